@@ -1,17 +1,20 @@
 """The records of a fit, as a planner's file."""
 
+import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
 from exfit import __version__
-from exfit.case.peek import limiter_places, section_of, stabiliser_inputs
+from exfit.case.peek import limiter_places, section_of, stabiliser_inputs, unused_values
 from exfit.errors import ExfitError, FileError
-from exfit.exchange.file_format import WIDTH, FileFormat
+from exfit.exchange.file_format import MOST_BUSES, WIDTH, FileFormat, is_machine_id
 from exfit.exchange.psse.files import PSSE_FILES
 from exfit.exchange.records import (
     PSSE,
+    RATING,
+    SHARE,
     SIGNALS,
     SPEED_FLAG,
     Definition,
@@ -19,7 +22,9 @@ from exfit.exchange.records import (
     contradictions,
     definition_of,
     definitions,
+    in_digits_borne,
     outside,
+    unused_of,
 )
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
@@ -32,6 +37,7 @@ from exfit.results.typical_values import by_weight, first_of
 from exfit.util.sources import NOT_STATED, TYPICAL, by_source
 from exfit.util.text import near, show
 
+NAME = re.compile(r"[A-Za-z_][\w.]*")  # in a tie
 CODES = {signal: code for code, signal in SIGNALS.items()}
 
 
@@ -45,11 +51,15 @@ class Exported:
 
 @dataclass(frozen=True)
 class Written:
-    """A record with its values, and their names by the source of their values."""
+    """A record with its values, and their names by the source of their values.
+
+    ``unused`` are values of the planner's file that its program does without.
+    """
 
     definition: Definition
     values: Mapping[str, float]
     by_source: Mapping[str, Sequence[str]]
+    unused: Mapping[str, float]
 
 
 def export(
@@ -89,8 +99,27 @@ def export(
     comments = [*origin, *(f"{text}." for text in of_fit)]
     comments += [text for record in written for text in _comments(record)]
     lines = [line for text in comments for line in comment_lines(text, files)]
-    lines += [files.record_text(own.definition, own.values, bus, machine_id) for own in written]
+    lines += [
+        files.record_text(own.definition, {**own.values, **own.unused}, bus, machine_id)
+        for own in written
+    ]
     return Exported("\n".join(lines) + "\n", (*of_fit, *warnings))
+
+
+def place_of(result: FitResult) -> tuple[int, str]:
+    """The bus and the machine id of a unit where it was found, 1 where that is not said.
+
+    Raises ExfitError for what no record can hold.
+    """
+    found = result.as_found
+    place = (None, None) if found is None else (found.bus, found.machine_id)
+    bus, machine_id = (1 if place[0] is None else place[0]), place[1] or "1"
+    if not (0 < bus < MOST_BUSES and is_machine_id(machine_id)):
+        raise ExfitError(
+            f"as_found: bus {bus}, id {machine_id!r} are not those of a record; "
+            "give them with --bus and --id"
+        )
+    return bus, machine_id
 
 
 def _translated(result: FitResult, translation: Translation) -> FitResult:
@@ -232,24 +261,60 @@ def _limiters(
             warnings.append(f"{name}: the exciter's record says nothing of its place: set its flag")
 
 
+def values_in_digits(result: FitResult, prefix: str) -> dict[str, float]:
+    """The values of a model; fitted ones, and those tied to them, in the digits that they bear."""
+    values = dict(result.values_of(prefix))
+    for symbol, value in values.items():
+        name = prefix + symbol
+        if name in result.parameters:
+            values[symbol] = in_digits_borne(value, result.parameters[name].rounding_error)
+        elif result.parameters.keys() & NAME.findall(result.ties.get(name, "")):
+            values[symbol] = in_digits_borne(value, None)
+    return values
+
+
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
     """Return a record with the values of a result.
 
     Raises ExfitError where one is missing, outside its data sheet's range, or contradicts others.
     """
-    values = result.values_of(prefix)
+    values = values_in_digits(result, prefix)
     sheet = definition.model.sheet
     missing = [row.symbol for row in sheet if row.symbol not in values]
     if missing:
         names = ", ".join(prefix + symbol for symbol in missing)
         raise ExfitError(f"{definition.record.name}: no value of {names} in the result")
     faults = [*outside(sheet, values)] or [*contradictions(definition.model, values)]
+    faults = faults or [*_not_whole(definition, values)]
     if faults:
         texts = (f"{definition.record.name}: {prefix}{symbol}: {text}" for symbol, text in faults)
         raise FileError(texts)
     own = {row.symbol: result.sources.get(prefix + row.symbol, NOT_STATED) for row in sheet}
     written = [name for name in definition.names if name in own]
-    return Written(definition, values, by_source(written, own))
+    unused = _unused(result, definition.record, prefix, values)
+    return Written(definition, values, by_source(written, own), unused)
+
+
+def _unused(
+    result: FitResult, record: DynamicsRecord, prefix: str, values: Mapping[str, float]
+) -> dict[str, float]:
+    """Return what the planner's file has of a record beside the values of the case."""
+    of_file = unused_values(result.case_text, result.case)
+    symbols = [*dict(record.unused)]
+    if prefix + SHARE not in result.parameters:
+        symbols.append(RATING)
+    return {
+        symbol: of_file[prefix + symbol]
+        for symbol in symbols
+        if prefix + symbol in of_file and values.get(symbol, 0.0) == 0.0
+    }
+
+
+def _not_whole(definition: Definition, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Yield (symbol, fault) for each integer of a record whose value is none."""
+    for symbol, _ in definition.record.icons:
+        if not float(values.get(symbol, 0.0)).is_integer():
+            yield symbol, f"{show(values[symbol])} is not a whole number"
 
 
 def _warnings(entry: Written) -> Iterator[str]:
@@ -257,8 +322,12 @@ def _warnings(entry: Written) -> Iterator[str]:
     record = entry.definition.record
     for row in entry.definition.model.sheet:
         value = entry.values[row.symbol]
+        if row.symbol == SHARE and RATING in entry.unused:
+            continue
         if row.symbol not in entry.definition.names and _matters(row.symbol, value):
             yield f"{record.name} cannot hold {row.symbol} = {show(value)}: it is lost"
+    for symbol, value in unused_of(record, entry.values).items():
+        yield f"{record.name}: {entry.definition.program} does without {symbol} = {show(value)}"
     if record.doubt:
         yield f"{record.name}: {record.doubt}"
     if TYPICAL in entry.by_source:

@@ -68,3 +68,8 @@ def wrong_id(machine_id: str) -> Iterator[str]:
     """Yield why a text is not the id of a machine."""
     if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
         yield f"{show_value(machine_id)} is not a machine id of one or two characters"
+
+
+def is_machine_id(text: str) -> bool:
+    """Return whether a record that exfit writes can have this id of a machine."""
+    return 1 <= len(text) <= LONGEST_ID and text.isascii() and text.isalnum()

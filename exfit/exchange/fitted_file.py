@@ -14,10 +14,19 @@ from typing import NamedTuple
 
 from exfit.case.peek import stabiliser_inputs
 from exfit.errors import ExfitError
+from exfit.exchange.export import values_in_digits
 from exfit.exchange.fields import Field, encoded, number, text_of
-from exfit.exchange.records import UNSATURATED, Definition, read_values
+from exfit.exchange.records import (
+    OF_SATURATION,
+    RATING,
+    SHARE,
+    Definition,
+    idle_lags,
+    read_values,
+)
 from exfit.exchange.unit import Unit, UnitPart
 from exfit.exchange.units import DynamicsUnits, read_units
+from exfit.models.sheet import Parameter
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.util.sources import TYPICAL
@@ -238,17 +247,9 @@ def _edits(result: FitResult, part: UnitPart, prefix: str, file: str) -> Iterato
 
     Typical values are not of the unit: their fields stay, and what no field holds is not missed.
     """
-    values = result.values_of(prefix)
+    values = values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
-    symbols = _symbols(part.definition)
-    changed = {
-        symbol
-        for symbol in symbols
-        if result.sources.get(prefix + symbol) != TYPICAL
-        and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
-    }
-    if changed & UNSATURATED.keys() and _without_saturation(part):
-        changed |= UNSATURATED.keys()
+    changed = _changed(result, part, prefix, values)
     _refuse_nonquadratic(result, part, changed)
     whole = dict(part.definition.record.icons)
     edits = []
@@ -260,6 +261,21 @@ def _edits(result: FitResult, part: UnitPart, prefix: str, file: str) -> Iterato
     yield from (edit for edit in edits if float(edit.text) != number(edit.field))
 
 
+def _changed(
+    result: FitResult, part: UnitPart, prefix: str, values: Mapping[str, float]
+) -> set[str]:
+    """The parameters of a record that change, with the fields that then say something again."""
+    changed = {
+        symbol
+        for symbol in _symbols(part.definition)
+        if result.sources.get(prefix + symbol) != TYPICAL
+        and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
+    }
+    return changed | {
+        row.symbol for row in _idle(part) if row.search and row.search.needs in changed
+    }
+
+
 def _refuse_lost(
     result: FitResult, part: UnitPart, prefix: str, values: Mapping[str, float]
 ) -> None:
@@ -267,6 +283,8 @@ def _refuse_lost(
     record = part.definition.record
     fields = {*part.definition.names}
     own = {symbol: part.values[symbol] for symbol in dict(record.held)}
+    if RATING in dict(part.unused):
+        del own[SHARE]  # the file has the rating, and a case its share of a base not in the file
     for symbol in (row.symbol for row in part.definition.model.sheet):
         lost = f"{record.name} cannot hold {symbol} = {show(values[symbol])}"
         if symbol not in fields and prefix + symbol in result.parameters:
@@ -275,15 +293,15 @@ def _refuse_lost(
             raise ExfitError(f"{lost}: it stands for {show(own[symbol])}")
 
 
-def _without_saturation(part: UnitPart) -> bool:
-    """Return whether a record has four zeros in place of a saturation curve."""
-    fields = dict(zip(part.definition.names, part.fields, strict=True))
-    return all(number(fields[name]) == 0.0 for name in UNSATURATED if name in fields)
+def _idle(part: UnitPart) -> list[Parameter]:
+    """The lags of 0 that a record may have as long as their gains are 0."""
+    named = zip(part.definition.names, part.fields, strict=True)
+    return idle_lags(part.definition.model.sheet, {name: number(field) for name, field in named})
 
 
 def _refuse_nonquadratic(result: FitResult, part: UnitPart, changed: Iterable[str]) -> None:
     """Raise ExfitError where a saturation changes that the fit took in another form."""
-    own = [name for name in changed if name in UNSATURATED]
+    own = [name for name in changed if name in OF_SATURATION]
     if own and part.definition.kind == "exciter" and result.saturation != "quadratic":
         raise ExfitError(
             f"fitted with saturation: {result.saturation}; {part.definition.program} takes "

@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import wrap
 
 from exfit.case.templates import (
+    WIDTH,
     PlannerUnit,
     as_found_lines,
     commented,
@@ -69,8 +71,13 @@ def as_found(unit: Unit, file: str) -> Iterator[str]:
         for row in part.definition.model.sheet
         if row.symbol in part.definition.names
     }
+    unused = {
+        _prefix(part) + symbol: value
+        for part in (unit.exciter, unit.machine, *unit.added)
+        for symbol, value in part.unused
+    }
     source = PlannerUnit(unit.bus, in_comment(unit.id), file)
-    yield from as_found_lines(source, unit.exciter.definition.model.name, values)
+    yield from as_found_lines(source, unit.exciter.definition.model.name, values, unused)
 
 
 def _prefix(part: UnitPart) -> str:
@@ -82,7 +89,8 @@ def _heading(unit: Unit, file: str) -> Iterator[str]:
     name = in_comment(Path(file).name)
     yield f"# Unit {in_comment(unit.id)} at bus {unit.bus} of {name}, on open circuit."
     for line, text in unit.warnings:
-        yield f"# Line {line}: {in_comment(text)}."
+        remark = f"Line {line}: {in_comment(text)}."
+        yield from wrap(remark, WIDTH, initial_indent="# ", subsequent_indent="#   ")
 
 
 def _exciter_name(exciter: UnitPart) -> Iterator[str]:

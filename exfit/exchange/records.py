@@ -7,16 +7,18 @@ from exfit.exchange.fields import DynamicsFault, Field, number, whole
 from exfit.models import GOVERNORS, MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
-from exfit.models.sheet import DynamicsRecord, Model, Sheet, typical
-from exfit.util.text import show, show_value
+from exfit.models.sheet import DynamicsRecord, Model, Parameter, Sheet, typical
+from exfit.util.text import rounded, show, show_value
 
 PSSE, PSLF = "PSS/E", "PSLF"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
+RATING, SHARE = "Trate", "Trate_Mbase"  # of a turbine: MW, and over the machine's base
 SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
 FLAGS = ("OEL", "UEL")  # of the places where limiters act
 LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
-UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
+OF_SATURATION = ("E1", "SE1", "E2", "SE2")
+LEAST_DIGITS = 4  # of a fitted value: with fewer, values that depend on each other miss the record
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Reading:
     """What the fields of a record say: values by symbol, what is wrong, what must be known.
 
     ``inputs`` are the signals of a stabiliser whose record has codes of them; ``times_speed`` says
-    that efd is multiplied by the speed.
+    that efd is multiplied by the speed; ``unused`` are the file's values of what is 0 in
+    ``values``, since its program does without them, or not there: the rating of a turbine.
     """
 
     values: Mapping[str, float]
@@ -62,6 +65,7 @@ class Reading:
     warnings: list[DynamicsFault]
     inputs: tuple[str, ...] = ()
     times_speed: bool = False
+    unused: tuple[tuple[str, float], ...] = ()
 
 
 def definitions(program: str = PSSE) -> list[Definition]:
@@ -129,17 +133,39 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
 
     given, unreadable = _numbers(definition, fields)
     rows = definition.model.sheet
+    given = with_exchanged(record, given)
     of_sheet = {row.symbol: given[row.symbol] for row in rows if row.symbol in given}
-    if all(of_sheet.get(name) == 0.0 for name in UNSATURATED):
-        of_sheet |= UNSATURATED  # the voltages say nothing
-    values = {**typical(rows), **dict(record.held), **of_sheet}
+    idle = idle_lags(rows, of_sheet)
+    of_sheet |= {row.symbol: row.typical for row in idle}
+    unused = unused_of(record, of_sheet)
+    values = {**typical(rows), **dict(record.held), **of_sheet, **dict.fromkeys(unused, 0.0)}
     wrong = [*unreadable, *outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
     doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
     unmodelled = [*_unmodelled(definition, given), *_without_effect(rows, of_sheet)]
-    warnings = doubt + placed([*unmodelled, *_lacking(definition)])
+    unmodelled += [*_unused(definition, unused), *_rating(given)]
+    unmodelled += [(row.symbol, _says_nothing(row)) for row in idle]
+    short = [*_short(definition, line, fields)]
+    warnings = doubt + short + placed([*unmodelled, *_lacking(definition)])
     times_speed = record.times_speed or given.get(SPEED_FLAG, 0.0) != 0.0
-    return Reading(values, placed(wrong), warnings, _inputs(definition, given), times_speed)
+    inputs = _inputs(definition, given)
+    kept = tuple((unused | {name: given[name] for name, _ in _rating(given)}).items())
+    return Reading(values, placed(wrong), warnings, inputs, times_speed, kept)
+
+
+def with_exchanged(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:
+    """Return values of which two have changed places, where they do so in a record."""
+    pairs = zip(record.exchanged, reversed(record.exchanged), strict=True)
+    return {**values, **{name: values[other] for name, other in pairs if other in values}}
+
+
+def unused_of(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:
+    """Return those values that act in a model and not in the program of a record."""
+    return {
+        name: values[name]
+        for name, other in record.unused
+        if values.get(name, 0.0) != 0.0 and values.get(other, 0.0) == 0.0
+    }
 
 
 def record_fields(definition: Definition, values: Mapping[str, float]) -> list[str]:
@@ -147,13 +173,38 @@ def record_fields(definition: Definition, values: Mapping[str, float]) -> list[s
     record = definition.record
     integers = dict(record.icons)
     given = {**dict.fromkeys(record.ignored, 0.0), **integers, **values, **dict(record.absent)}
-    if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
+    given = with_exchanged(record, given)
+    if {*OF_SATURATION} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):
             given[first], given[second] = given[second], given[first]
     return [
         str(int(given[name])) if name in integers else repr(float(given[name])).upper()
         for name in definition.names
     ]
+
+
+def idle_lags(rows: Sheet, given: Mapping[str, float]) -> list[Parameter]:
+    """The lags of 0 that the model cannot have, and whose gain of 0 asks for none."""
+    return [
+        row
+        for row in rows
+        if row.is_time
+        and row.low > 0.0 == given.get(row.symbol)
+        and row.search is not None
+        # above EFDN, KN takes the place of KF
+        and given.get(row.search.needs) == 0.0 == given.get("KN", 0.0)
+    ]
+
+
+def _says_nothing(row: Parameter) -> str:
+    gain = "" if row.search is None else row.search.needs
+    return f"0 says nothing, since {gain} is 0; the typical value {show(row.typical)} is taken"
+
+
+def in_digits_borne(value: float, error: float | None) -> float:
+    """A fitted value in the digits that its standard error bears, at least four."""
+    candidates = float(rounded(value, error)), float(f"{value:.{LEAST_DIGITS}g}")
+    return min(candidates, key=lambda candidate: abs(candidate - value))
 
 
 def _numbers(
@@ -197,6 +248,16 @@ def _inputs(definition: Definition, given: Mapping[str, float]) -> tuple[str, ..
     return tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
 
 
+def _short(definition: Definition, line: int, fields: tuple[Field, ...]) -> Iterable[DynamicsFault]:
+    """Yield which values, that might do something, a file of PSLF does not have."""
+    record = definition.record
+    named = zip(definition.names, fields, strict=True)
+    missing = [name for name, field in named if not field.end and name in dict(record.absent)]
+    if missing:
+        text = f"{record.name}: not in the file, taken as without effect: {', '.join(missing)}"
+        yield DynamicsFault(line, text)
+
+
 def _lacking(definition: Definition) -> Iterable[tuple[str, str]]:
     """Yield (symbol, warning) for what the model has and the record has not."""
     for row in definition.model.sheet:
@@ -217,6 +278,22 @@ def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Iterable[
             continue
         if value != modelled and name not in explained:
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
+
+
+def _unused(definition: Definition, unused: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for what the program of a record does without."""
+    for name, value in unused.items():
+        other = dict(definition.record.unused)[name]
+        why = f", since {other} is 0" if other else ""
+        yield name, f"{show(value)} does not act in {definition.program}{why}; 0 is taken"
+
+
+def _rating(given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for the rating of a turbine, where it has one of its own."""
+    rating = given.get(RATING, 0.0)
+    if rating != 0.0:
+        text = f"{show(rating)} MW, but the machine's base is not in the file: {SHARE} is 1 in the "
+        yield RATING, f"{text}case, where it must be {show(rating)} over that base"
 
 
 def _without_effect(rows: Sheet, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:

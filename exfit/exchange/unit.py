@@ -7,12 +7,18 @@ from exfit.errors import DynamicsError
 from exfit.exchange.fields import DynamicsFault, Field, located, number, refuse
 from exfit.exchange.file_format import Head
 from exfit.exchange.formats import format_of
-from exfit.exchange.records import FLAGS, Definition, definition_of, definitions, read_values
+from exfit.exchange.records import (
+    FLAGS,
+    SHARE,
+    Definition,
+    definition_of,
+    definitions,
+    read_values,
+)
 from exfit.models import LIMITERS
 from exfit.util.text import near, show
 
 NEEDED = ("machine", "exciter")
-BASE_SHARE = "Trate_Mbase"  # the base of a governor over the machine's, where its model has it
 LIMITER = "excitation limiter"
 MOST_LISTED = 20  # units in a message
 OTHERS: Mapping[str, str] = {
@@ -22,7 +28,7 @@ OTHERS: Mapping[str, str] = {
             HYGOVDU HYGOVM HYGOVR1 HYGOVRU HYGOVT IEEEG1 IEEEG1SDU IEEEG2 IEEEG3 IEESGO IVOGO
             PIDGOV SHAF25 TGOV1 TGOV1DU TGOV2 TGOV3 TGOV4 TGOV5 TURCZT TWDM1T TWDM2T URCSCT URGS3T
             WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
-        "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PSS2C PSS5C PSS6C PSS7C PTIST1 PTIST3
+        "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PTIST1 PTIST3
             STAB3 STAB4 STABNI STBSVC""",
         LIMITER: "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL4C UEL2",
         "compensator": "COMP COMPCC IEEEVC REMCMP",
@@ -38,7 +44,8 @@ class UnitPart:
     """A model of the unit with the values of its record, which begins on ``line``.
 
     ``fields`` are those behind the id, one for each name of the definition; ``inputs`` the signals
-    of a stabiliser whose record has codes of them.
+    of a stabiliser whose record has codes of them; ``unused`` the file's values of what ``values``
+    has as 0, or not at all.
     """
 
     definition: Definition
@@ -47,6 +54,7 @@ class UnitPart:
     fields: tuple[Field, ...] = ()
     inputs: tuple[str, ...] = ()
     times_speed: bool = False
+    unused: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -123,9 +131,9 @@ def _on_its_base(
     own, machine = bases.get("governor"), bases.get("machine")
     if own is None or own == machine:
         return governor
-    if machine is not None and machine > 0.0 and BASE_SHARE in governor.values:
+    if machine is not None and machine > 0.0 and SHARE in governor.values:
         share = own / machine
-        return replace(governor, values={**governor.values, BASE_SHARE: share})
+        return replace(governor, values={**governor.values, SHARE: share})
     theirs = "is not in the file" if machine is None else f"is {show(machine)} MVA"
     name = governor.definition.record.name
     text = (
@@ -181,6 +189,7 @@ def _parts(
             head.fields,
             reading.inputs,
             reading.times_speed,
+            reading.unused,
         )
     return parts
 
@@ -194,6 +203,8 @@ def _chosen(
         for key, records in units.items()
         if bus in (None, key[0]) and (machine_id is None or machine_id.strip().upper() == key[1])
     }
+    if len(meant) > 1:
+        meant = {key: records for key, records in meant.items() if not all_classical(records)}
     if len(meant) == 1:
         return next(iter(meant.values()))
     if meant:
@@ -242,6 +253,11 @@ def classical_machines(heads: Iterable[Head]) -> Iterator[DynamicsFault]:
             yield DynamicsFault(head.line, f"{head.name} is {CLASSICAL[head.name.upper()]}")
 
 
+def all_classical(heads: Iterable[Head]) -> bool:
+    """Whether the records at a place are classical machines alone, which are no unit to verify."""
+    return all(head.name.upper() in CLASSICAL for head in heads)
+
+
 def names_of(kind: str, program: str) -> list[str]:
     """Return the names by which a file of a program may have a machine or an exciter."""
     return sorted(
@@ -266,8 +282,13 @@ def _left_out(head: Head, exciter: UnitPart) -> str:
     if kind is None:
         return f"{head.name} is left out: not a known model"
     name = head.name.upper()
-    how = f": give it under limiters{_place(name, exciter)}" if name in LIMITERS else ""
-    return f"{kind} {name} is left out{how}"
+    if name not in LIMITERS:
+        return f"{kind} {name} is left out"
+    how = f"give it under limiters{_place(name, exciter)}"
+    for record in LIMITERS[name].records:
+        if record.exchanged:
+            how += f", {' and '.join(record.exchanged)} exchanged"
+    return f"{kind} {name} is left out: {how}"
 
 
 def _place(limiter: str, exciter: UnitPart) -> str:

@@ -10,6 +10,7 @@ from exfit.exchange.formats import format_of
 from exfit.exchange.unit import (
     NEEDED,
     Unit,
+    all_classical,
     by_unit,
     classical_machines,
     kind_left_out,
@@ -39,11 +40,15 @@ class RefusedUnit:
 
 @dataclass(frozen=True)
 class DynamicsUnits:
-    """The units of a file in its order; ``faults`` are of records that belong to no unit."""
+    """The units of a dynamics file in its order; ``faults`` are of records that belong to no unit.
+
+    ``classical`` counts the classical machines without an exciter, which are no units.
+    """
 
     units: tuple[Unit, ...]
     refused: tuple[RefusedUnit, ...]
     faults: tuple[DynamicsFault, ...]
+    classical: int = 0
 
 
 def read_units(text: str, file: str | Path) -> DynamicsUnits:
@@ -53,14 +58,17 @@ def read_units(text: str, file: str | Path) -> DynamicsUnits:
     loads and other devices whose records begin so count as units without a machine.
     """
     heads, faults = format_of(file).heads(text)
-    units, refused = list[Unit](), list[RefusedUnit]()
+    units, refused, classical = list[Unit](), list[RefusedUnit](), 0
     for own in by_unit(heads).values():
+        if all_classical(own):
+            classical += 1
+            continue
         unit, wrong = unit_of(own)
         if unit is not None:
             units.append(unit)
         else:
             refused.append(_refused(own, wrong))
-    return DynamicsUnits(tuple(units), tuple(refused), tuple(faults))
+    return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical)
 
 
 def _refused(heads: Sequence[Head], faults: Sequence[DynamicsFault]) -> RefusedUnit:

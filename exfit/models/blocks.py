@@ -274,14 +274,16 @@ class Saturation(NamedTuple):
 def quadratic(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:
     """VX = B (E - A)^2 through two points, zero below the knee A (as in PSS/E).
 
-    The points may come in either order; both SE zero is a machine without saturation.
+    The points may come in either order; both SE zero is a machine without saturation, wherever
+    they lie.
     """
+    none = (SE1 <= 0.0) & (SE2 <= 0.0)
     swapped = E1 > E2
     low, high = where(swapped, E2, E1), where(swapped, E1, E2)
     vx_low, vx_high = where(swapped, E2 * SE2, E1 * SE1), where(swapped, E1 * SE1, E2 * SE2)
     ratio = sqrt(vx_low / where(vx_high > 0.0, vx_high, 1.0))
     knee = (low - ratio * high) / (1.0 - ratio)
-    gain = vx_high / ((high - knee) * (high - knee))
+    gain = vx_high / where(none, 1.0, (high - knee) * (high - knee))
     above = larger(e - knee, 0.0)
     return Saturation(gain * above * above, 2.0 * gain * above)
 
@@ -289,7 +291,7 @@ def quadratic(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Sa
 def growth(E1: Signal, y1: Signal, E2: Signal, y2: Signal) -> Signal:
     """Return B of y = A exp(B E) through two points, zero where both lie at zero."""
     none = (y1 <= 0.0) & (y2 <= 0.0)
-    return log(where(none, 1.0, y2) / where(none, 1.0, y1)) / (E2 - E1)
+    return log(where(none, 1.0, y2) / where(none, 1.0, y1)) / where(none, 1.0, E2 - E1)
 
 
 def exponential(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:

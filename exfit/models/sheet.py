@@ -141,6 +141,8 @@ class DynamicsRecord:
     only value that the model stands for, unless its sheet has the symbol; ``absent`` are symbols
     that the model does not have, with the only value that it stands for; ``held`` are those of the
     model that the record does not have, with the value that makes the model that of the record;
+    ``unused`` are those that the program reads and does without, always or where another one is 0,
+    which is named: the model then has 0; ``exchanged`` are two whose values change places there;
     ``ignored`` are symbols (integers too) that act only where a limiter does, or otherwise not in
     the model's own equations: any value will do; ``doubt`` says what is not settled about the
     order; ``spelled`` are symbols with their names in the file, where these differ by more than
@@ -158,6 +160,8 @@ class DynamicsRecord:
     times_speed: bool = False
     spelled: tuple[tuple[str, str], ...] = ()
     places: tuple[tuple[int, str], ...] = ()
+    unused: tuple[tuple[str, str], ...] = ()
+    exchanged: tuple[str, ...] = ()
 
 
 def record(
@@ -172,6 +176,8 @@ def record(
     times_speed: bool = False,
     spelled: Mapping[str, str] | None = None,
     places: Mapping[int, str] | None = None,
+    unused: Mapping[str, str] | None = None,
+    exchanged: str = "",
 ) -> DynamicsRecord:
     """Return a record from its symbols in one text, ``"TR KA TA"``."""
     return DynamicsRecord(
@@ -185,6 +191,8 @@ def record(
         times_speed,
         tuple((spelled or {}).items()),
         tuple((places or {}).items()),
+        tuple((unused or {}).items()),
+        tuple(exchanged.split()),
     )
 
 
@@ -192,7 +200,7 @@ def record(
 OF_A_LIST = "its order is that of a public list of parameters, not confirmed by a file"
 AS_IN_PSSE = "its order is taken to be that of PSS/E, not confirmed by a file"
 # what is not settled about orders of PSS/E
-OF_ONE_PROGRAM = "its order is that of another open program, not confirmed by a file"
+OF_TWO_PROGRAMS = "its order is as InterPSS and PowerWorld read it, not confirmed by PSS/E"
 # what flags of limiters mean (InterPSS); 0 says that the input is not used
 ONE_GATE = {1: "summing", 2: "takeover"}
 TWO_GATES = {**ONE_GATE, 3: "takeover-output"}
@@ -300,24 +308,31 @@ def crossed_limits(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
 def saturation_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) where two saturation points contradict each other.
 
-    Saturation grows with the voltage: SE at the higher of E1, E2 is the larger, or both are zero.
+    Saturation grows with the voltage: SE at the higher of E1, E2 is the larger. Where both SE are
+    zero there is none, and E1 and E2 say nothing.
     """
     if not {"E1", "SE1", "E2", "SE2"} <= values.keys():
         return
-    (low, se_low, _), (high, se_high, name) = sorted(
-        [(values["E1"], values["SE1"], "SE1"), (values["E2"], values["SE2"], "SE2")]
+    if values["SE1"] == values["SE2"] == 0.0:
+        return
+    (low, se_low, lower, _), (high, se_high, _, name) = sorted(
+        [(values["E1"], values["SE1"], "E1", "SE1"), (values["E2"], values["SE2"], "E2", "SE2")]
     )
     if low == high:
         yield "E1", f"{low:g} equals E2: two points are needed"
-    elif se_high <= se_low and (se_low, se_high) != (0.0, 0.0):
+    elif low == 0.0:
+        yield lower, "0 is no point of a saturation curve, unless SE1 and SE2 are 0"
+    elif se_high <= se_low:
         yield name, f"{se_high:g} at {high:g} pu is not above {se_low:g} at {low:g} pu"
 
 
 def stabiliser_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, fault) for a ramp tracking filter or a switch that cannot be."""
+    """Yield (symbol, fault) for a ramp tracking filter, a transducer or a switch that cannot be."""
     lags = values.get("M", 1.0) * values.get("N", 1.0)
     if "N" in values and lags > MOST_LAGS:
         yield "N", f"M N = {lags:g} lags of the ramp tracking filter exceed {MOST_LAGS}"
+    if values.get("ALI", 0.0) > 0.0 and values["BLI"] == 0.0:  # of PSS4B
+        yield "BLI", f"0 leaves the transducer with ALI = {values['ALI']:g} undamped"
     on, off = values.get("PPSSON", 0.0), values.get("PPSSOFF", 0.0)
     if off > on > 0.0:
         yield "PPSSOFF", f"{off:g} is above PPSSON = {on:g}"

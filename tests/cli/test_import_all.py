@@ -20,8 +20,8 @@ CASES = ["bus-1-1.yaml", "bus-1-2.yaml", "bus-9-1.yaml"]
 
 @pytest.fixture(autouse=True)
 def workplace(empty_folder):
-    """Work in a folder with a file of three units, and one that exfit has no model of."""
-    Path("units.dyr").write_text(THREE + "7 GENCLS 1 3 0 /\n")
+    """Work in a folder with a file of three units, a classical machine, and a load."""
+    Path("units.dyr").write_text(THREE + "7 GENCLS 1 3 0 /\n8 IEELBL 1 1 0 /\n")
     Path("records").mkdir()
     return empty_folder
 
@@ -43,7 +43,7 @@ def test_every_unit_becomes_the_case_that_it_becomes_alone(run):
     ran = run("import", "--all", "units.dyr", "-o", "cases")
     assert ran.code == 0
     assert ran.out == "written to cases; cases: 3, with records: 0; all units: units.csv\n"
-    assert "no model: bus 7, machine 1: line 13: GENCLS is a constant voltage" in ran.err
+    assert "not units to verify: 1 GENCLS without an exciter" in ran.err
     assert sorted(path.name for path in Path("cases").iterdir()) == [*CASES, "units.csv"]
     for name in CASES:
         _, bus, machine_id = name.removesuffix(".yaml").split("-")
@@ -52,6 +52,7 @@ def test_every_unit_becomes_the_case_that_it_becomes_alone(run):
         assert Path("cases", name).read_text() == alone.read_text()
     rows = units_of()
     assert [row["status"] for row in rows.values()] == ["written"] * 3 + ["no model"]
+    assert "no model: bus 8, machine 1: line 14: no machine and no exciter" in ran.err
     assert (rows["1 2"]["machine"], rows["1 2"]["case"]) == ("GENROU", "bus-1-2.yaml")
 
 

@@ -3,9 +3,11 @@
 from dataclasses import replace
 from functools import partial
 from itertools import count
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from dynamics import THREE, replaced
 from dyr_words import changed_words
 from loose_dyd import PSLF_UNIT, loose_dyd
@@ -13,10 +15,22 @@ from loose_records import loose, sound
 from records import TEST, TIME, case_of, one, synthetic
 
 from exfit import workflows
+from exfit.case.load import parse_case
+from exfit.exchange.export import export
 from exfit.exchange.fields import text_of
 from exfit.exchange.fitted_file import FittedUnit, fitted_file, number_text
-from exfit.exchange.records import PSLF, PSSE, contradictions, definition_of, definitions
+from exfit.exchange.import_case import case_text
+from exfit.exchange.psse.files import record_text
+from exfit.exchange.records import (
+    PSLF,
+    PSSE,
+    contradictions,
+    definition_of,
+    definitions,
+    unused_of,
+)
 from exfit.exchange.units import read_units
+from exfit.models.sheet import typical
 from exfit.results.model import FittedParameter
 from exfit.results.other_values import AsFound
 from exfit.util.sources import FITTED, TYPICAL
@@ -122,7 +136,8 @@ def other_values(unit, random, share=0.4):
         trial = {**part.values, **{name: rounded(drawn[name]) for name in chosen}}
         rows = {row.symbol: row for row in part.definition.model.sheet}
         inside = all(rows[name].low <= trial[name] <= rows[name].high for name in chosen)
-        if inside and not [*contradictions(part.definition.model, trial)]:
+        acts = not unused_of(part.definition.record, trial)
+        if inside and acts and not [*contradictions(part.definition.model, trial)]:
             values |= {prefix + name: trial[name] for name in chosen}
     return values
 
@@ -326,6 +341,59 @@ def test_a_unit_that_is_not_in_the_file_or_has_several_fits_is_named(fit):
     ]
 
 
+@pytest.mark.parametrize("name", [name for name, of in DEFINITIONS.items() if of.record.unused])
+def test_what_its_program_does_without_is_0_in_a_case_and_stays_in_the_file(name, fit):
+    own = DEFINITIONS[name]
+    partners = {"machine": GENROU, "exciter": ESAC1A} | {own.kind: own}
+    values = {kind: typical(of.model.sheet) for kind, of in partners.items()}
+    ((symbol, _),) = own.record.unused
+    values[own.kind][symbol] = 0.4
+    text = "\n".join(record_text(of, values[kind], 7, "1") for kind, of in partners.items()) + "\n"
+    unit, full = unit_of(text.encode(), 7), PREFIXES[own.kind] + symbol
+    (warning,) = [w.text for w in unit.warnings if f"{name}: {symbol}: 0.4 does not act" in w.text]
+    assert warning.endswith("; 0 is taken")
+    case = case_text(unit, "units.dyr")
+    found = yaml.safe_load(case)["as_found"]
+    assert found["unused"] == {full: 0.4}
+    assert found["parameters"][full] == values_of(unit)[full] == 0.0
+    as_case = {"case_text": case, "case": Path("unit.yaml")}
+    changed = {**values_of(unit), "KA": 321.0}
+    written = export(verified(fit, unit, changed, **as_case), 7, "1")
+    assert f"{record_text(own, values[own.kind] | {'KA': 321.0}, 7, '1')}\n" in written.text
+    assert not any("does without" in text for text in written.warnings)
+    kept = exported(text.encode(), verified(fit, unit, changed))
+    assert [after for _, after in changed_words(text, kept.data.decode())] == [321.0]
+    acting = export(verified(fit, unit, {**changed, full: 0.4}), 7, "1")
+    assert f"{name}: PSS/E does without {symbol} = 0.4" in acting.warnings
+
+
+def test_the_rating_of_a_turbine_is_named_at_import_and_stays_in_the_file(fit):
+    """It is in MW, the case has its share of the machine's base, which is not in a .dyr file."""
+    parts = (GENROU, ESAC1A, DEFINITIONS["GGOV1"])
+
+    def text_of_rating(MW):
+        values = [typical(of.model.sheet) | {"Trate": MW} for of in parts]
+        return "".join(record_text(*one, 7, "1") + "\n" for one in zip(parts, values, strict=True))
+
+    def warned(unit):
+        return [text for _, text in unit.warnings if "GGOV1: Trate: " in text]
+
+    assert warned(unit_of(text_of_rating(0.0).encode(), 7)) == []
+    text = text_of_rating(390.24)
+    unit = unit_of(text.encode(), 7)
+    (warning,) = warned(unit)
+    assert warning.endswith("where it must be 390.24 over that base")
+    case = case_text(unit, "units.dyr")
+    assert parse_case(case, Path("unit.yaml")).as_found.unused == {"governor.Trate": 390.24}
+    values = {**values_of(unit), "KA": 321.0, "governor.Trate_Mbase": 3.9024}
+    result = verified(fit, unit, values, case_text=case, case=Path("unit.yaml"))
+    written = export(result, 7, "1")
+    assert written.text.endswith(text[text.index("7  'GGOV1'") :])
+    assert not any("Trate" in warning for warning in written.warnings)
+    kept = exported(text.encode(), result)
+    assert [after for _, after in changed_words(text, kept.data.decode())] == [321.0]
+
+
 def test_four_zeros_in_place_of_a_saturation_give_way_to_a_whole_curve(fit):
     data = replaced("3.14 .03 4.18 .1", "0 0 0 0").encode()
     unit = unit_of(data, 1)
@@ -343,3 +411,16 @@ def test_four_zeros_in_place_of_a_saturation_give_way_to_a_whole_curve(fit):
 def test_a_number_is_readable_and_has_a_point(value, text):
     assert number_text(value) == text
     assert float(text) == pytest.approx(value, rel=WRITTEN)
+
+
+def test_a_lag_of_0_is_written_with_the_gain_that_it_goes_with(fit):
+    """KF and TF of the record are 0: a fit that has a KF has its TF as well."""
+    data = replaced(" .024 1 ", " 0 0 ").encode()
+    unit = unit_of(data, 1)
+    found = values_of(unit)
+    assert (found["KF"], found["TF"]) == (0.0, 1.0)
+    other = exported(data, verified(fit, unit, {**found, "KA": 300.0}))
+    assert other.data == data.replace(b" 766 ", b" 300.0 ")
+    both = exported(data, verified(fit, unit, {**found, "KF": 0.03}))
+    assert both.data == data.replace(b"1.3 0 0 ", b"1.3 0.03 1.0 ")
+    assert [change.parameter for change in both.changes] == ["KF", "TF"]

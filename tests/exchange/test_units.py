@@ -56,15 +56,28 @@ def test_a_record_without_an_end_leaves_the_other_units(damaged):
 
 
 def test_a_unit_without_a_model_is_named_with_its_records():
-    text = SOUND + "7 GENCLS 1 3 0 /\n8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
+    text = SOUND + "8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
     no_model = {unit.bus: unit for unit in read_units(text, "f").refused}
-    assert [unit.modelled for unit in no_model.values()] == [False] * 3
-    assert "GENCLS is a constant voltage behind a reactance" in no_model[7].faults[0].text
+    assert [unit.modelled for unit in no_model.values()] == [False] * 2
     assert "no exciter of the catalogue: GENROU, IEEEG1" in no_model[8].faults[0].text + (
         no_model[8].faults[1].text
     )
     assert no_model[9].faults[1].text == "ESACA1A: did you mean ESAC1A?"
-    assert len(no_model[7].faults) == 1
+
+
+def test_a_classical_machine_without_an_exciter_is_no_unit():
+    text = (
+        "6 GENCLS 1 3 0 /\n"
+        + SOUND
+        + "7 GENCLS 1 99999 0 /\n8 GENCLS 1 3 0 /\n8 SEXS 1 .1 10 100 .1 0 5 /\n"
+    )
+    units = read_units(text, "f")
+    assert (len(units.units), units.classical) == (1, 2)
+    assert read_unit(text[: text.index("8 GENCLS")], "unit.dyr") == units.units[0]
+    (refused,) = units.refused
+    assert "GENCLS is a constant voltage behind a reactance" in refused.faults[0].text
+    with pytest.raises(DynamicsError, match="GENCLS is a constant voltage behind a reactance"):
+        read_unit(text, "unit.dyr", 7)
 
 
 @pytest.mark.parametrize("seed", few_of(range(100), 25))

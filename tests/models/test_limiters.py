@@ -12,8 +12,11 @@ from typed_on_load import Typed
 
 from exfit.engine.kernel import Kernel, Span
 from exfit.engine.system import Rest, System
+from exfit.exchange.fields import Field
+from exfit.exchange.records import Definition, read_values, record_fields
 from exfit.models import LIMITERS, MODELS
 from exfit.models.blocks import SHORTEST, Limited
+from exfit.models.limiter_blocks import counting
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, typical
 from exfit.plants import (
@@ -316,6 +319,38 @@ def test_OEL2C_counts_acts_and_is_reset():
     assert states["IREF"][on + round((p["IINST"] - p["ILIM"]) / 20.0 / 5e-4) + 2] == p["ILIM"]
     assert states["IREF"][-1] == p["IINST"]
     assert got[-1, 0] == p["VOELMAX1"]
+
+
+# OEL2CU1 in PSS/E 36.7 (InterPSS-Project/ipss-plugin, EmbeddedNativeTrajectoryValues.java at
+# f727fb59): its constants without the last one, the rated field current; t, current and timer
+OF_PSSE = """
+    0.015 0.08 0.02 0.1 0.35 0.8 0.01 0.08 0 -1 0 -1 0 -1 0 0.12 0.4 0.04 0.7 0.02 1.02 0.9 1.45 1.1
+    0.05 1.8 0.2 2 0.05 0.5 -0.5 1 -1 0.2 1 0 0 -2 2 0.1
+"""
+TIMER_OF_PSSE = (
+    (0.572498738766, 0.864291489124, 0.280472099781),
+    (0.580999135971, 0.862973809242, 0.288938462734),
+    (0.769007921219, 0.836122572422, 0.475910454988),
+    (0.789008855820, 0.833166480064, 0.495770514011),
+    (0.932515561581, 0.812548458576, 0.638089656830),
+    (0.951516449451, 0.810221195221, 0.656911790371),
+)
+
+
+def test_OEL2C_counts_as_in_PSSE_with_two_values_exchanged():
+    """A record does that; from one instant to the next the rate hardly bends."""
+    model = LIMITERS["OEL2C"]
+    definition = Definition("limiter", model, model.records[0])
+    fields = tuple(Field(text, 1) for text in ("1", *OF_PSSE.split()))
+    read = read_values(definition, 1, fields)
+    p = Names(**read.values)
+    assert (p.ITFPU, p.C2, p.K2, p.KFB, p.FIXEDRU, p.FIXEDRD) == (0.9, 2.0, 0.05, 0.0, -1.0, 1.0)
+    for first, second in pairwise(TIMER_OF_PSSE):
+        (t1, i1, timer1), (t2, i2, timer2) = first, second
+        rate = 0.5 * (counting(i1, p) + counting(i2, p))
+        assert abs((timer2 - timer1) / (t2 - t1) - rate) < 1e-4
+    written = [float(text) for text in record_fields(definition, read.values)[1:]]
+    assert written == [float(text) for text in OF_PSSE.split()]
 
 
 def test_OEL5C_acts_by_its_count_or_soon_and_lets_go_when_the_count_is_empty():

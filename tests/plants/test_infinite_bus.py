@@ -1,7 +1,7 @@
 """A machine on load: another simulator, equations typed again, and what must hold at the limits."""
 
 import csv
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import pi
 
 import numpy as np
@@ -298,6 +298,22 @@ def test_short_times_of_a_stabiliser_ask_for_sub_steps():
     made, values = stabilised(STABILISERS["PSS1A"])
     simulator = Simulator(made, Inputs(0.0, 1.0, ()), np.array([1.0]), 1e-3)
     assert simulator.substeps(values | {STABILISER + "T6": 2.5e-4}) >= 4
+
+
+IDLE = {("KPR", "KIR"), ("KPM", "KIM"), ("KPA", "KIA"), ("KP", "KI")}  # a regulator without a gain
+
+
+def test_slopes_at_rest_have_derivatives_with_one_and_with_two_gains_of_zero(exciter):
+    """Without them the sub-steps cannot be counted, and the rest is refused."""
+    made = system(MACHINES["GENROU"], exciter=exciter)
+    values = values_on_load(MACHINES["GENROU"], exciter=exciter)
+    gains = [row.symbol for row in MODELS[exciter].sheet if row.symbol[0] == "K" and row.low <= 0.0]
+    code, inputs = LinearKernel(made), np.zeros(len(ALL_INPUTS))
+    for names in [(name,) for name in gains] + sorted({*combinations(gains, 2)} - IDLE):
+        p = vector(made, values | dict.fromkeys(names, 0.0))
+        rest = code.rest(p)
+        _, jacobian = code.motion(p, rest.r, rest.x, inputs)
+        assert np.isfinite(jacobian).all(), names
 
 
 def test_exact_derivatives_on_load_equal_central_differences(machine):

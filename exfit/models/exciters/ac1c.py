@@ -30,7 +30,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac1a
-from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record, renamed
+from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 
 ALIASES = ("ESAC1C",)
 
@@ -43,7 +43,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
         places=ONE_GATE,
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

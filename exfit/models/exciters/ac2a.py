@@ -70,9 +70,9 @@ SHEET = sheet(
     ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 0.35, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 4.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 4.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.037, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.3, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 3.3, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.012, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -38,7 +38,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac2a
-from exfit.models.sheet import OF_ONE_PROGRAM, record, renamed
+from exfit.models.sheet import OF_TWO_PROGRAMS, record, renamed
 
 ALIASES = ("ESAC2C",)
 
@@ -51,7 +51,7 @@ RECORDS = (
         "VEMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

@@ -70,9 +70,9 @@ SHEET = sheet(
     ("KD", 0.499, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("VFEMAX", 16.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
-    ("E1", 6.24, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 6.24, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 1.143, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 4.68, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 4.68, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.1, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

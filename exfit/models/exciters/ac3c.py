@@ -23,8 +23,10 @@ is not that of a sample: GridKit, with the standard's sample data, has it at 1.
 
 The limiters act at the summing point (vsum) or at the gates. The sources are
 the drawing of 2005, the program InterPSS, which adds the PID and the gates, and
-the parameters that PowerWorld lists. VEMIN is 0.1 here; with 0 VE stays at 0
-once it is there, since the regulator then has no supply.
+the parameters that PowerWorld lists. The PID is that of PowerWorld 24 (vt 1e-6
+pu over a fault, KC = KD = 0); the gates rest on InterPSS alone. VEMIN is 0.1
+here; with 0 VE stays at 0 once it is there, since the regulator then has no
+supply.
 """
 
 from exfit.engine.trace import Signal
@@ -45,9 +47,8 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac3a
-from exfit.models.sheet import FREE, OF_ONE_PROGRAM, ONE_GATE, SearchRange, record, sheet
+from exfit.models.sheet import FREE, OF_TWO_PROGRAMS, ONE_GATE, SearchRange, record, sheet
 
-DOUBT = "rests on one public diagram for its PID and gates, that of InterPSS"
 ALIASES = ("ESAC3C",)
 
 SHEET = (
@@ -70,7 +71,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
         places=ONE_GATE,
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

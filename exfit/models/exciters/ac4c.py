@@ -20,7 +20,7 @@ where the limit of the lag winds up.
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller
 from exfit.models.exciters import ac4a
-from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record
+from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record
 
 ALIASES = ("ESAC4C",)
 
@@ -33,7 +33,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
         places=ONE_GATE,
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

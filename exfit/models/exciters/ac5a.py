@@ -47,9 +47,9 @@ SHEET = sheet(
     ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
     ("TF2", 0.8, "s", (0.0, 100.0), "stabilising feedback lag", LAG_OF_KF),
     ("TF3", 0.0, "s", (0.0, 100.0), "stabilising feedback lead"),
-    ("E1", 5.6, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 5.6, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.86, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 4.2, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 4.2, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.5, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -19,7 +19,8 @@ loaded exciter. KC and KD are those of the sample of AC1A here.
 
 The limiters act at the summing point (vsum) or at the gates. The sources are
 the drawing of 2005, the program InterPSS, which adds rectifier and gates, and
-the parameters that PowerWorld lists.
+the parameters that PowerWorld lists. The rectifier is that of PowerWorld 24 (vt
+1e-6 pu over a fault); the gates rest on InterPSS alone.
 """
 
 from exfit.engine.trace import Signal
@@ -35,9 +36,8 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac1a, ac5a
-from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record, renamed
+from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 
-DOUBT = "rests on one public diagram for its rectifier, that of InterPSS"
 ALIASES = ("ESAC5C",)
 
 SHEET = (
@@ -53,7 +53,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
         places=ONE_GATE,
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

@@ -66,9 +66,9 @@ SHEET = sheet(
     ("KC", 0.173, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 1.91, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.6, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 7.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 7.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.214, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 5.55, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 5.55, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.044, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

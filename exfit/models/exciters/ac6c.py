@@ -31,7 +31,7 @@ from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import clip, field_demand, lag, larger, lead_lag, limited_lead_lag, smaller
 from exfit.models.exciters import ac6a
-from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record, renamed
+from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 
 ALIASES = ("ESAC6C",)
 
@@ -45,7 +45,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
         places=ONE_GATE,
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

@@ -37,11 +37,11 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.sheet import (
-    AS_IN_PSSE,
     DEMAGNETISING,
     EXCITER_LAG,
     FREE,
     LOADING,
+    OF_A_LIST,
     SearchRange,
     record,
     sheet,
@@ -71,9 +71,9 @@ SHEET = sheet(
     ("TE", 1.1, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("VFEMAX", 6.9, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
     ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-    ("E1", 6.3, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 6.3, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.44, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 4.725, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 4.725, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.075, "pu", (0.0, 100.0), "saturation at E2"),
 )
 
@@ -88,10 +88,10 @@ RECORDS = (
 PSLF_RECORDS = (
     record(
         "esac7b",
-        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD "
-        "KE TE VFEMAX VEMIN E1 SE1 E2 SE2 SPDMLT",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL TE VFEMAX VEMIN KE KC "
+        "KD KF1 KF2 KF3 TF E1 SE1 E2 SE2 SPDMLT",
         ignored="SPDMLT",
-        doubt=AS_IN_PSSE,
+        doubt=OF_A_LIST,
     ),
 )
 

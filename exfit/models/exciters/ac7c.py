@@ -46,7 +46,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import ac7b
-from exfit.models.sheet import OF_ONE_PROGRAM, TWO_GATES, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, TWO_GATES, record, sheet
 
 ALIASES = ("ESAC7C",)
 
@@ -69,7 +69,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1, "SW2": 1},
         ignored="OEL UEL",
         places=TWO_GATES,
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

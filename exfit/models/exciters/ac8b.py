@@ -55,9 +55,9 @@ SHEET = sheet(
     ("KC", 0.55, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 1.1, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 9.0, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 9.0, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 6.5, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 6.5, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
 )
 
@@ -66,7 +66,8 @@ RECORDS = (
         "AC8B",
         "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN "
         "E1 SE1 E2 SE2",
-        doubt="the order of AC8B is likely, not confirmed",
+        doubt="its order is that of OPAL-RT's library and of PSS/E's AC8C; ANDES and InterPSS have "
+        "VRMAX VRMIN VFEMAX VEMIN TA KA TE KC KD KE behind VPIDMIN",
     ),
     record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
 )
@@ -86,7 +87,6 @@ PSLF_RECORDS = (
         absent={"VIMAX": 999.0, "LIMFLG": 0.0},
         held={"KA": 1.0, "VPIDMAX": 999.0, "VPIDMIN": -999.0, "VFEMAX": 999.0, "VEMIN": 0.0},
         spelled={"KPR": "kvp", "KIR": "kvi", "KDR": "kvd", "TDR": "tvd"},
-        doubt=OF_A_LIST,
     ),
 )
 

@@ -38,7 +38,7 @@ from exfit.models.blocks import (
     smaller,
 )
 from exfit.models.exciters import ac8b
-from exfit.models.sheet import OF_ONE_PROGRAM, TWO_GATES, record
+from exfit.models.sheet import TWO_GATES, record
 
 ALIASES = ("ESAC8C",)
 
@@ -52,7 +52,7 @@ RECORDS = (
         icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1},
         ignored="OEL UEL",
         places=TWO_GATES,
-        doubt=OF_ONE_PROGRAM,
+        doubt="PSS/E 36 reads constants in this order as AC8CU1, a user's model of five integers",
     ),
 )
 

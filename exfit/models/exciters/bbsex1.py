@@ -43,7 +43,6 @@ RECORDS = (
         "TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN SWITCH",
         absent={"SWITCH": 0.0},
         spelled={"TR": "TF"},
-        doubt="two other programs read SWITCH at the end, where it is not confirmed by a file",
     ),
 )
 

@@ -30,7 +30,7 @@ from exfit.models.commutators import (
     regulator_input,
 )
 from exfit.models.exciters import dc1a
-from exfit.models.sheet import OF_ONE_PROGRAM, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, record, sheet
 
 ALIASES = ("ESDC1C",)
 
@@ -48,7 +48,7 @@ RECORDS = (
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

@@ -29,7 +29,7 @@ from exfit.models.commutators import (
     regulator_input,
 )
 from exfit.models.exciters import dc2a
-from exfit.models.sheet import OF_ONE_PROGRAM, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, record, sheet
 
 ALIASES = ("ESDC2C",)
 
@@ -47,7 +47,7 @@ RECORDS = (
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

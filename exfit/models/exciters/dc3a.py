@@ -35,9 +35,9 @@ SHEET = sheet(
     ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
     ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-    ("E1", 3.375, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 3.375, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.267, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.15, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 3.15, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.068, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -67,9 +67,9 @@ SHEET = sheet(
     ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
     ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
     ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-    ("E1", 2.33, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 2.33, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 1.75, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 1.75, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.08, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -24,7 +24,8 @@ and THETAP, act on load only. The limiters act at the summing point (vsum) or at
 the gates. The limits of the lag and of EFD are non-windup; the integral is
 frozen while the PID is at its limit. DC4B multiplies with VT before the lag TA:
 with TA = 0 and VB = VT they are one model. KE and VRMAX are used as given, also
-0. The drawing is PowerWorld's and InterPSS's; VFE as the current of the
+0. The drawing is PowerWorld's and InterPSS's, and vt that of PowerWorld 24
+(1e-6 pu over a fault, without KC1 and saturation); VFE as the current of the
 rectifier is InterPSS's. Typical data are the standard's, as GridKit has them,
 but for saturation (DC4B's; the SE of 1.54 at 4.8 lets no EFD pass 1.5) and KC1.
 """
@@ -46,17 +47,13 @@ from exfit.models.sheet import (
     EXCITER_LAG,
     FREE,
     LAG_OF_KF,
-    OF_ONE_PROGRAM,
     REGULATOR_LAG,
     SearchRange,
     record,
     sheet,
 )
 
-DOUBT = (
-    "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld "
-    "but for saturation and KC1"
-)
+DOUBT = "rests on one public diagram for the load of its supply (KC1), that of InterPSS"
 SHEET = (
     *sheet(
         ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -73,9 +70,9 @@ SHEET = (
         ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
         ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
         ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-        ("E1", 2.33, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+        ("E1", 2.33, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
         ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),
-        ("E2", 1.75, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+        ("E2", 1.75, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
         ("SE2", 0.08, "pu", (0.0, 100.0), "saturation at E2"),
     ),
     *SUPPLY,
@@ -88,7 +85,7 @@ RECORDS = (
         "KP KI XL THETAP KC1 VBMAX",
         icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
         ignored="OEL UEL SCL",
-        doubt=OF_ONE_PROGRAM,
+        doubt="PSS/E 36 reads constants in this order as DC4CU1, a user's model",
     ),
 )
 

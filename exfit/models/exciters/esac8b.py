@@ -28,9 +28,9 @@ SHEET = sheet(
     ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("TE", 1.2, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 9.0, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 9.0, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 6.5, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 6.5, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -51,9 +51,9 @@ SHEET = sheet(
     ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 0.38, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 4.18, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.10, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.14, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 3.14, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -67,9 +67,9 @@ SHEET = sheet(
     ("KD", 0.35, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("VLR", 4.4, "pu", (-9999.0, 9999.0), "limit of the exciter's field current"),
-    ("E1", 4.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 4.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.037, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.3, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 3.3, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.012, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -66,9 +66,9 @@ SHEET = sheet(
     ("KD", 1.02, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("VLV", 0.46, "pu", (-9999.0, 9999.0), "field voltage of the low voltage limiter"),
-    ("E1", 4.64, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 4.64, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.186, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 6.19, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 6.19, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 1.391, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -45,9 +45,9 @@ SHEET = sheet(
     ("TE", 1.33, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
     ("TF1", 0.675, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 3.05, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 3.05, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.279, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 2.29, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 2.29, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.117, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -33,9 +33,9 @@ SHEET = sheet(
     ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
     ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
     ("TF2", 0.8, "s", (0.01, 100.0), "second stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 4.18, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.1, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.14, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 3.14, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -44,9 +44,9 @@ SHEET = sheet(
     ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
     ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 2.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 2.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.03, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 5.0, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 5.0, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.5, "pu", (0.0, 100.0), "saturation at E2"),
 )
 

@@ -56,7 +56,6 @@ from exfit.models.sheet import (
     FREE,
     LAG_OF_KF,
     LOADING,
-    OF_A_LIST,
     REGULATOR_LAG,
     record,
     sheet,
@@ -91,9 +90,9 @@ SHEET = sheet(
     ("TE", 0.7, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 0.5, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("E1", 2.525, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("E1", 2.525, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.1, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.367, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("E2", 3.367, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.23, "pu", (0.0, 100.0), "saturation at E2"),
     ("FLIMF", 0.0, "1", (0.0, 1.0), "share of the limits that follows VT"),
 )
@@ -114,7 +113,6 @@ PSLF_RECORDS = (
         "KH KE TE KC KD E1 SE1 E2 SE2 RCOMP XCOMP NVPHZ KVPHZ FLIMF XC VCMAX KEFD LIMFLG",
         absent={"KVPHZ": 0.0, "XC": 0.0, "KEFD": 0.0, "LIMFLG": 0.0},
         ignored="RCOMP XCOMP NVPHZ VCMAX",
-        doubt=OF_A_LIST,
     ),
 )
 

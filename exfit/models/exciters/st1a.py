@@ -36,7 +36,7 @@ from exfit.models.blocks import (
     regulator_output,
     washout,
 )
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, OF_A_LIST, SearchRange, record, sheet
+from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, SearchRange, record, sheet
 
 ALIASES = ("ESST1A",)
 
@@ -77,16 +77,14 @@ RECORDS = (
 PSLF_RECORDS = (
     record(
         "esst1a",
-        "UELIN PSSIN TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF TC1 TB1 VAMAX VAMIN ILR KLR",
+        "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF TC1 TB1 VAMAX VAMIN ILR KLR UELIN PSSIN",
         absent={"PSSIN": 0.0},
         ignored="UELIN",
-        doubt=OF_A_LIST,
     ),
     record(
         "exst1",
         "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF TC1 TB1 VAMAX VAMIN XE ILR KLR",
         absent={"XE": 0.0},
-        doubt=OF_A_LIST,
     ),
 )
 

@@ -26,7 +26,7 @@ InterPSS's record of PSS/E: OEL, UEL, VOS. Typical data are those of ST1A.
 from exfit.engine.trace import Signal
 from exfit.models.blocks import lag, where
 from exfit.models.exciters import st1a
-from exfit.models.sheet import OF_ONE_PROGRAM, TWO_GATES, record, sheet
+from exfit.models.sheet import TWO_GATES, record, sheet
 
 ALIASES = ("ESST1C",)
 
@@ -44,7 +44,6 @@ RECORDS = (
         icons={"UEL": 1, "VOS": 1, "OEL": 1},
         ignored="UEL OEL",
         places=TWO_GATES,
-        doubt=OF_ONE_PROGRAM,
     ),
 )
 

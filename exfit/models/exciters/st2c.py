@@ -20,9 +20,11 @@ derivative, XL = 0 and VBMAX out of reach it is ST2A.
 The limiters act at the summing point (vsum) or at the gates behind the PID.
 InterPSS writes this; the parameters and limits that PowerWorld lists agree, but
 for the derivative, which the standard does not have and the record of PSS/E
-has. The model of this name in Dynawo is a form of ST2A. Typical data are those
-of ST2A; the sample of 2016, as GridKit has it, has KI = XL = 0, KC = 0.1, VBMAX
-= 5.2 and EFDMAX = 4.4. PID, VBMAX and XL are not those of a sample.
+has. vt is that of PowerWorld 24 (1e-6 pu over a fault, with KI = KC = 0); the
+gates rest on InterPSS alone. The model of this name in Dynawo is a form of
+ST2A. Typical data are those of ST2A; the sample of 2016, as GridKit has it, has
+KI = XL = 0, KC = 0.1, VBMAX = 5.2 and EFDMAX = 4.4. PID, VBMAX and XL are not
+those of a sample.
 """
 
 from exfit.engine.trace import Signal
@@ -39,10 +41,9 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import st2a
-from exfit.models.sheet import OF_ONE_PROGRAM, not_searched, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, not_searched, record, sheet
 from exfit.models.static import PID
 
-DOUBT = "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld"
 ALIASES = ("ESST2C",)
 
 SHEET = (
@@ -62,7 +63,7 @@ RECORDS = (
         "THETAP KC VBMAX",
         icons={"OEL": 1, "UEL": 1, "SCL": 1},
         ignored="OEL UEL SCL",
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 

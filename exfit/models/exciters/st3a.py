@@ -58,6 +58,7 @@ PSLF_RECORDS = (
         "esst3a",
         "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM "
         "VMMAX VMMIN",
+        spelled={"THETAP": "angp"},
         doubt=AS_IN_PSSE,
     ),
 )

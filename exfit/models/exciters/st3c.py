@@ -23,19 +23,19 @@ no integral and no derivative it is ST3A.
 The limiters act at the summing point (vsum) or at the gates behind VIMAX.
 InterPSS writes this; the parameters and limits that PowerWorld lists agree, but
 for the derivative, which the standard does not have and the record of PSS/E
-has. A later test of InterPSS says that PSS/E reads TA and does without it: here
-it acts, as in ST3A. Typical data are those of ST3A, which are the first set of
-the standard's sample data in GridKit; the PID is not that of a sample: GridKit
-lists none.
+has. PSS/E and PowerWorld 24 read TA and do without it (with 0 vt is that of
+PowerWorld within 1e-6 pu over a fault, with 0.4 within 4e-3): here it acts, as
+in ST3A, and a unit of a .dyr file has 0. Typical data are those of ST3A, which
+are the first set of the standard's sample data in GridKit; the PID is not that
+of a sample: GridKit lists none.
 """
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag, limited_lag, pi_rest, pid, smaller
 from exfit.models.exciters import st3a
-from exfit.models.sheet import OF_ONE_PROGRAM, not_searched, record
+from exfit.models.sheet import OF_TWO_PROGRAMS, not_searched, record
 from exfit.models.static import PID, SUPPLY_SWITCH, supply
 
-DOUBT = "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld"
 ALIASES = ("ESST3C",)
 
 SHEET = (*not_searched(st3a.SHEET, "KA"), *PID, *SUPPLY_SWITCH)
@@ -47,7 +47,8 @@ RECORDS = (
         "VMMIN KG VGMAX KP KI XL THETAP KC VBMAX",
         icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
         ignored="OEL UEL SCL",
-        doubt=OF_ONE_PROGRAM,
+        doubt=OF_TWO_PROGRAMS,
+        unused={"TA": ""},
     ),
 )
 

@@ -16,7 +16,7 @@ only. Not modelled: UEL at the summing point, and VGMAX of later editions.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, pi, pi_rest, smaller, source_voltage
-from exfit.models.sheet import FREE, OF_A_LIST, REGULATOR_LAG, record, sheet
+from exfit.models.sheet import FREE, REGULATOR_LAG, record, sheet
 
 ALIASES = ("ESST4B",)
 
@@ -49,9 +49,9 @@ RECORDS = (
 PSLF_RECORDS = (
     record(
         "esst4b",
-        "TR KPR KIR VRMAX VRMIN TA KPM KIM VMMAX VMMIN KG KP KI VBMAX KC XL THETAP VGMAX",
+        "TR KPR KIR TA VRMAX VRMIN KPM KIM VMMAX VMMIN KG KP THETAP KI KC XL VBMAX VGMAX",
         absent={"VGMAX": 999.0},
-        doubt=OF_A_LIST,
+        spelled={"THETAP": "angp"},
     ),
     record(
         "exst4b",

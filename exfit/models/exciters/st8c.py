@@ -17,15 +17,14 @@ on load only. An integral is frozen while its PI is at its limit; the limit of
 the lag is non-windup.
 
 The limiters act at the summing point (vsum) or at the gates of the field
-current regulator. Sources disagree on what this regulator sees: InterPSS
-subtracts IFD and KF IFD / (1 + sTF), and reports a comparison with PSS/E,
-PowerSimulationsDynamics the latter alone, which is followed: KF is the gain of
-the feedback. OEL is subtracted at the
-summing point by PowerWorld and InterPSS; here a limiter has the sign of what it
-adds. PowerSimulationsDynamics has VB1 for SW1 = 2 only, and no VB2. Typical
-data are not those of a sample: that of the standard, as GridKit has it, has no
-KIA and no second source (KPR 6.6, KIR 30, KPA 2.38, KA 4.295, TA 0.0017, KC1
-0.062, KP 1, TR and TF 0.0226).
+current regulator. That regulator sees KF IFD / (1 + sTF), as in
+PowerSimulationsDynamics and in PSS/E 36.7, with whose curve it agrees (vt 1e-6
+pu over a pulse of the reference); InterPSS draws IFD beside it. OEL is
+subtracted at the summing point by PowerWorld and InterPSS; here a limiter has
+the sign of what it adds. PowerSimulationsDynamics has VB1 for SW1 = 2 only, and
+no VB2. Typical data are not those of a sample: that of the standard, as GridKit
+has it, has no KIA and no second source (KPR 6.6, KIR 30, KPA 2.38, KA 4.295, TA
+0.0017, KC1 0.062, KP 1, KC2 and KI2 0, TR and TF 0.0226).
 """
 
 from exfit.engine.trace import Signal
@@ -40,13 +39,10 @@ from exfit.models.blocks import (
     smaller,
     where,
 )
+from exfit.models.phasors import modulus
 from exfit.models.sheet import FREE, ONE_GATE, record, sheet
 from exfit.models.static import SUPPLY_SWITCH
 
-DOUBT = (
-    "has the feedback KF alone of the field current; one of its two public diagrams "
-    "subtracts IFD as well"
-)
 ALIASES = ("ESST8C",)
 
 SHEET = (
@@ -97,7 +93,7 @@ def sources(u: Signal, p: Signal) -> tuple[Signal, Signal]:
     """Return VB1 and VB2, what the sources give behind their rectifiers."""
     terminals = compound_source(u.vt, u.p, u.q, p.KP, p.KI1, p.XL, p.THETAP)
     ve1 = where(p.SW1 < 1.5, terminals, p.KP)
-    ve2 = compound_source(u.vt, u.p, u.q, 0.0, p.KI2)
+    ve2 = p.KI2 * modulus(u.p / u.vt, u.q / u.vt)
     vb1 = smaller(rectifier(ve1, p.KC1 * u.ifd), p.VB1MAX)
     return vb1, smaller(rectifier(ve2, p.KC2 * u.ifd), p.VB2MAX)
 

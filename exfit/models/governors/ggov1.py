@@ -46,7 +46,8 @@ is 10 ms. Ka = 0 leaves the limiter out (there it lets no valve open). Dm < 0
 multiplies wf on its way to fsrt with (1 + dw)^Dm. pref is a speed, R times the
 droop at rest; where Rselect = 0, it is 0. A unit that starts above Ldref is not
 at rest. Trate_Mbase is the turbine's rating over the machine's base, 1 where
-PSS/E's Trate is 0.
+PSS/E's Trate (MW) is 0. A .dyr file does not have that base: an import names a
+Trate, by which the valve is that of PowerWorld 24 within 1e-6 pu at rest.
 
 The equations are those of InterPSS, which has compared them with PowerWorld. In
 doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power), the way
@@ -74,7 +75,7 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import OF_A_LIST, record, sheet
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     ("Rselect", 1.0, "1", (-2.0, 1.0), "signal of the droop: 1, 0, -1 or -2"),
@@ -120,7 +121,6 @@ RECORDS = (
         absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
         ignored="Trate",
         held={"Trate_Mbase": 1.0},
-        doubt="Trate is taken as the base of the machine; Trate_Mbase says otherwise",
     ),
 )
 
@@ -134,7 +134,6 @@ PSLF_RECORDS = (
         absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
         ignored="PMWSET",
         held={"Trate_Mbase": 1.0},
-        doubt=OF_A_LIST,
     ),
 )
 

@@ -27,16 +27,18 @@ active with none: activated when t reaches TFCL or iact has been above iref for
 TEN (TEN = 0: always), inactive again when iref is IINST and has been above iact
 by ITHOFF for TOFF. At the summing point VOELMAX1 is 0.
 
-Dynawo and InterPSS have FIXEDRU and FIXEDRD the other way round, so that the
-timer never runs back with the sample data; InterPSS's tests, which compare it
-with PSS/E, count with FIXEDRU = 1 below the pick-up. Followed are the names of
-the parameters ("fixed delay time", "fixed cooling-down time", "reset delay
-time": PSCAD, PowerWorld, GridKit); data made for PSS/E may need the two values
-exchanged. Dynawo has no memory of being active, which InterPSS has: without
-either condition its bias is 0. Lists call TC1OEL and TC2OEL lags and TB1OEL and
-TB2OEL leads; the letters, Dynawo and InterPSS say the reverse, as drawn. Not
-modelled: the field voltage or the exciter's field current as input. Typical
-data are the first set of the standard's sample data (GridKit, PSCAD).
+FIXEDRU and FIXEDRD are as the lists of parameters have them ("fixed delay
+time", "fixed cooling-down time", "reset delay time": PSCAD, PowerWorld,
+GridKit). PSS/E has them the other way round, and so have Dynawo and InterPSS:
+with FIXEDRU = 1 the timer of PSS/E 36.7 (OEL2CU1) runs at 0.9961 below the
+pick-up. With the two exchanged it counts as here, within 1e-4: an export writes
+them exchanged, and data of a .dyr file are to be exchanged. With the sample
+data as they are PSS/E's timer never runs back. Dynawo has no memory of being
+active, which InterPSS has: without either condition its bias is 0. Lists call
+TC1OEL and TC2OEL lags and TB1OEL and TB2OEL leads; the letters, Dynawo and
+InterPSS say the reverse, as drawn. Not modelled: the field voltage or the
+exciter's field current as input. Typical data are the first set of the
+standard's sample data (GridKit, PSCAD).
 """
 
 from exfit.engine.trace import Signal
@@ -53,7 +55,6 @@ from exfit.models.limiter_blocks import (
 )
 from exfit.models.sheet import record, sheet
 
-DOUBT = "has FIXEDRU and FIXEDRD as their names say; its two public diagrams exchange them"
 PLACES = ("takeover", "takeover-output", "summing")
 INPUTS = ("ifd",)
 
@@ -109,6 +110,7 @@ RECORDS = (
         "C2 K2 VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU",
         icons={"OELINPUT": 0},
         held={"SW1": 0.0},
+        exchanged="FIXEDRU FIXEDRD",
         doubt="its order is that of PowerWorld's list, not confirmed by a file; another program "
         "reads SW1 as a second integer and a rated field current at the end",
     ),

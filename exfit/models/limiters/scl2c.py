@@ -34,12 +34,12 @@ activated while v is below VTMIN, and is inactive below VTRESET. At the summing
 point VOELMAX1 and VUELMIN1 are 0.
 
 The equations are Dynawo's, the parameters those of GridKit's and PowerWorld's
-lists (there under SCL1C). Followed as in OEL2C: the names FIXEDRU and FIXEDRD,
-and the memory of being active, which Dynawo has not. Where ipref is above iref
-Dynawo's reference jumps to iref; here it is continuous, 0. PSS/E's record is
-not known. Typical data are no sample: C1, C2, FIXEDRU, FIXEDRD and IINST are
-CoLib's, the limit is that of SCL1C, timer and regulators as in OEL2C, and all
-else is chosen so that it waits at rated current: take the plant's own.
+lists (there under SCL1C). As in OEL2C are FIXEDRU and FIXEDRD, and the memory
+of being active, which Dynawo has not. Where ipref is above iref Dynawo's
+reference jumps to iref; here it is continuous, 0. PSS/E's record is not known.
+Typical data are no sample: C1, C2, FIXEDRU, FIXEDRD and IINST are CoLib's, the
+limit is that of SCL1C, timer and regulators as in OEL2C, and all else is chosen
+so that it waits at rated current: take the plant's own.
 """
 
 from exfit.engine.trace import Signal, sqrt

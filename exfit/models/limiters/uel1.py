@@ -50,7 +50,6 @@ RECORDS = (
         "UEL1",
         "KUR KUC KUF VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN",
         absent={"KUF": 0.0},
-        doubt="its order is that of PowerWorld's list, not confirmed by a file",
     ),
 )
 

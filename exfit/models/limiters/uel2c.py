@@ -79,7 +79,7 @@ RECORDS = (
         "P7 Q7 P8 Q8 P9 Q9 P10 Q10",
         absent={"KUF": 0.0, "KFB": 0.0},
         ignored="TUL",
-        doubt="its order is that of PowerWorld's list, not confirmed by a file",
+        doubt="its order is that of PowerWorld's list; PSS/E 36 has another in its UEL2CU1",
     ),
 )
 

@@ -64,6 +64,11 @@ DRAWING = f"""\
 flux, with a share of each axis. i1q is the same of the q axis, where nothing
 excites. On open circuit id and iq are 0, and the q axis rests."""
 
+AS_IN_PSSE = """
+
+In PSS/E 36.7 S10 = 0 is a machine without saturation, whatever S12 is, and so
+is a GENROU of a .dyr file. In a case the curve then begins at 1 pu."""
+
 LEAST_TIME = 0.01  # s; 0 is written where there is no winding
 CONS = "Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xl S10 S12"
 
@@ -127,10 +132,11 @@ def machine(
     order: Callable[..., Faults],
 ) -> Machine:
     """Return a round-rotor machine with one form of saturation."""
+    of_psse = name == "GENROU"
     return Machine(
         name=name,
         title=f"round rotor, {shape} saturation by the air-gap flux",
-        drawing=DRAWING,
+        drawing=DRAWING + AS_IN_PSSE if of_psse else DRAWING,
         sheet=SHEET,
         d_axis=D_AXIS,
         q_axis=("EDP", "PSIQ"),
@@ -141,8 +147,8 @@ def machine(
         rest=partial(rest, form),
         quadrature=partial(quadrature, form),
         faults=partial(faults, order),
-        records=(record(name, CONS),),
-        pslf_records=(pslf_record("genrou", CONS),) if name == "GENROU" else (),
+        records=(record(name, CONS, unused={"S12": "S10"} if of_psse else None),),
+        pslf_records=(pslf_record("genrou", CONS),) if of_psse else (),
         saturation=shape,
     )
 

@@ -79,12 +79,11 @@ RECORDS = (
 PSLF_RECORDS = (
     record(
         "pss2b",
-        "ICS1 REMBUS1 VSI1MAX VSI1MIN ICS2 REMBUS2 VSI2MAX VSI2MIN TW1 TW2 TW3 TW4 T6 "
-        "T7 KS2 KS3 KS4 T8 T9 N M KS1 T1 T2 T3 T4 T10 T11 VSTMAX VSTMIN A TA TB",
+        "ICS1 REMBUS1 ICS2 REMBUS2 VSI1MAX VSI1MIN TW1 TW2 VSI2MAX VSI2MIN TW3 TW4 T6 "
+        "T7 KS2 KS3 T8 T9 N M KS1 T1 T2 T3 T4 T10 T11 VSTMAX VSTMIN A TA TB KS4",
         icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
         absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
         spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
-        doubt="its order is not confirmed by any public source",
     ),
     record(
         "pss2a",

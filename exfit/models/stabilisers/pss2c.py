@@ -30,7 +30,7 @@ the standard, as GridKit has them, with KS2 for H = 5.05 s.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lead_lag
-from exfit.models.sheet import MOST_LAGS, OF_ONE_PROGRAM, record, sheet
+from exfit.models.sheet import MOST_LAGS, record, sheet
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
     INPUT_LIMITS,
@@ -69,7 +69,6 @@ RECORDS = (
         "VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN T12 T13 PPSSON PPSSOFF XCOMP TCOMP",
         icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
         ignored="XCOMP TCOMP",
-        doubt=OF_ONE_PROGRAM,
     ),
 )
 

@@ -46,7 +46,6 @@ RECORDS = (
         "PSS3B",
         "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN",
         icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
-        doubt="whether REMBUS1 and REMBUS2 are in the record of PSS3B is not confirmed",
     ),
 )
 

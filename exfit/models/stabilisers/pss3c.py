@@ -24,7 +24,7 @@ compensated frequency of an input of PSS/E. Typical data are PSS3B's.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.sheet import OF_ONE_PROGRAM, record
+from exfit.models.sheet import record
 from exfit.models.stabiliser_parts import SWITCH, switch_rest, switched
 from exfit.models.stabilisers import pss3b
 
@@ -40,7 +40,6 @@ RECORDS = (
         icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
         absent={"TPGFILT": 0.0},
         ignored="XCOMP TCOMP",
-        doubt=OF_ONE_PROGRAM,
     ),
 )
 

@@ -131,7 +131,7 @@ RECORDS = (
         "KI1 KI11 TI1 TI2 TI3 TI4 TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN "
         "KH1 KH11 TH1 TH2 TH3 TH4 TH5 TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN "
         "VSTMAX VSTMIN",
-        doubt="its order is from one public source; its power has the sign of IEC 61970-302",
+        doubt="its power has the sign of IEC 61970-302",
     ),
 )
 

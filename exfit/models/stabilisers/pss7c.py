@@ -15,13 +15,14 @@ v ─►[KS1]─►(+)─ e ─►[form]─ y ─────►[clip]─►[swi
 
 PSS2C with the canonical form of PSS6C in place of its leads and lags: four
 integrators in a row, sTI1 x1 = e, sTI2 x2 = x1, sTI3 x3 = KI3 x2, sTI4 x4 = KI4
-x3; f = x1 + x2 + x3 + x4 is fed back, and y = K0 e + K1 x1 + K2 x2 + K3 x3 +
-K4 x4. The first input is the speed, the second the electrical power (KS2 =
-T7 / 2H). TW2 = 0 and TW4 = 0 leave out their washouts; T6 or T7 = 0 bypasses
-its block. The ramp tracking filter is N of the blocks that are drawn; M and N
-are whole numbers, M N at most 8. InterPSS, which has compared it with PSS/E and
-PowerWorld, multiplies both signals before the filter with KS3, here it is as in
-PSS2C; where KS3 = 1 there is no difference.
+x3; f = x1 + x2 + x3 + x4 is fed back, and y = K0 e + K1 x1 + K2 x2 + K3 x3 + K4
+x4. The first input is the speed, the second the electrical power (KS2 = T7 /
+2H). TW2 = 0 and TW4 = 0 leave out their washouts; T6 or T7 = 0 bypasses its
+block. The ramp tracking filter is N of the blocks that are drawn; M and N are
+whole numbers, M N at most 8. vt with it is that of PSS/E 36.7 (1e-5 pu over a
+fault, with KS3 = 1). InterPSS, which draws it, multiplies both signals before
+the filter with KS3, here it is as in PSS2C; where KS3 = 1 there is no
+difference.
 
 The switch makes vs 0 from where the power p of the machine falls to PPSSOFF to
 where it rises to PPSSON; it goes over 5 ms after the power has passed. It is on
@@ -34,7 +35,7 @@ for KS2, which is that of H = 5.05 s as in PSS2C (there 0.7052).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip
-from exfit.models.sheet import MOST_LAGS, OF_ONE_PROGRAM, record, sheet, with_typical
+from exfit.models.sheet import MOST_LAGS, record, sheet, with_typical
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
     CANONICAL,
@@ -47,10 +48,6 @@ from exfit.models.stabiliser_parts import (
     switched,
 )
 
-DOUBT = (
-    "rests on one public diagram, that of InterPSS, which reports a comparison with PSS/E "
-    "and PowerWorld"
-)
 INPUTS = ("speed", "p")
 
 SHEET = (
@@ -76,7 +73,6 @@ RECORDS = (
         "VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
         icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
         ignored="XCOMP TCOMP",
-        doubt=OF_ONE_PROGRAM,
     ),
 )
 

@@ -1,0 +1,39 @@
+"""Units of planners' files behind a fault, against the programs that simulate such files."""
+
+import pytest
+from two_buses import TwoBuses, cases, differences
+
+from exfit.models import GOVERNORS
+from exfit.models.sheet import typical
+
+SHORT = ("powerworld_pss5c", "powerworld_st3c")
+# pu: what the steps of the programs leave; a block that is left out or wrong is 1e-4 at least
+AGREES = {"vt": 5e-6, "p": 5e-5, "q": 5e-5}
+DRIFTS = {"psse_pss7c": 4.0}  # what is small behind the fault grows with its swing
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name if name in SHORT else pytest.param(name, marks=pytest.mark.long) for name in cases()],
+)
+def test_a_unit_of_a_file_moves_as_in_the_program_that_the_file_is_for(name):
+    share = DRIFTS.get(name, 1.0)
+    for signal, difference in differences(name, AGREES).items():
+        assert difference < share * AGREES[signal], signal
+
+
+def test_a_turbine_of_another_rating_than_the_machine_rests_as_in_powerworld():
+    """Its GGOV1D with a Trate of 390.24 MW: pelec and the actuator, per unit of the turbine.
+
+    InterPSS-Project/ipss-plugin, EmbeddedTrajectoryValues.java at 126d350c, PowerWorld 24.
+    """
+    own = {"Kturb": 1.22, "Wfnl": 0.18, "R": 0.03, "Trate_Mbase": 390.24 / 100.0}
+    values = typical(GOVERNORS["GGOV1"].sheet) | own
+    told = {
+        "program": "PowerWorld",
+        "records": ["1 'SCRX' 1 0.0 100.0 0.01 10.0 -99.0 99.0 1 0.0 /"],
+        "governor": {"model": "GGOV1", "parameters": values},
+    }
+    rest = TwoBuses(told).rest
+    assert abs(rest["governor.PE"] - 0.1281288564) < 1e-6
+    assert abs(rest["governor.VALVE"] - 0.2850236595) < 1e-6
