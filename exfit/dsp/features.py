@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isnan, nan
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,25 @@ LABELS = (
 TIMES = ("rise_time", "peak_time", "settling_time")  # those that may be missing
 
 
+class RemovedLine(NamedTuple):
+    """A line of the spectrum that features are read without: Hz, and pu."""
+
+    frequency: float
+    amplitude: float
+
+    @property
+    def text(self) -> str:
+        """The line in words."""
+        return f"the line of {self.frequency:.4g} Hz, amplitude {self.amplitude:.2g} pu"
+
+
 @dataclass(frozen=True)
 class Features:
     """Features of the response to one step: voltages per unit, times in s after the step.
 
     A time that the record is too short to show is None. Of a noisy record ``errors`` holds by how
     much a feature may be off, half of its 95 % interval, and ``why`` the reason where the noise
-    hides it.
+    hides it; ``without`` are the lines, of a ripple or a sway, that were removed before.
     """
 
     initial_value: Annotated[float, nan]
@@ -43,6 +55,12 @@ class Features:
     settling_time: float | None
     errors: Mapping[str, float] = field(default_factory=dict)
     why: Mapping[str, str] = field(default_factory=dict)
+    without: tuple[RemovedLine, ...] = ()
+
+    @property
+    def removed(self) -> str:
+        """The lines that they are read without, in words; empty where none was removed."""
+        return " and ".join(line.text for line in self.without)
 
 
 def features(time: Array, signal: Array, step_at: float, until: float) -> Features | None:

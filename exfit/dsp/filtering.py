@@ -19,6 +19,7 @@ LOWEST_CUTOFF = 1e-6  # of the sampling rate: the coefficients for a lower one a
 BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice
 FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
 FEWEST_AVERAGED = 2  # samples of a line
+FEWEST_IN_WINDOW = 16  # samples: lines through fewer err by 1 % of what an average does, or more
 OUTLIER_WINDOW = 7  # samples, of which the middle one is compared with the rest; 3 may be spikes
 
 
@@ -137,6 +138,12 @@ class Filtering:
         if self.averaged is None:
             return 1
         return max(1, round(self.averaged.window / float(median(np.diff(self.time)))))
+
+    @property
+    def window_between(self) -> float:
+        """The window (s) of averages, of which the samples hold too few for lines; else 0."""
+        few = self.averaged is not None and self.smooth_over < FEWEST_IN_WINDOW
+        return self.averaged.window if few and self.averaged is not None else 0.0
 
     @cached_property
     def _nothing_to_do(self) -> bool:

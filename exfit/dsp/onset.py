@@ -108,10 +108,12 @@ def _compared(time: Array, samples: Array, low: float, scatter: float) -> tuple[
     known = max(scatter, NOISELESS * float(np.ptp(samples))) ** 2
     left = float(np.min(costs)) / freedom
     fits = left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom))
-    return _below(instants, costs, float(np.min(costs)) + CHI_SQUARE * max(known, left)), fits
+    return interval_below(
+        instants, costs, float(np.min(costs)) + CHI_SQUARE * max(known, left)
+    ), fits
 
 
-def _below(instants: Array, costs: Array, limit: float) -> Onset:
+def interval_below(instants: Array, costs: Array, limit: float) -> Onset:
     """Return the first and last instant at which costs (N,) cross a limit, in lines between them.
 
     Where they are below it at an end, that is the end.

@@ -1,13 +1,14 @@
 """What the channels of a record contradict in each other, or in what a test can be."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.steps import RecordedStep
 from exfit.signals import SIGNALS
 
 LARGEST_STEP = 0.2  # pu: no regulator is tested with more
-FOLLOWS = ("efd", "ifd", "vref")  # signals that rise for good where vt does
+FIELD = ("efd", "ifd")  # what rises for good where vt does
+FOLLOWS = (*FIELD, "vref")
 CERTAIN_CHANGE = (0.01, 6.0)  # of the level and times the noise: a change whose sign is certain
 
 
@@ -19,8 +20,45 @@ def contradictions(
     voltage = by_signal.get("vt")
     for step in steps:
         yield from _too_large(by_signal, step)
+        disputed = sign_disputed_by(channels, steps, step)
         if voltage is not None:
-            yield from _opposite(voltage, by_signal, step)
+            undisputed = {name: c for name, c in by_signal.items() if c not in disputed}
+            yield from _opposite(voltage, undisputed, step)
+        for channel in disputed:
+            size = step.sizes[channel.name]
+            yield (
+                f"{channel.name}: {'falls' if size < 0.0 else 'rises'} by {abs(size):.3g} at "
+                f"{step.at:.4g} s, against the voltage: which way that step went is open, give its "
+                "size with its sign"
+            )
+
+
+def sign_disputed_by(
+    channels: Iterable[InspectedChannel], steps: Sequence[RecordedStep], step: RecordedStep
+) -> tuple[InspectedChannel, ...]:
+    """Return the channels of the field that leave open which way a step went.
+
+    They certainly move against the voltage, which hardly changes there, or with which they move at
+    other steps: a channel that always moves against it is inverted.
+    """
+    by_signal = {channel.signal: channel for channel in channels if channel.signal}
+    voltage = by_signal.get("vt")
+    if voltage is None or step.sizes.get(voltage.name, 0.0) == 0.0:
+        return ()
+    field = (by_signal[signal] for signal in FIELD if signal in by_signal)
+    return tuple(channel for channel in field if _disputes(channel, voltage, steps, step))
+
+
+def _disputes(
+    channel: InspectedChannel,
+    voltage: InspectedChannel,
+    steps: Sequence[RecordedStep],
+    step: RecordedStep,
+) -> bool:
+    if channel.inverted or not _moved_with(voltage, channel, step, -1.0):
+        return False
+    hardly = not _certain(voltage, step.sizes[voltage.name])
+    return hardly or any(_moved_with(voltage, channel, other, 1.0) for other in steps)
 
 
 def size_in_words(size: float) -> str:
@@ -63,6 +101,14 @@ def _opposite(
                 f"{voltage.name} {moves[1]}: if it is the {SIGNALS[signal].name}, the channel is "
                 "inverted, and scale: -1 with an offset turns it"
             )
+
+
+def _moved_with(
+    voltage: InspectedChannel, channel: InspectedChannel, step: RecordedStep, sign: float
+) -> bool:
+    """Return whether a channel certainly moves as the voltage does, or against it (-1)."""
+    size = step.sizes.get(channel.name, 0.0)
+    return _certain(channel, size) and sign * size * step.sizes.get(voltage.name, 0.0) > 0.0
 
 
 def _certain(channel: InspectedChannel, size: float) -> bool:

@@ -372,7 +372,10 @@ def _clock_findings(inspection: Inspection) -> Iterator[str]:
         places = ", ".join(inspection.backward_at)
         more = len(sampling.backward) - len(inspection.backward_at)
         rest = f" and {more} more" if more else ""
-        yield f"time repeats or goes back at {places}{rest}: left out here, refused by a fit"
+        yield (
+            f"time repeats or goes back at {places}{rest}: left out here, refused by a fit but for "
+            "rows that are alike, or of which `repeats: first` or `repeats: last` leaves one"
+        )
     if sampling.step >= 1.0:
         yield f"samples are {sampling.step:g} s apart: is the time in s?"
     flags = None if inspection.pmu is None else inspection.pmu.status

@@ -29,6 +29,7 @@ from exfit.signals import unit_of_signal
 from exfit.util.magnitude import LARGEST, SMALLEST
 
 Rows = NDArray[np.intp]
+Repeats = Literal["refuse", "first", "last"]
 
 PERCENT = "%"
 ANGLE = "angle"
@@ -94,6 +95,7 @@ def read_record(
     memory: float | None = None,
     phasors: Phasors | None = None,
     status: Status | None = None,
+    repeats: Repeats = "refuse",
 ) -> Record:
     """Return the record of a file: each signal is ``column / base * scale + offset``.
 
@@ -112,13 +114,14 @@ def read_record(
         memory: what reading may take, GB; None: 1, or four times the file's size up to 4.
         phasors: of a PMU, from which further columns are computed: phasors.vt and others.
         status: the flags of the rows; those of a row that is bad are missing samples.
+        repeats: which of several rows with one time stamp counts. Rows that are alike are one.
 
     Raises:
         RecordError: a file that cannot be read or needs more memory, a column that is missing, in
             another unit or of another length than the time, a cell that is no finite number, time
-            that does not increase, fewer than two samples, a signal without any, waveforms that
-            are none, a record that cannot be resampled, a row that its flags call bad where no
-            sample may be missing, or an angle whose turns cannot be counted.
+            that goes back, or repeats with other numbers, fewer than two samples, a signal without
+            any, waveforms that are none, a record that cannot be resampled, a row that its flags
+            call bad where no sample may be missing, or an angle whose turns cannot be counted.
     """
     file = open_table(path, sheet, memory)
     table = file if phasors is None else PhasorTable(file, phasors)
@@ -127,6 +130,7 @@ def read_record(
     columns = _columns(table, clock, channels, missing)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
     rows = _rows_in_window(path, time, window)
+    rows, notes = _without_repeats(table, clock, time, columns, rows, repeats)
     if status is not None:
         _leave_out(file, status, columns, rows, missing)
     voltages = {
@@ -152,6 +156,7 @@ def read_record(
         path,
         table.sha256,
         {name: voltage.window for name, voltage in voltages.items() if voltage.window is not None},
+        notes,
     )
 
 
@@ -183,12 +188,44 @@ def _within_windows(voltages: Iterable[_PhaseVoltage], rows: Rows) -> Rows:
 
 
 def _instants(table: Table, clock: Clock) -> Array:
-    """Return the time (M,) in s; raises RecordError where it does not increase."""
+    """Return the time (M,) in s, which may repeat; raises RecordError where it goes back."""
     time = table.instants(clock.columns, clock.unit)
     check_finite(time, clock.label, table.place)
-    check_increasing(time, clock.label, table.place)
+    check_increasing(time, clock.label, table.place, may_repeat=True)
     check_steps(time, clock.label, table.place)
     return time
+
+
+def _without_repeats(
+    table: Table,
+    clock: Clock,
+    time: Array,
+    columns: Mapping[str, Array],
+    rows: Rows,
+    repeats: Repeats,
+) -> tuple[Rows, tuple[str, ...]]:
+    """Return those rows of which each has a time of its own, and what was left out.
+
+    Raises RecordError where rows of one time differ and nothing says which counts.
+    """
+    again = rows[1:][np.diff(time[rows]) == 0.0]
+    if not again.size:
+        return rows, ()
+    for name, column in columns.items():
+        differ = (column[again] != column[again - 1]) & ~(
+            np.isnan(column[again]) & np.isnan(column[again - 1])
+        )
+        if repeats == "refuse" and differ.any():
+            row = int(again[differ][0])
+            raise RecordError(
+                f"{table.place(row)}: {clock.label}: time {time[row]} s repeats, and {name!r} is "
+                f"{column[row]:g} after {column[row - 1]:g}: which row is right? `repeats: first` "
+                "or `repeats: last` beside the file of a record leaves out the other"
+            )
+    left_out = again - 1 if repeats == "last" else again
+    count = "1 row that repeats" if len(again) == 1 else f"{len(again)} rows that repeat"
+    text = f"{count} the time of another, the first at {table.place(int(again[0]))}: left out"
+    return rows[~np.isin(rows, left_out)], (text,)
 
 
 def _smooth_angle(

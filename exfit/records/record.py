@@ -24,7 +24,8 @@ class Record:
     """Signals in per unit, each (M,) like ``time`` in s, which increases; arrays are read-only.
 
     A missing sample is nan; only signals may have any, and only where the caller allowed it. A
-    signal of waveforms is ``averaged`` over a window (s) about each instant, by signal.
+    signal of waveforms is ``averaged`` over a window (s) about each instant, by signal. ``notes``
+    say what was left out when it was read.
     """
 
     time: Array
@@ -32,6 +33,7 @@ class Record:
     source: Path
     sha256: str
     averaged: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the source, the signals and the time that they cover, in one line."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
 from exfit.dsp.step_detection import running_median
+from exfit.records.contradictions import sign_disputed_by
 from exfit.records.inspection import Inspection, effective_value
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
 
@@ -35,7 +36,8 @@ class DetectedTest:
     """Steps of the reference from one rest to the next, and the window (s) to look at.
 
     ``changes`` are those of the reference, if it was recorded, else of the voltage, as shares of
-    the level at the start of the record; None where neither shows a step.
+    the level at the start of the record; None where neither shows a step, or the field moves
+    against the voltage.
     """
 
     steps: tuple[RecordedStep, ...]
@@ -172,6 +174,8 @@ def _change(inspection: Inspection, step: RecordedStep) -> float | None:
     for signal in ("vref", "vt"):
         channel = inspection.channel_of(signal)
         if channel is not None and channel.name in step.sizes:
+            if signal == "vt" and sign_disputed_by(inspection.channels, inspection.steps, step):
+                return None
             level = 1.0 if channel.seems_per_unit else channel.level
             return step.sizes[channel.name] / level if level else None
     sizes = (

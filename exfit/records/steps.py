@@ -112,26 +112,26 @@ def steps_of_signals(
 ) -> tuple[dict[str, ChannelSteps], tuple[RecordedStep, ...]]:
     """Return the steps of each signal (M,), and those of the test; these without lasting sizes.
 
-    Where no signal rests before a step, it is one that the record begins with. What no
-    ``recognised`` channel shows is no step of the test, if one of them shows any: a frequency
-    wanders by itself.
+    Where no signal rests before a step, it is one that the record begins with. If a ``recognised``
+    channel shows a step, the others have no say in when it was: a frequency wanders by itself.
     """
     own = {name: steps_of_channel(time, y, name in references) for name, y in signals.items()}
     if not any(channel.changes for channel in own.values()):
         early = [name for name, channel in own.items() if channel.moves_from_start]
         starting = changes_from_start(time, {name: signals[name] for name in early})
         own |= {name: ChannelSteps((change,)) for name, change in starting.items()}
-    steps = combined_steps({name: channel.changes for name, channel in own.items()})
-    steps = _of_test(steps, recognised)
-    responding = {name: signals[name] for name, channel in own.items() if channel.responds}
+    heard = _heard(own, recognised)
+    steps = combined_steps({name: channel.changes for name, channel in heard.items()})
+    responding = {name: signals[name] for name, channel in heard.items() if channel.responds}
     return own, tuple(_sharpened(time, responding, steps))
 
 
-def _of_test(
-    steps: tuple[RecordedStep, ...], recognised: Collection[str]
-) -> tuple[RecordedStep, ...]:
-    """Return the steps that a recognised channel shows; all where none of them shows any."""
-    return tuple(step for step in steps if {*step.seen_in} & {*recognised}) or steps
+def _heard(
+    own: Mapping[str, ChannelSteps], recognised: Collection[str]
+) -> Mapping[str, ChannelSteps]:
+    """Return the recognised channels; all where none of them shows a step."""
+    heard = {name: channel for name, channel in own.items() if name in recognised}
+    return heard if any(channel.changes for channel in heard.values()) else own
 
 
 def _sharpened(

@@ -181,7 +181,7 @@ def test_a_clock_may_have_another_unit_and_stand_in_two_columns(csv):
 
 
 def test_timestamps_that_repeat_or_go_back_are_refused(csv):
-    path = csv("Time;vt\n10:51:42,1;1\n10:51:42,1;2\n10:51:42,0;3\n")
+    path = csv("Time;vt\n10:51:42,1;1\n10:51:42,1;2\n10:51:42,3;3\n")
     with pytest.raises(RecordError, match=r"bump\.csv:3: column 'Time': time 0\.0 s repeats"):
         read_record(path, Clock(("Time",)), VT)
     path = csv("Date;Time;vt\n2020-01-02;10:00;1\n2020-01-01;10:00;2\n")

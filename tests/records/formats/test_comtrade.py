@@ -152,6 +152,43 @@ def test_the_standard_of_1991_has_fewer_cells(write, form):
     assert_the_record(read_comtrade(write(configuration(form, "1991"), samples(form))), form)
 
 
+@pytest.mark.parametrize("written", ["0", "1997", "2000", " 2000 "])
+@pytest.mark.parametrize("form", ["ASCII", "BINARY"])
+def test_a_revision_that_no_standard_has_is_read_by_the_cells_of_the_channels(write, form, written):
+    """Wisp.Comtrade, ComtradeTests/ExampleSet2: a file of 1997 and one of 2000, both as in 1999."""
+    rates = ((0.0, SAMPLES),)  # the time is that of the stamps, with the multiplier of 1999
+    for revision, multiplier in (("1999", MULTIPLIER), ("1991", 1.0)):
+        station, *lines = configuration(form, revision, rates=rates)
+        station = ",".join([*station.split(",")[:2], written])
+        data = samples(form, ticks(multiplier=multiplier))
+        assert_the_record(read_comtrade(write([station, *lines], data)), form)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_last_sample_that_is_counted_from_zero_is_read(write, first):
+    """Wisp.Comtrade, ComtradeTests/ExampleSet2: 2.cfg numbers from 0, 4.CFG from 1."""
+    whole = configuration(rates=((1000.0, SAMPLES),))
+    data = b"".join(
+        struct.pack("<I", row + first) + GOOD[row * ROW + 4 : (row + 1) * ROW]
+        for row in range(SAMPLES)
+    )
+    expected = read_comtrade(write(whole, GOOD)).numbers(("time", "Ugen"))
+    found = read_comtrade(write(configuration(rates=((1000.0, SAMPLES - 1),)), data)).numbers(
+        ("time", "Ugen")
+    )
+    for name, samples in expected.items():
+        assert np.array_equal(found[name], samples)
+    with pytest.raises(RecordError, match="50 samples, but 48"):
+        read_comtrade(write(configuration(rates=((1000.0, SAMPLES - 2),)), data))
+
+
+def test_a_status_channel_without_its_normal_state_is_read(write):
+    """Wisp.Comtrade, ComtradeTests/ExampleSet2, 2.cfg: of spare channels the fifth cell lacks."""
+    lines = [f"{line[:-2]}" if ",CB" in line else line for line in configuration()]
+    assert {line.count(",") for line in lines if ",CB" in line} == {3}
+    assert_the_record(read_comtrade(write(lines, samples("BINARY"))), "BINARY")
+
+
 @pytest.mark.parametrize(
     "suffixes", [(".CFG", ".DAT"), (".cfg", ".DAT"), (".Cfg", ".dat")], ids="".join
 )

@@ -29,7 +29,8 @@ def time_of(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Ar
         return _stamped(parts, config, samples.stamp)
     time = np.empty(len(samples.number))
     first, before = 0, 0.0
-    for rate, last in config.sample_rates:
+    rates, ends = zip(*config.sample_rates, strict=True)
+    for rate, last in zip(rates, (*ends[:-1], len(time)), strict=True):
         count = np.arange(last - first) + (first > 0)
         time[first:last] = before + count / rate
         first, before = last, float(time[last - 1])

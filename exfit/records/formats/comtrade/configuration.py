@@ -14,9 +14,11 @@ if TYPE_CHECKING:
     from comtrade import Cfg
 
 REVISIONS = ("", "1991", "1999", "2001", "2013")  # without one it is 1991 (-1999, 5.3.1)
+# of recorders: 1997 of a draft, 2000 as IEC 60255-24:2001 has it for an example, 0 of none
+BY_CELLS = ("0", "1997", "2000")
 KINDS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")
 ANALOG_CELLS = (10, 13)  # 1991, and since
-STATUS_CELLS = (3, 5)
+STATUS_CELLS = (3, 4, 5)  # 1991, without the normal state, which is not used, and since
 SLOWEST_RATE = 1e-6  # Hz: less is no sampling rate
 TEXT_SHOWN = 60
 CHANNEL_BYTES = 4000  # of a channel's description, while it is read
@@ -35,7 +37,8 @@ def config_of(parts: ComtradeFiles) -> "Cfg":
     except ImportError:
         raise missing_package(parts.path, "comtrade", "comtrade") from None
     _check_lines(parts)
-    text = _NO_FRACTION.sub(r"\1.0", parts.text)  # the package fails where seconds have none
+    text = _with_known_revision(parts.text)
+    text = _NO_FRACTION.sub(r"\1.0", text)  # the package fails where seconds have none
     stream = io.StringIO(text)
     config = Cfg(ignore_warnings=True)
     try:
@@ -80,9 +83,20 @@ def _check_station(parts: ComtradeFiles, line: str) -> None:
         raise RecordError(
             f"{parts.line(0)}: {len(cells)} cells in place of station, device, revision"
         )
-    if len(cells) == 3 and cells[2] not in REVISIONS:
+    if len(cells) == 3 and cells[2] not in (*REVISIONS, *BY_CELLS):
         supported = ", ".join(REVISIONS[1:])
         raise RecordError(f"{parts.line(0)}: revision {cells[2]!r} is not one of {supported}")
+
+
+def _with_known_revision(text: str) -> str:
+    """Return a configuration with the revision that its first channel has the cells of."""
+    station, counts, channel, *rest = text.split("\n")
+    *first, revision = station.split(",")
+    if len(first) < 2 or revision.strip() not in BY_CELLS:
+        return text
+    old = channel.count(",") + 1 in (ANALOG_CELLS[0], STATUS_CELLS[0])
+    station = ",".join([*first, "1991" if old else "1999"])
+    return "\n".join([station, counts, channel, *rest])
 
 
 def _channel_counts(parts: ComtradeFiles, lines: Sequence[str]) -> tuple[int, int]:

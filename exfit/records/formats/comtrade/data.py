@@ -38,7 +38,9 @@ def samples_of(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     read = _ascii if config.ft.upper() == "ASCII" else _binary
     samples = read(parts, config)
     rows, total = len(samples.number), config.sample_rates[-1][1]
-    if rows != total:
+    # some recorders count the last sample from 0; of one rate that is no matter
+    counts_from_zero = len(config.sample_rates) == 1 and rows == total + 1
+    if rows != total and not counts_from_zero:
         raise RecordError(f"{parts.dat}: {rows} samples, but {total} in {parts.cfg.name}")
     number = samples.number.astype(np.float64)
     jump = np.flatnonzero(number[1:] != number[:-1] + 1.0)
