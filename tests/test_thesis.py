@@ -7,13 +7,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from gallery import same, same_word
-from places import ROOT
+from places import CONFIGS, ROOT
 from thesis_numbers import (
     ABSOLUTE,
     APPROXIMATE,
+    COSTS,
     CURVES,
+    DGN,
     INSTANTS,
     LM,
+    LM_DGN,
     RELATIVE,
     RESULTS,
     STARTS,
@@ -22,6 +25,10 @@ from thesis_numbers import (
     A,
     K,
 )
+from thesis_runs import thesis_case
+
+from exfit.case.load import load_case
+from exfit.workflows import fit
 
 PAGE = (ROOT / "docs" / "thesis.md").read_text(encoding="utf-8")
 IMAGES = ROOT / "docs" / "img"
@@ -124,6 +131,46 @@ def test_a_curve_of_andes_begins_at_rest_and_makes_its_step(name):
     ).T
     assert vt[time <= 1.0] == pytest.approx(1.0, abs=1e-7)
     assert vt[-1] == pytest.approx(1.05, abs=1e-3)
+
+
+# ---- the cases that come with exfit
+
+
+@pytest.mark.parametrize("name", ["ac1a_table_1", "ac8b_table_9"])
+def test_a_case_of_the_thesis_is_the_one_that_the_study_fits(name):
+    case = load_case(CONFIGS / "thesis" / f"{name}.yaml")
+    studied = "ac1a_typical" if name == "ac1a_table_1" else "ac8b_unit1"
+    own = thesis_case(studied, STARTS[studied], "dgn")
+    assert case.values() == own.values()
+    for section in ("free", "held"):
+        assert getattr(case, section)() == getattr(own, section)()
+    for section in ("estimate", "test", "simulation", "plant"):
+        assert getattr(case, section) == getattr(own, section)
+    files = [one.recordings[0].record.file for one in (case, own)]
+    assert files[0].removeprefix("../") == files[1]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "number"), [("ac1a_table_1", 1), ("ac8b_table_9", 9)])
+def test_its_fit_goes_through_the_table_of_the_page(name, number):
+    (heading,) = re.findall(rf"^### Table {number}: .*", PAGE, re.MULTILINE)
+    rows = [row[4:] for row in table_below(heading)[2:] if row[4]]
+    history = fit(CONFIGS / "thesis" / f"{name}.yaml").history
+    assert len(rows) == len(history)
+    for (norm, cost, halvings), line in zip(rows, history, strict=True):
+        assert same_word(norm, f"{line.gradient_norm:.6f}")
+        assert same_word(cost, f"{line.cost:.7f}")
+        assert line.inner == int(halvings)
+
+
+def test_a_cost_of_the_text_is_that_of_the_table_with_more_digits():
+    """Where the row is that of the search: case 1's second and case 3's are other ones."""
+    last = {(table.case, table.method): table.rows[-1][1] for table in TABLES}
+    for search in (("ac1a_typical", DGN), ("ac1a_typical", LM_DGN), ("ac1a_good", DGN),
+                   ("ac1a_low", LM_DGN), ("ac8b_unit1", DGN), ("ac8b_unit2", DGN)):  # fmt: skip
+        digits = len(last[search].partition(".")[2])
+        assert f"{float(COSTS[search]):.{digits}f}" == last[search]
+        assert COSTS[search] in PAGE
 
 
 # ---- the study

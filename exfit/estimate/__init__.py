@@ -25,6 +25,7 @@ from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
     from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
+    from exfit.estimate.damping_armijo import ArmijoDamping
     from exfit.estimate.damping_ratio import RatioDamping
     from exfit.estimate.gauss_newton import LineSearch
     from exfit.estimate.problem import half_square
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "STATUS",
+    "ArmijoDamping",
     "CostProfile",
     "Descent",
     "Functions",
@@ -66,6 +68,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "ArmijoDamping": "exfit.estimate.damping_armijo",
     "CostProfile": "exfit.estimate.profiling",
     "LowerMinimum": "exfit.estimate.profiling",
     "Descent": "exfit.estimate.solver",

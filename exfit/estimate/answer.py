@@ -129,9 +129,9 @@ class Result:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far many searches side by side are; ``best`` is the lowest cost so far."""
+    """How far many searches are, side by side or in turn; ``best`` is the lowest cost so far."""
 
-    stage: Literal["screening", "refining", "profiling"]
+    stage: Literal["screening", "refining", "profiling", "weighing", "causes"]
     done: int
     total: int
     best: float

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from exfit.estimate.damping_armijo import ArmijoDamping
 from exfit.estimate.damping_ratio import RatioDamping
 from exfit.estimate.gauss_newton import FullStep, LineSearch
 from exfit.estimate.trust_region import TrustRegion
@@ -13,7 +14,7 @@ class Searches:
 
     gn: FullStep = field(default_factory=lambda: FullStep(retries=True))
     dgn: LineSearch = field(default_factory=LineSearch)
-    lm: TrustRegion | RatioDamping = field(default_factory=TrustRegion)
+    lm: TrustRegion | RatioDamping | ArmijoDamping = field(default_factory=TrustRegion)
 
 
 USUAL = Searches()

@@ -119,7 +119,7 @@ def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> Fil
     if isinstance(section.filter, MedianSection) and section.filter.median > widest:
         samples = f"{section.filter.median} samples; at most {widest}, a tenth of the record"
         raise RecordError(f"{record.source}: {signal}: filter: median: {samples}")
-    window = record.averaged.get(signal, section.averaged)
+    window = record.averaged.get(signal, section.averaged) or None
     if section.filter is None and window is None and kept.all():
         return None
     average = None if window is None else MovingAverage(window)

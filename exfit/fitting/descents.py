@@ -1,7 +1,8 @@
 """The descents from the start of a case, and the choice among the ends that they and others found.
 
-Strategy auto judges its ends: what casts doubt on one is passed as a function, which knows the
-records, their noise and the validations.
+Of ends that the records do not tell apart it is one on which the validations hold. Strategy auto
+asks more of an end. What speaks against one is passed as a judge, which knows the records, their
+noise and the validations.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -12,15 +13,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from exfit.estimate import STATUS, Descent, OneByOne, Result, SolverIteration, Stop
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
 Announce = Callable[[SolverIteration], None]
-Doubt = Callable[[Result], str]  # why an end may not be the one looked for; "" where it is
+Doubt = Callable[[Result], str]  # what speaks against an end; "" where nothing does
 
 STAGES = ("dgn", "lm-then-dgn")
 CONFIRMED = 2  # descents that must lead to a minimum which is in doubt
+
+
+class Judge(NamedTuple):
+    """What speaks against an end: ``refused`` why a validation does not hold on it.
+
+    ``doubt`` says why else it may not be the one looked for: strategy auto goes on then.
+    """
+
+    refused: Doubt
+    doubt: Doubt
 
 
 class Descents(NamedTuple):
@@ -50,8 +60,8 @@ class SearchMethods(Protocol):
     def one(self, method: str, announce: Announce) -> Result:
         """Return the end of a descent from the start of the case."""
 
-    def margin(self, cost: float) -> float:
-        """Return by how much a cost may exceed this one and the records do not tell them apart."""
+    def margin(self, lowest: Result) -> float:
+        """Return by how much a cost may exceed the lowest and the records not tell them apart."""
 
 
 def no_doubt(_: Result) -> str:
@@ -59,8 +69,11 @@ def no_doubt(_: Result) -> str:
     return ""
 
 
+NO_JUDGE = Judge(no_doubt, no_doubt)
+
+
 def from_start(
-    searches: SearchMethods, methods: Sequence[str], doubt: Doubt, announce: Announce
+    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
 ) -> Descents:
     """Return the descents by one method after the other, until one ends without doubt.
 
@@ -72,9 +85,9 @@ def from_start(
             ends.append(searches.one(method, announce))
             if ends[-1].stop is Stop.INTERRUPTED:
                 raise KeyboardInterrupt
-            best, reason = chosen(searches, doubt, ends)
-            doubts.append(reason)
-            if not reason:
+            best = chosen(searches, judge, ends)
+            doubts.append(judge.doubt(best))
+            if not doubts[-1]:
                 break
     except KeyboardInterrupt:
         if not ends:
@@ -83,20 +96,19 @@ def from_start(
     return Descents(tuple(ends), tuple(doubts), best)
 
 
-def chosen(searches: SearchMethods, doubt: Doubt, ends: Sequence[Result]) -> tuple[Result, str]:
-    """Return the lowest end and its doubt, or one like it without doubt, if there is one."""
+def chosen(searches: SearchMethods, judge: Judge, ends: Sequence[Result]) -> Result:
+    """Return the lowest end, or one like it if the validations hold on that one alone."""
     lowest, *others = sorted(ends, key=lambda end: end.cost)
-    reason = doubt(lowest)
-    if reason:
-        for other in others:
-            if other.cost <= lowest.cost + searches.margin(lowest.cost) and not doubt(other):
-                return other, ""
-    return lowest, reason
+    if others and others[0].cost > lowest.cost and judge.refused(lowest):
+        highest = lowest.cost + searches.margin(lowest)
+        like = (other for other in others if other.cost <= highest)
+        return next((other for other in like if not judge.refused(other)), lowest)
+    return lowest
 
 
-def count_like(cost: float, costs: ArrayLike, searches: SearchMethods) -> int:
-    """Return how many costs the records do not tell from one that is lower than all of them."""
-    return int(np.count_nonzero(np.asarray(costs) <= cost + searches.margin(cost)))
+def count_like(lowest: Result, costs: ArrayLike, searches: SearchMethods) -> int:
+    """Return how many costs the records do not tell from the lowest of them."""
+    return int(np.count_nonzero(np.asarray(costs) <= lowest.cost + searches.margin(lowest)))
 
 
 def confirmed(best: Result, doubt: str, like: int) -> Result:
@@ -139,6 +151,15 @@ def following(last: SolverIteration, line: SolverIteration) -> SolverIteration:
     )
 
 
+def taken_for_validation(times: float) -> str:
+    """Return that a minimum so many times as high as the lowest one was taken, and why."""
+    return (
+        f"the cost is {times:.4g} times the lowest one found: the records do not tell the two "
+        "minima apart, and this one was taken because the validation holds on it; it is no "
+        "independent test then"
+    )
+
+
 def notes_of(doubts: Sequence[str], best: Result, like: int, costs: ArrayLike) -> Iterator[str]:
     """Yield why auto went beyond its first stage, and what it left in doubt.
 
@@ -146,15 +167,9 @@ def notes_of(doubts: Sequence[str], best: Result, like: int, costs: ArrayLike) -
     at ``costs``, led to the lowest minimum or to one like it.
     """
     first, last = doubts[0], doubts[-1]
-    lowest, count = float(np.nanmin(costs)), int(np.count_nonzero(np.isfinite(costs)))
+    count = int(np.count_nonzero(np.isfinite(costs)))
     if first:
         yield f"auto took dgn and lm-then-dgn, because after dgn: {first}"
-    if first and not last and best.cost > lowest:
-        yield (
-            f"the cost is {best.cost / lowest:.4g} times the lowest one found: the records do not "
-            "tell the two minima apart, and this one was taken because the validation holds on it; "
-            "it is no independent test then"
-        )
     if last:
         yield (
             f"{last}; {like} of {count} descents led to this minimum or to one like it, and none "
@@ -176,7 +191,9 @@ def descent_near(residuals: Residuals, theta: Array) -> Result:
     Raises KeyboardInterrupt at an interruption.
     """
     descent = Descent(
-        functions=OneByOne(residuals, residuals.exact), bounds=residuals.bounds, x_scale=UNIT
+        functions=OneByOne(residuals, residuals.exact),
+        bounds=residuals.bounds,
+        x_scale=residuals.units,
     )
     end = descent.run(theta)
     if end.stop is Stop.INTERRUPTED:

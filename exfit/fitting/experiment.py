@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.averages import Averages, averages_of
 from exfit.dsp.filtering import Filtering
 from exfit.fitting.nuisances.kinds import OF_SYSTEM, Nuisance
 from exfit.fitting.nuisances.sine import Sine
@@ -45,14 +46,7 @@ class Channel:
         """Return what is compared of simulated signals (K, M), a row (errors,) of each."""
         if self.filtering is None:
             return simulated
-        return np.stack([self.filtered(self.as_recorded(samples)) for samples in simulated])
-
-    def as_recorded(self, simulated: Array) -> Array:
-        """Return simulated values (M, ...) as the recorder shows them, before they are filtered.
-
-        Where it records averages, these are averaged alike; so are derivatives.
-        """
-        return simulated if self.filtering is None else self.filtering.as_recorded(simulated)
+        return np.stack([self.filtered(samples) for samples in simulated])
 
     def slopes(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives of filtered samples, given those (M, N) of the samples."""
@@ -135,10 +129,13 @@ class Experiment:
 
     def with_inputs(self, values: Values) -> Simulator:
         """Return the simulator with the steps and the delay that the values give."""
+        return self._with_inputs(self.simulator, values)
+
+    def _with_inputs(self, simulator: Simulator, values: Values) -> Simulator:
         if not self.moves:
-            return self.simulator
-        steps: list[InputStep] = list(self.simulator.inputs.steps)
-        delay = self.simulator.delay
+            return simulator
+        steps: list[InputStep] = list(simulator.inputs.steps)
+        delay = simulator.delay
         for nuisance in self.nuisances:
             if nuisance.kind in ("at", "switching"):
                 for place in range(nuisance.step, nuisance.step + nuisance.count):
@@ -153,7 +150,35 @@ class Experiment:
             for nuisance in self.nuisances
             if nuisance.kind == "shift"
         ]
-        return self.simulator.with_inputs(tuple(steps), sum(shifts, start=delay))
+        return simulator.with_inputs(tuple(steps), sum(shifts, start=delay))
+
+    @cached_property
+    def _averages(self) -> Averages | None:
+        """What short windows of averages show of the simulation, None where that is its samples."""
+        filterings = [channel.filtering for channel in self.channels]
+        return averages_of(filterings) if self.simulator.alone else None
+
+    @cached_property
+    def _reader(self) -> Simulator:
+        """The simulator, read where averages need it."""
+        averages, own = self._averages, self.simulator
+        return own if averages is None else own.at_times(averages.times(own.times))
+
+    def _as_recorded(self, read: Array, axis: int = 0) -> Array:
+        """Return simulated signals (..., M, channels, ...) as the recorder shows them.
+
+        Where it records averages, these are averaged alike; so are derivatives.
+        """
+        if self._averages is not None:
+            read = self._averages.of(read, axis)
+        for k, channel in enumerate(self.channels):
+            filtering = channel.filtering
+            if filtering is None or (self._averages is not None and filtering.window_between):
+                continue
+            place = (slice(None),) * (axis + 1) + (k,)
+            by_lines = filtering.as_recorded(np.moveaxis(read[place], axis, 0))
+            read[place] = np.moveaxis(by_lines, 0, axis)
+        return read
 
     def measured(self, channel: Channel, values: Values) -> Array:
         """Return a record (M,) in per unit, by the scale and offset that the values give."""
@@ -168,9 +193,10 @@ class Experiment:
         return raw * of_record.get("scale", channel.scale) + of_record.get("offset", channel.offset)
 
     def samples(self, values: Values) -> tuple[Array, int]:
-        """Return the simulated signals (M, channels), and the number of sub-steps."""
-        samples, parts = self.with_inputs(values).samples(self.parameters(values), self.signals)
-        return self._with_sines(samples, values), parts
+        """Return the simulated signals (M, channels) as recorded, and the number of sub-steps."""
+        simulator = self._with_inputs(self._reader, values)
+        samples, parts = simulator.samples(self.parameters(values), self.signals)
+        return self._with_sines(self._as_recorded(samples), values), parts
 
     def errors(self, values: Values) -> tuple[Array, int]:
         """Return the weighted errors, one channel behind the other, and the sub-steps."""
@@ -191,8 +217,8 @@ class Experiment:
         Of a set without a start at rest they are no numbers; see ``Simulator.samples_of_many``.
         """
         systems = [self.parameters(values) for values in sets]
-        samples, parts = self.simulator.samples_of_many(systems, self.signals, self._tests(sets))
-        return self._all_with_sines(samples, sets), parts
+        samples, parts = self._reader.samples_of_many(systems, self.signals, self._tests(sets))
+        return self._all_with_sines(self._as_recorded(samples, 1), sets), parts
 
     def compared(self, samples: Array, values: Values) -> Array:
         """Return the weighted errors of simulated signals (M, channels)."""
@@ -200,7 +226,8 @@ class Experiment:
 
     def _tests(self, sets: Sequence[Values]) -> list[Simulator] | None:
         """Return the simulator of each set, None where they all have the same."""
-        return [self.with_inputs(values) for values in sets] if self.moves else None
+        reader = self._reader
+        return [self._with_inputs(reader, values) for values in sets] if self.moves else None
 
     def _compared_many(self, samples: Array, sets: Sequence[Values]) -> Array:
         """Return the weighted errors (K, errors) of signals (K, M, channels) of several sets."""
@@ -236,13 +263,14 @@ class Experiment:
 
         Each set has its own N ``moves``. Of a set without a start at rest they are no numbers.
         """
-        samples, slopes, parts = self.simulator.tangents_of_many(
+        samples, slopes, parts = self._reader.tangents_of_many(
             [self.parameters(values) for values in sets],
             self.signals,
             [[self.direction(move) for move in own] for own in moves],
             self._tests(sets),
         )
-        samples = self._all_with_sines(samples, sets)
+        samples = self._all_with_sines(self._as_recorded(samples, 1), sets)
+        slopes = self._as_recorded(slopes, 1)
         derivatives = [
             self._slopes_of(response, self._slopes_with_sines(own, values, move), values, move)
             for response, own, values, move in zip(samples, slopes, sets, moves, strict=True)
@@ -255,9 +283,7 @@ class Experiment:
         """Return the derivatives (errors, N) of weighted errors, of those of the signals."""
         blocks = []
         for k, channel in enumerate(self.channels):
-            ours = channel.slopes(
-                channel.as_recorded(samples[:, k]), channel.as_recorded(slopes[:, k])
-            )
+            ours = channel.slopes(samples[:, k], slopes[:, k])
             theirs = self._measured_slopes(channel, values, moves)
             blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
         slopes = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
@@ -268,8 +294,11 @@ class Experiment:
     ) -> tuple[Array, Array]:
         """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
         directions = [self.direction(move) for move in moves]
-        simulator = self.with_inputs(values)
-        samples, slopes = simulator.tangents(self.parameters(values), self.signals, directions)
+        simulator = self._with_inputs(self._reader, values)
+        samples, slopes = (
+            self._as_recorded(each)
+            for each in simulator.tangents(self.parameters(values), self.signals, directions)
+        )
         return self._with_sines(samples, values), self._slopes_with_sines(slopes, values, moves)
 
     def _all_with_sines(self, samples: Array, sets: Sequence[Values]) -> Array:
@@ -281,13 +310,15 @@ class Experiment:
 
     def _with_sines(self, samples: Array, values: Values) -> Array:
         """Return simulated signals (M, channels) with their periodic disturbances."""
-        if not self.sines:
-            return samples
-        disturbed = np.array(samples)
+        return samples + self.disturbances(values) if self.sines else samples
+
+    def disturbances(self, values: Values) -> Array:
+        """Return the periodic disturbances (M, channels) of the simulated signals."""
+        disturbances = np.zeros((len(self.simulator.times), len(self.channels)))
         for sine in self.sines:
             place = self.signals.index(sine.signal)
-            disturbed[:, place] += sine.samples(self.simulator.times, values)
-        return disturbed
+            disturbances[:, place] += sine.samples(self.simulator.times, values)
+        return disturbances
 
     def _slopes_with_sines(self, slopes: Array, values: Values, moves: Sequence[Values]) -> Array:
         """Return derivatives (M, channels, N) of signals with their periodic disturbances."""
@@ -298,6 +329,22 @@ class Experiment:
             place = self.signals.index(sine.signal)
             disturbed[:, place] += sine.slopes(self.simulator.times, values, moves)
         return disturbed
+
+    def undisturbed_slopes(
+        self, signal: str, values: Values, moves: Sequence[Values]
+    ) -> tuple[Array, Array]:
+        """Return the derivatives (kept, N) of a signal as it is compared, and those of its errors.
+
+        The first are those without its periodic disturbance, simulated less measured the others.
+        """
+        k = self.signals.index(signal)
+        channel = self.channels[k]
+        samples, slopes = self.response_with_derivatives(values, moves)
+        of_sines = self._slopes_with_sines(np.zeros_like(slopes), values, moves)
+        own = samples[:, k]
+        disturbed, of_sine = (channel.slopes(own, each[:, k]) for each in (slopes, of_sines))
+        theirs = self._measured_slopes(channel, values, moves)
+        return disturbed - of_sine, disturbed if theirs is None else disturbed - theirs
 
     def direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from exfit.estimate import Descent, spread
 from exfit.fitting.forms.legs import legs_of
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import SideBySide
 from exfit.fitting.simulation_counter import SimulationCounter
@@ -75,5 +74,5 @@ def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> D
         method=DEFAULT_STRATEGY,
         max_iterations=MOST_ITERATIONS,
         ftol=TO_DISTINGUISH,
-        x_scale=UNIT,
+        x_scale=problem.residuals.units,
     )

@@ -13,7 +13,7 @@ from exfit.estimate.starts import outcome_of, same
 from exfit.fitting.descents import (
     Announce,
     Descents,
-    Doubt,
+    Judge,
     SearchMethods,
     chosen,
     confirmed,
@@ -23,6 +23,7 @@ from exfit.fitting.descents import (
     from_start,
     notes_of,
     stopped,
+    taken_for_validation,
 )
 from exfit.util.strategies import FROM_FURTHER_STARTS
 
@@ -42,7 +43,8 @@ class SearchResult(NamedTuple):
     from the start of the case to ``best``, which is that at ``place`` of the minima, None where it
     is none of them; ``own`` is the best end of the descents from the start of the case. ``ways``
     says what each descent began with: the strategy of the case, its linear phase, or the model
-    itself.
+    itself. ``for_validation`` where ``best`` was taken in place of a lower minimum, as the
+    validations hold on it alone.
     """
 
     best: Result
@@ -52,6 +54,7 @@ class SearchResult(NamedTuple):
     place: int | None = None
     ways: "tuple[Way, ...]" = ()
     notes: tuple[str, ...] = ()
+    for_validation: bool = False
 
     @property
     def interrupted(self) -> bool:
@@ -91,29 +94,29 @@ class GlobalSearchMethods(SearchMethods, Protocol):
 
 
 def local_search(
-    searches: SearchMethods, methods: Sequence[str], doubt: Doubt, announce: Announce
+    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
 ) -> SearchResult:
     """Return the best point of the descents from the start of a case."""
-    return best_of(searches, from_start(searches, methods, doubt, announce))
+    return best_of(searches, from_start(searches, methods, judge, announce))
 
 
 def global_search(
-    searches: GlobalSearchMethods, methods: Sequence[str], doubt: Doubt, announce: Announce
+    searches: GlobalSearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
 ) -> SearchResult:
     """Return the best point of the descents from the start of a case and from further starts.
 
-    Of minima that the records do not tell apart it is one without doubt, if there is one. Where the
-    descents of the case came to the same minimum, theirs is the result; else a last descent from
-    the end found. An interruption keeps the best point so far.
+    Of minima that the records do not tell apart it is one on which the validations hold, if there
+    is one. Where the descents of the case came to the same minimum, theirs is the result; else a
+    last descent from the end found. An interruption keeps the best point so far.
     """
-    descents = from_start(searches, methods, doubt, announce)
+    descents = from_start(searches, methods, judge, announce)
     if descents.interrupted:
         return best_of(searches, descents)
     reason = why_local(searches, descents.best)
     if reason:
         alone = best_of(searches, descents)
         return alone._replace(notes=(*alone.notes, f"no search from further starts: {reason}"))
-    return beyond(searches, descents, searches.further(descents.ends), doubt, announce)
+    return beyond(searches, descents, searches.further(descents.ends), judge, announce)
 
 
 def why_local(searches: GlobalSearchMethods, own: Result) -> str:
@@ -131,9 +134,13 @@ def best_of(searches: SearchMethods, descents: Descents) -> SearchResult:
     best, notes = descents.best, tuple[str, ...]()
     if not descents.interrupted:
         costs = [end.cost for end in descents.ends]
-        like = count_like(min(costs), costs, searches)
-        best = confirmed(best, descents.doubts[-1], like)
+        lowest = min(descents.ends, key=lambda end: end.cost)
+        reason = descents.doubts[-1]
+        like = count_like(lowest, costs, searches) if reason else len(costs)
+        best = confirmed(best, reason, like)
         notes = tuple(notes_of(descents.doubts, best, like, costs))
+        if best.cost > lowest.cost:
+            notes = (*notes, taken_for_validation(best.cost / lowest.cost))
     best = counted(best, descents.ends)
     return SearchResult(best, None, descents.history, best, notes=notes)
 
@@ -142,7 +149,7 @@ def beyond(
     searches: GlobalSearchMethods,
     descents: Descents,
     further: FurtherDescents,
-    doubt: Doubt,
+    judge: Judge,
     announce: Announce,
 ) -> SearchResult:
     """Return the best of the descents from the start of a case and of the minima found with it."""
@@ -151,11 +158,12 @@ def beyond(
     try:
         if minima.interrupted:
             raise KeyboardInterrupt
-        best, reason = chosen(searches, doubt, ends)
+        best = chosen(searches, judge, ends)
+        reason = judge.doubt(best)
     except KeyboardInterrupt:
         best = min([*descents.ends, *filter(None, [minima.best])], key=lambda end: end.cost)
         return interrupted(descents, minima, ways, best, announce)
-    like = count_like(ends[0].cost, minima.end_costs, searches)
+    like = count_like(ends[0], minima.end_costs, searches) if reason else len(ends)
     own = own_end(descents, best)
     if own is None:
         path, last = refined(searches, descents.history, best, announce)
@@ -166,7 +174,7 @@ def beyond(
     if further.why_direct:
         notes.append(f"the search goes without its linear phase: {further.why_direct}")
     place = next(k for k, end in enumerate(ends) if end is best)
-    return SearchResult(last, minima, path, descents.best, place, ways, tuple(notes))
+    return SearchResult(last, minima, path, descents.best, place, ways, tuple(notes), place > 0)
 
 
 def continued(
@@ -190,6 +198,19 @@ def continued(
     lowest = LocalMinimum(last.x, last.cost, sum(local.starts for local in alike), last)
     minima = replace(found.minima, minima=(lowest, *others), best=last)
     return found._replace(best=last, history=path, minima=minima, place=0)
+
+
+def judged_again(
+    searches: GlobalSearchMethods, found: SearchResult, judge: Judge, announce: Announce
+) -> SearchResult:
+    """Return a search whose best minimum is a new one, or one like it if validations hold there."""
+    ends = [] if found.minima is None else [local.result for local in found.minima.minima]
+    best = chosen(searches, judge, ends) if ends else found.best
+    if not ends or best is ends[0]:
+        return found._replace(for_validation=False)
+    path, last = refined(searches, found.history, best, announce)
+    place = next(k for k, end in enumerate(ends) if end is best)
+    return found._replace(best=last, history=path, place=place, for_validation=True)
 
 
 def own_end(descents: Descents, best: Result) -> Result | None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from exfit.case.bounds import search_bounds
+from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
@@ -58,7 +58,7 @@ def with_given_values(
     changed = case.with_values(changed_values(case, given, str(source)), source, sources)
     faults, rows = [], case.rows()
     for name, section in changed.free().items():
-        low, high = search_bounds(section.min, section.max, rows.get(name))
+        low, high = bounds_of(section, rows.get(name))
         if name in given and not low <= section.start <= high:
             limits = f"{low:g} ... {high:g} in {case.path}"
             faults.append(f"{source}: {name}: {section.start:g} lies outside its bounds {limits}")

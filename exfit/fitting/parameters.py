@@ -1,11 +1,17 @@
 """The parameters that a fit may move, as it moves them."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.bounds import bounds_of
+from exfit.case.schema import FreeSection
+from exfit.models.sheet import Parameter
 
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
@@ -22,7 +28,10 @@ class Prior:
 class FreeParameter:
     """A parameter that the fit may move, between ``low`` and ``high``, which may be infinite.
 
-    The estimator sees its logarithm, or its place in the interval where zero may be reached.
+    The estimator sees its logarithm, or its place in the interval where zero may be reached; where
+    a ``divisor`` is given, the value over that. A value below ``least`` has no response.
+    ``given`` are those bounds that a case has; the others are limits of the equations, which say
+    nothing of its size. None: both are bounds.
     """
 
     name: str
@@ -31,18 +40,33 @@ class FreeParameter:
     high: float
     logarithmic: bool
     prior: Prior | None = None
+    divisor: float | None = None
+    least: float = -inf
+    given: tuple[float, ...] | None = None
 
     @cached_property
     def width(self) -> float:
         """The interval between the bounds.
 
         Without one of them it is twice the distance of the start to zero or, where that is more,
-        to the other one: half of it, a reasonable step, then is the size of the start.
+        to the other one: half of it, a reasonable step, then is the size of the start. Where that
+        is 0, it is the interval that the equations allow, if they do.
         """
-        if isfinite(self.high - self.low):
-            return self.high - self.low
-        given = [bound for bound in (0.0, self.low, self.high) if isfinite(bound)]
-        return 2.0 * max(abs(self.start - bound) for bound in given)
+        interval = self.high - self.low
+        if self.given is None and isfinite(interval):
+            return interval
+        given = (self.low, self.high) if self.given is None else self.given
+        distances = [abs(self.start - bound) for bound in (0.0, *given) if isfinite(bound)]
+        return 2.0 * max(distances) or (interval if isfinite(interval) else 0.0)
+
+    @property
+    def unit(self) -> float:
+        """A reasonable step of the scaled parameter."""
+        return UNIT if self.logarithmic else UNIT * self.width / self._linear_scale
+
+    @property
+    def _linear_scale(self) -> float:
+        return self.width if self.divisor is None else self.divisor
 
     @cached_property
     def _scaled_bounds(self) -> dict[float, float]:
@@ -51,13 +75,13 @@ class FreeParameter:
 
     def scaled(self, value: float) -> float:
         """Return the number that the estimator moves."""
-        return float(np.log(value)) if self.logarithmic else value / self.width
+        return float(np.log(value)) if self.logarithmic else value / self._linear_scale
 
     def value(self, scaled: float) -> float:
         """Return the parameter's own value; at a bound, exactly that bound."""
         if scaled in self._scaled_bounds:
             return self._scaled_bounds[scaled]
-        return float(np.exp(scaled)) if self.logarithmic else scaled * self.width
+        return float(np.exp(scaled)) if self.logarithmic else scaled * self._linear_scale
 
     def bound(self, value: float) -> Literal["min", "max"] | None:
         """Return which bound a value lies on."""
@@ -65,6 +89,43 @@ class FreeParameter:
             return "min"
         return "max" if value == self.high else None
 
+    @property
+    def scaled_least(self) -> float:
+        """What is scaled of ``least``."""
+        return -inf if self.logarithmic else self.least / self._linear_scale
+
     def slope(self, scaled: float) -> float:
         """Return d value / d scaled."""
-        return float(np.exp(scaled)) if self.logarithmic else self.width
+        return float(np.exp(scaled)) if self.logarithmic else self._linear_scale
+
+
+def free_parameter(name: str, section: FreeSection, row: Parameter | None) -> FreeParameter:
+    """Return a parameter that a case leaves free, as a fit moves it."""
+    prior = None if section.prior is None else Prior(section.prior.mean, section.prior.sigma)
+    return FreeParameter(
+        name,
+        section.start,
+        *bounds_of(section, row),
+        section.scale == "log",
+        prior,
+        {"raw": 1.0, "start": abs(section.start)}.get(section.scale),
+        0.0 if row is not None and row.is_time and row.low >= 0.0 else -inf,
+        _given(section.min, section.max),
+    )
+
+
+def _given(*bounds: float | None) -> tuple[float, ...] | None:
+    """Those bounds that a case gives, None where it gives both."""
+    return None if None not in bounds else tuple(bound for bound in bounds if bound is not None)
+
+
+def units_of(free: Iterable[FreeParameter]) -> NDArray[np.float64]:
+    """Return a reasonable step of each scaled parameter, (N,)."""
+    return np.array([parameter.unit for parameter in free])
+
+
+def scaled_values(
+    free: Iterable[FreeParameter], values: Mapping[str, float]
+) -> NDArray[np.float64]:
+    """Return the numbers (N,) that the estimator moves, at values by name."""
+    return np.array([parameter.scaled(values[parameter.name]) for parameter in free])

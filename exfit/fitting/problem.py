@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import CaseError
 from exfit.fitting.forms.compression import compressed
-from exfit.fitting.parameters import FreeParameter, Prior
+from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.fitting.setup import ExperimentSetup
 
@@ -46,8 +45,15 @@ def residuals_of(
     values = case.values() if start is None else start
     fixed = {name: value for name, value in values.items() if name not in names}
     experiments = [setup.experiment for setup in setups]
-    step = case.estimate.difference_step
-    return Residuals(experiments, free, fixed, case.ties, robust_of(case), step)
+    return Residuals(
+        experiments,
+        free,
+        fixed,
+        case.ties,
+        robust_of(case),
+        case.estimate.difference_step,
+        case.estimate.differences == "relative",
+    )
 
 
 def robust_of(case: Case) -> Robust | None:
@@ -65,16 +71,9 @@ def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[
     """
     rows = case.rows()
     shared = [
-        FreeParameter(
-            name,
-            section.start,
-            *search_bounds(section.min, section.max, rows.get(name)),
-            section.scale == "log",
-            None if section.prior is None else Prior(section.prior.mean, section.prior.sigma),
-        )
-        for name, section in case.free().items()
+        free_parameter(name, section, rows.get(name)) for name, section in case.free().items()
     ]
-    sizeless = [parameter.name for parameter in shared if parameter.width == 0.0]
+    sizeless = [each.name for each in shared if each.width == 0.0 or each.divisor == 0.0]
     if sizeless:
         raise CaseError(
             f"{case.path}: {name}: a start of 0 gives no size by which to search: give min and max"

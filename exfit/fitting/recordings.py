@@ -113,6 +113,7 @@ def read_section(file: RecordFile, folder: Path, per_unit: bool, f0: float = 1.0
         file.memory,
         phasors_of(file.phasors),
         status_of(file.status),
+        file.repeats,
     )
 
 

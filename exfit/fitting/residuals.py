@@ -3,7 +3,7 @@
 They are functions of the scaled free parameters; what is known beforehand adds one each.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -16,7 +16,7 @@ from exfit.dsp.robust_loss import Loss
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.parameters import FreeParameter, Prior
+from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.simulation.substeps import NO_SUBSTEPS
 
@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 
 CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
-ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
 MOST_NUMBERS_AT_ONCE = 1 << 21  # of Jacobians that are made together: 16 MB
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
@@ -44,7 +43,8 @@ class Residuals:
 
     ``fixed`` holds every value that is neither free nor follows others by ``ties``. A set that
     cannot be simulated has infinite residuals. ``difference_step`` is that of `central`, `forward`
-    and `backward` in scaled parameters. ``counter`` counts the simulations that all of it costs.
+    and `backward` in scaled parameters, or, with ``relative_differences``, as a share of values.
+    ``counter`` counts the simulations that all of it costs.
     """
 
     experiments: Sequence[Experiment]
@@ -53,6 +53,7 @@ class Residuals:
     ties: Ties = field(default_factory=Ties)
     robust: Robust | None = None
     difference_step: float | None = None
+    relative_differences: bool = False
     counter: SimulationCounter | None = None
 
     @cached_property
@@ -86,6 +87,11 @@ class Residuals:
         low = np.array([parameter.scaled(parameter.low) for parameter in self.free])
         return low, np.array([parameter.scaled(parameter.high) for parameter in self.free])
 
+    @property
+    def units(self) -> Array:
+        """A reasonable step of each scaled parameter, (N,)."""
+        return units_of(self.free)
+
     @cached_property
     def noise(self) -> float:
         """The standard deviation of a weighted error, by the noise of the records.
@@ -109,9 +115,16 @@ class Residuals:
         )
 
     def values(self, theta: Array) -> dict[str, float]:
-        """Return every value by name."""
-        pairs = zip(self.free, theta, strict=True)
-        return self.completed({free.name: free.value(float(x)) for free, x in pairs})
+        """Return every value by name.
+
+        Raises SimulationError where there is no response to one.
+        """
+        values = {}
+        for free, x in zip(self.free, theta, strict=True):
+            value = values[free.name] = free.value(float(x))
+            if value < free.least:
+                raise SimulationError(f"{free.name} = {value:g}: no response below {free.least:g}")
+        return self.completed(values)
 
     def completed(self, free: Mapping[str, float]) -> dict[str, float]:
         """Return every value by name, given those of the free parameters."""
@@ -169,23 +182,32 @@ class Residuals:
 
     def central(self, theta: Array) -> Array:
         """Return the Jacobian by central differences, all 2 N runs side by side."""
-        step = self.difference_step or CENTRAL_STEP
+        step = self._steps(theta, CENTRAL_STEP)
         return self.differences(theta, -step, step)
 
     def forward(self, theta: Array) -> Array:
         """Return the Jacobian by forward differences."""
-        return self.differences(theta, 0.0, self.difference_step or ONE_SIDED_STEP)
+        return self.differences(theta, 0.0, self._steps(theta, ONE_SIDED_STEP))
 
     def backward(self, theta: Array) -> Array:
         """Return the Jacobian by backward differences."""
-        return self.differences(theta, -(self.difference_step or ONE_SIDED_STEP), 0.0)
+        return self.differences(theta, -self._steps(theta, ONE_SIDED_STEP), 0.0)
 
-    def differences(self, theta: Array, below: float, above: float) -> Array:
+    def _steps(self, theta: Array, usual: float) -> Array:
+        """Return the step of the differences of each scaled parameter (N,)."""
+        step = np.full(len(theta), self.difference_step or usual)
+        if not self.relative_differences:
+            return step
+        shares = np.array([free.logarithmic for free in self.free]) | (theta == 0.0)
+        return np.where(shares, step, step * np.abs(theta))
+
+    def differences(self, theta: Array, below: Array | float, above: Array | float) -> Array:
         """Return difference quotients over [theta + below, theta + above] within the bounds.
 
         Raises SimulationError where one of these points has no response.
         """
         low, high = self.bounds
+        low = np.maximum(low, [parameter.scaled_least for parameter in self.free])
         down, up = np.clip(theta + below, low, high), np.clip(theta + above, low, high)
         stuck = down == up  # a one-sided difference at the bound that it points to
         down, up = np.where(stuck, theta - above, down), np.where(stuck, theta - below, up)
@@ -263,10 +285,10 @@ class Residuals:
         return linearised
 
     def _reached(self, theta: Array) -> dict[str, float] | None:
-        """Return every value by name, None where a tie has none."""
+        """Return every value by name, None where one has no response or a tie no value."""
         try:
             return self.values(theta)
-        except TieError:
+        except UNREACHABLE:
             return None
 
     def _directed(self, theta: Array) -> tuple[dict[str, float], list[dict[str, float]]] | None:
@@ -359,33 +381,11 @@ def scatter_of(channel: Channel) -> float:
     )
 
 
-JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {
-    "exact": lambda residuals: residuals.exact,
-    "central": lambda residuals: residuals.central,
-    "forward": lambda residuals: residuals.forward,
-    "backward": lambda residuals: residuals.backward,
-}
-
-
-def jacobian_error(jacobian: str, difference_step: float | None = None) -> float | None:
-    """Return the error of a Jacobian by differences, as a share of its largest singular value.
-
-    It is what rounding or curvature makes of a direction that no signal sees; None for the exact
-    one.
-    """
-    if jacobian == "exact":
-        return None
-    central = jacobian == "central"
-    step = difference_step or (CENTRAL_STEP if central else ONE_SIDED_STEP)
-    return max(ROUNDING_OF_RUNS / step, step**2 if central else step)
-
-
 @dataclass(frozen=True, eq=False)
 class SideBySide:
     """Residuals and Jacobians of many points at once, as searches in lock-step ask for them."""
 
     residuals_of: Residuals
-    jacobian: str = "exact"
 
     def residuals(self, points: Sequence[Array]) -> Sequence[Array]:
         """Return the residuals (M,) at each of points (N,)."""
@@ -393,6 +393,4 @@ class SideBySide:
 
     def jacobians(self, points: Sequence[Array]) -> Sequence[Array]:
         """Return the Jacobian (M, N) at each of points (N,)."""
-        if self.jacobian == "exact":
-            return self.residuals_of.exact_of_many(points)
-        return [JACOBIANS[self.jacobian](self.residuals_of)(point) for point in points]
+        return self.residuals_of.exact_of_many(points)

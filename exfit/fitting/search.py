@@ -1,6 +1,6 @@
 """The search for the parameters of a case."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import isfinite
@@ -15,7 +15,7 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiments
-from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
+from exfit.fitting.descents import NO_JUDGE, STAGES, Announce, Judge, no_doubt
 from exfit.fitting.forms.external import has_twin, is_external, simulated_by, start_tried
 from exfit.fitting.forms.twin_descent import descent_by_twin
 from exfit.fitting.global_search import (
@@ -23,18 +23,16 @@ from exfit.fitting.global_search import (
     SearchResult,
     continued,
     global_search,
+    judged_again,
     local_search,
 )
 from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
-from exfit.fitting.residuals import (
-    JACOBIANS,
-    LEAST_NOISE,
-    Residuals,
-    jacobian_error,
-)
+from exfit.fitting.residuals import CENTRAL_STEP, LEAST_NOISE, ONE_SIDED_STEP, Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.fitting.uncertainty import linearisation
+from exfit.inference import confidence
 from exfit.simulation.external import QUOTIENT_STEP
 from exfit.util.strategies import (
     DEFAULT_STRATEGY,
@@ -50,6 +48,13 @@ CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 PROGRAM_TOLERANCE = 1e-5  # of the cost: no gain that is less is worth a run
 PROGRAM_STEP = 1e-4  # of scaled parameters: no step that is less
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
+ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
+JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {
+    "exact": lambda residuals: residuals.exact,
+    "central": lambda residuals: residuals.central,
+    "forward": lambda residuals: residuals.forward,
+    "backward": lambda residuals: residuals.backward,
+}
 
 
 def fitted(
@@ -112,19 +117,22 @@ def search(
     progress: Callable[[estimate.Progress], None],
     counter: SimulationCounter | None = None,
     options: Estimate | None = None,
-    doubt: Doubt | None = None,
+    judge: Judge | None = None,
 ) -> SearchResult:
     """Return the best point found from the start of a case and, in a global search, from others.
 
     ``counter`` counts the simulations of the search alone; ``options`` are by default the case's.
-    ``doubt`` says why an end may not be the one looked for: strategy auto goes on then.
+    The ``judge`` says on which of the minima that the records do not tell apart the validations
+    hold, and to strategy auto why an end may not be the one looked for.
     """
     options = options or case.estimate
     searches = CaseSearches(problem, options, progress, counter)
-    judge = doubt if method == "auto" else None
-    methods = (method,) if judge is None else STAGES
+    staged = method == "auto" and judge is not None
+    judge = judge or NO_JUDGE
     search_of = local_search if options.search == "local" else global_search
-    return search_of(searches, methods, judge or no_doubt, announce)
+    if staged:
+        return search_of(searches, STAGES, judge, announce)
+    return search_of(searches, (method,), judge._replace(doubt=no_doubt), announce)
 
 
 def continued_from(
@@ -135,10 +143,15 @@ def continued_from(
     counter: SimulationCounter,
     options: Estimate,
     phase: str = FROM_FURTHER_STARTS,
+    judge: Judge | None = None,
 ) -> SearchResult:
-    """Return a search that goes on from a point (N,) with a lower cost than its best."""
+    """Return a search that goes on from a point (N,) with a lower cost than its best.
+
+    With a ``judge`` its end is the result only if validations do not hold on another like it alone.
+    """
     searches = CaseSearches(problem, options, lambda _: None, counter)
-    return continued(searches, found, point, announce, phase)
+    found = continued(searches, found, point, announce, phase)
+    return found if judge is None else judged_again(searches, found, judge, announce)
 
 
 @dataclass(frozen=True)
@@ -166,9 +179,15 @@ class CaseSearches:
         if self.options.jacobian == "exact" and has_twin(self.residuals):
             by_twin = partial(self._descent, method)
             return descent_by_twin(self.residuals, by_twin, announce)
-        jacobian = JACOBIANS[self.options.jacobian](self.residuals)
-        descent = self._descent(method, estimate.OneByOne(self.residuals, jacobian))
+        descent = self._descent(method, estimate.OneByOne(self.residuals, self._jacobian))
         return descent.run(self.residuals.start, announce)
+
+    def _jacobian(self, theta: Array) -> Array:
+        """Return the Jacobian (M, N), no number where the model has none."""
+        try:
+            return JACOBIANS[self.options.jacobian](self.residuals)(theta)
+        except SimulationError:
+            return np.full((1, 1), np.nan)
 
     def _descent(self, method: str, functions: estimate.Functions) -> estimate.Descent:
         options = self.options
@@ -209,7 +228,7 @@ class CaseSearches:
         stop, tolerance = self.options.stop, self.options.tolerance
         return {
             "bounds": self.residuals.bounds,
-            "x_scale": UNIT,
+            "x_scale": self.residuals.units,
             "gtol": tolerance.gradient,
             "gtol_absolute": tolerance.gradient_absolute,
             "xtol": tolerance.step,
@@ -237,15 +256,20 @@ class CaseSearches:
             self.counter.add(counter.simulations)
         return FurtherDescents(minima, starts.ways, starts.why_direct)
 
-    def margin(self, cost: float) -> float:
-        """Return by how much a cost may exceed this one and the records do not tell them apart.
+    def margin(self, lowest: estimate.Result) -> float:
+        """Return by how much a cost may exceed the lowest and the records not tell them apart.
 
-        That is the limit of the likelihood ratio, or what no recorder shows where that is more.
+        That is the limit of the likelihood ratio, wider where residuals are not white, or what no
+        recorder shows where that is more.
         """
         residuals = self.problem.residuals
-        freedom = max(1, residuals.count - len(residuals.free))
+        try:
+            linear = linearisation(self.problem, lowest.x, ())
+            variance = confidence(linear).variance
+        except SimulationError:  # no finite derivatives
+            variance = 2.0 * lowest.cost / max(1, residuals.count - len(residuals.free))
         weights = [channel.weight**2 * channel.samples for channel in residuals.channels]
-        return LIKELIHOOD_RATIO * cost / freedom + 0.5 * LEAST_NOISE**2 * sum(weights)
+        return 0.5 * (LIKELIHOOD_RATIO * variance + LEAST_NOISE**2 * sum(weights))
 
 
 def _good_enough(options: Estimate, residuals: Residuals) -> float | None:
@@ -257,16 +281,31 @@ def _good_enough(options: Estimate, residuals: Residuals) -> float | None:
     return float(options.good_enough.rmse * np.sqrt(share))
 
 
+def jacobian_error(jacobian: str, difference_step: float | None = None) -> float | None:
+    """Return the error of a Jacobian by differences, as a share of its largest singular value.
+
+    It is what rounding or curvature makes of a direction that no signal sees; None for the exact
+    one.
+    """
+    if jacobian == "exact":
+        return None
+    central = jacobian == "central"
+    step = difference_step or (CENTRAL_STEP if central else ONE_SIDED_STEP)
+    return max(ROUNDING_OF_RUNS / step, step**2 if central else step)
+
+
 def searches_of(options: Estimate) -> estimate.Searches:
     """Return the searches with the settings of a case."""
     dgn = estimate.LineSearch(
         capped=options.dgn.step == "capped", cut=CUTS[options.dgn.cut], armijo=options.armijo
     )
-    by_ratio = estimate.RatioDamping(
-        options.lm.nu, options.lm.nu_min, options.lm.increase, options.lm.decrease
-    )
-    by_radius = estimate.TrustRegion(options.lm.radius / UNIT, options.armijo)
-    return estimate.Searches(dgn=dgn, lm=by_ratio if options.lm.update == "ratio" else by_radius)
+    lm, armijo = options.lm, options.armijo
+    if lm.update == "ratio":
+        by_ratio = estimate.RatioDamping(lm.nu, lm.nu_min, lm.increase, lm.decrease)
+        return estimate.Searches(dgn=dgn, lm=by_ratio)
+    if lm.update == "armijo":
+        return estimate.Searches(dgn=dgn, lm=estimate.ArmijoDamping(lm.nu, armijo))
+    return estimate.Searches(dgn=dgn, lm=estimate.TrustRegion(lm.radius / UNIT, armijo))
 
 
 def refuse_unfit(case: Case, problem: FitProblem) -> None:

@@ -42,8 +42,8 @@ PLURALS = {"has": "have", "is": "are", "lies": "lie", "depends": "depend"}
 class Sensitivity(NamedTuple):
     """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S,), pu.
 
-    What counts as 100 % says `Linearisation.size`: the value, for most. What belongs to a record
-    is not among the parameters.
+    What counts as 100 % says `Linearisation.ranked_size`. What belongs to a record is not among the
+    parameters.
     """
 
     label: str
@@ -92,6 +92,23 @@ class UncertaintyAnalysis:
         """Return what the errors of given values add to the variance of a parameter."""
         return sum(error.shifts[name] ** 2 for error in self.given_errors.values())
 
+    def without_intervals(self, why: str) -> "UncertaintyAnalysis":
+        """Return it without what noise would say of the parameters, for a reason.
+
+        What no record can tell apart stays.
+        """
+        parameters = {
+            name: replace(own, interval=None, why=why, method=None)
+            for name, own in self.confidence.parameters.items()
+        }
+        known = self.identifiability
+        exact = tuple(combination for combination in known.unseen if combination.exact)
+        return replace(
+            self,
+            confidence=replace(self.confidence, parameters=parameters, sentences=()),
+            identifiability=replace(known, unseen=exact, suggestion=()),
+        )
+
     @property
     def open(self) -> tuple[str, ...]:
         """What is not determined, and what could be done about it, in words."""
@@ -105,7 +122,7 @@ class UncertaintyAnalysis:
             for name, parameter in without.items()
             if parameter.std_error is not None and parameter.method is None
         ]
-        if len(vague) < 2:
+        if len({without[name].why for name in vague}) < 2:
             vague = []  # its own reason says more
         by_reason = dict[str, list[str]]()
         for name, parameter in without.items():
@@ -172,7 +189,7 @@ def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Ite
     """Yield that of each channel: at the record's samples or, where compressed, of the grid."""
     residuals = problem.residuals
     values, moves = residuals.values(theta), residuals.moves(theta)
-    size = linear.size / slopes_of(residuals, theta)
+    size = linear.ranked_size / slopes_of(residuals, theta)
     labels = iter(linear.channels)
     own = [n for n, of_record in enumerate(linear.nuisances) if not of_record]
     pairs = zip(problem.compressed.experiments, residuals.experiments, strict=True)

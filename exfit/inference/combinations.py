@@ -1,7 +1,7 @@
 """Combinations of parameters that a record sees weakly, or not at all."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import inf, nan, sqrt
 from typing import Annotated
 
@@ -35,6 +35,7 @@ class Combination:
     """Parameters that can move together without being seen.
 
     moves    name and relative change, the largest first: by one standard error (``exact``: by 10 %)
+    reached  the value of each that its move leads to; none if exact
     changes  what the signals do then
     error    the standard error along the combination; None if exact
     """
@@ -44,6 +45,15 @@ class Combination:
     error: float | None
     exact: bool
     sentence: str
+    reached: Mapping[str, Annotated[float, inf]] = field(default_factory=dict)
+
+    def leaves(self, intervals: Mapping[str, tuple[float, float]]) -> bool:
+        """Return whether a move leads out of the interval of a parameter, by name."""
+        return any(
+            not intervals[name][0] <= value <= intervals[name][1]
+            for name, value in self.reached.items()
+            if name in intervals
+        )
 
 
 def seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Array]:
@@ -89,7 +99,14 @@ def weak_combinations(
         moves = ordered(kept[large], step[large])
         changes = tuple(changes_of(lin, noise, lin.relative[:, kept] @ step))
         sentence = f"{together(lin, moves)}: {effects(changes)}"
-        yield Combination(named(lin, moves), changes, 1.0 / float(value), False, sentence)
+        yield Combination(
+            named(lin, moves),
+            changes,
+            1.0 / float(value),
+            False,
+            sentence,
+            {lin.names[k]: moved(lin, k, share) for k, share in moves},
+        )
 
 
 def changes_of(lin: Linearisation, noise: Sequence[Noise], errors: Array) -> Iterator[SignalChange]:
@@ -131,6 +148,13 @@ def ordered(kept: Indices, shares: Array) -> list[tuple[int, float]]:
 def named(lin: Linearisation, moves: Sequence[tuple[int, float]]) -> tuple[tuple[str, float], ...]:
     """Return moves with the names of the parameters for their indices."""
     return tuple((lin.names[k], share) for k, share in moves)
+
+
+def moved(lin: Linearisation, k: int, share: float) -> float:
+    """Return the value of parameter k behind a relative move."""
+    value = lin.values[k]
+    with np.errstate(over="ignore"):
+        return float(value * np.exp(share) if lin.logarithmic[k] else value + share * lin.size[k])
 
 
 def together(lin: Linearisation, moves: Sequence[tuple[int, float]]) -> str:

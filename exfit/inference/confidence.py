@@ -25,7 +25,7 @@ TIED = (
 NORMAL = NormalDist().inv_cdf(0.5 * (1.0 + LEVEL))
 
 Interval = tuple[float | None, float | None]  # None: the record sets no limit on that side
-IntervalMethod = Literal["linear", "profile", "hull", "windows"]
+IntervalMethod = Literal["linear", "profile", "hull", "windows", "averages"]
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,9 @@ class Uncertainty:
     interval        that holds the true value with the level of the confidence
     why             the reason where there is no interval, or where one side of it has no limit
     method          how the interval, or that there is none, was found: by linear theory, from the
-                    profile likelihood, as the hull of the profiles about several minima, or of
-                    fits to windows of the records; None where linear theory gives none
+                    profile likelihood, as the hull of the profiles about several minima, of fits
+                    to windows of the records, or so that it also holds what averages of the
+                    recorder would change; None where linear theory gives none
     """
 
     std_error: float | None

@@ -35,6 +35,12 @@ class Fixing:
     errors: Mapping[str, FixingErrors]
     sentence: str
 
+    @property
+    def concerned(self) -> frozenset[str]:
+        """The parameters that its sentence speaks of: those to fix, and those then known better."""
+        better = (name for name, each in self.errors.items() if each.after < BETTER * each.before)
+        return frozenset((*self.names, *better))
+
 
 def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
     """Yield which parameters to fix, one more each time, until the others are known to WEAK.

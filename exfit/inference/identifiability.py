@@ -1,6 +1,7 @@
 """What a record does not determine of the parameters, and which to fix so that it does."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Annotated
 
@@ -43,6 +44,17 @@ class Identifiability:
             *(combination.sentence for combination in self.unseen),
             *(fixing.sentence for fixing in self.suggestion),
         )
+
+    def within(self, intervals: Mapping[str, tuple[float, float]]) -> "Identifiability":
+        """Return it without what the intervals of profiles, by name, contradict.
+
+        Linear theory does not hold along a combination that leads a parameter out of its interval,
+        nor for what fixing one of these would bring.
+        """
+        kept = tuple(each for each in self.unseen if not each.leaves(intervals))
+        contradicted = {name for each in self.unseen if each not in kept for name in each.reached}
+        suggestion = (each for each in self.suggestion if not each.concerned & contradicted)
+        return replace(self, unseen=kept, suggestion=tuple(suggestion))
 
 
 def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiability:

@@ -157,6 +157,15 @@ class Linearisation:
         kept_from_zero = ~(np.array(self.through_zero) | np.array(self.nuisances)) & (value > 0.0)
         return np.asarray(np.where(kept_from_zero, value, self.size))
 
+    @cached_property
+    def ranked_size(self) -> Array:
+        """The change that counts as 100 % where the effects of parameters are ranked, (N,).
+
+        It is the value and, of a value of 0, the interval between the bounds.
+        """
+        value = np.abs(self.values)
+        return np.asarray(np.where(value > 0.0, value, self.width))
+
     @property
     def free(self) -> Mask:
         """Which parameters lie on no bound (N,)."""

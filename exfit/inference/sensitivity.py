@@ -1,7 +1,7 @@
 """Which parameter matters first: by how much a small change of each moves what is recorded."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from exfit.inference.linear import Linearisation
 from exfit.inference.noise import Noise
 
 PERCENT = 0.01
+OF_INTERVAL = "is 0: 1 % of its interval"
 
 
 class ParameterEffect(NamedTuple):
@@ -16,18 +17,25 @@ class ParameterEffect(NamedTuple):
 
     ``rms`` is the root mean square of the change of each channel over its samples, per unit;
     ``of_noise`` is that of all samples together, each in standard deviations of its noise: below
-    about 1 / sqrt(samples) no record shows the change.
+    about 1 / sqrt(samples) no record shows the change. ``percent_of`` says of what the 1 % is: of
+    the value or, where that is 0, of the interval between the bounds.
     """
 
     parameter: str
     rms: Mapping[str, float]
     of_noise: Annotated[float, np.nan]
+    percent_of: Literal["value", "interval"] = "value"
+
+    @property
+    def label(self) -> str:
+        """The parameter, with what the 1 % is of where that is not its value."""
+        return self.parameter if self.percent_of == "value" else f"{self.parameter} ({OF_INTERVAL})"
 
 
 def effects(lin: Linearisation, noise: Sequence[Noise]) -> tuple[ParameterEffect, ...]:
     """Return the effect of each parameter, the strongest first.
 
-    What counts as 100 % is `Linearisation.size`: the value, for most. Samples that are left out do
+    What counts as 100 % is `Linearisation.ranked_size`. Samples that are left out do
     not count, and filters are applied. What belongs to a record is no parameter. Where the noise of
     a channel is not known its effects are compared per unit.
     """
@@ -40,11 +48,11 @@ def effects(lin: Linearisation, noise: Sequence[Noise]) -> tuple[ParameterEffect
 
 def _effects(lin: Linearisation, noise: Sequence[Noise]) -> Iterator[ParameterEffect]:
     samples = [each.samples for each in noise]
-    for k, name in enumerate(lin.names):
+    for k, (name, size) in enumerate(zip(lin.names, lin.ranked_size, strict=True)):
         if lin.nuisances[k]:
             continue
         squares = [
-            float(np.sum((PERCENT * lin.relative[channel.rows, k]) ** 2))
+            float(np.sum((PERCENT * size * lin.jacobian[channel.rows, k]) ** 2))
             for channel in lin.channels
         ]
         triples = zip(lin.channels, squares, samples, strict=True)
@@ -55,4 +63,9 @@ def _effects(lin: Linearisation, noise: Sequence[Noise]) -> Iterator[ParameterEf
         with np.errstate(divide="ignore", invalid="ignore"):
             in_noise = np.divide(squares, [each.std**2 for each in noise])
         of_noise = float(np.sqrt(np.sum(in_noise) / sum(samples)))
-        yield ParameterEffect(name, rms, of_noise if np.isfinite(of_noise) else np.nan)
+        yield ParameterEffect(
+            name,
+            rms,
+            of_noise if np.isfinite(of_noise) else np.nan,
+            "value" if lin.values[k] != 0.0 else "interval",
+        )

@@ -112,6 +112,12 @@ class Simulator:
         """Return the simulator of the same test of another system, which has the same inputs."""
         return Simulator(system, self.inputs, self.times, self.step, self.least, self.delay)
 
+    def at_times(self, times: Array) -> "Simulator":
+        """Return the simulator of the same run that is sampled at other times (M,) in s."""
+        result = copy(self)
+        result.times, result._sampling = times, Interpolation(self._grid, times, self.delay)
+        return result
+
     def on_grid(self, points: int | None = None) -> "Simulator":
         """Return the simulator that gives all points of its grid, or so many, whatever the delay.
 

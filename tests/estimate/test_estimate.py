@@ -16,6 +16,7 @@ from tiers import few_of
 from exfit import estimate
 from exfit.estimate import least_squares
 from exfit.estimate.bounded import bounded_minimum
+from exfit.estimate.damping_armijo import ArmijoDamping
 from exfit.estimate.damping_ratio import RatioDamping
 from exfit.estimate.gauss_newton import FullStep, LineSearch
 from exfit.estimate.strategies import STRATEGIES
@@ -210,6 +211,7 @@ def test_scipy_is_not_imported():
 def test_the_package_offers_what_its_users_name():
     assert set(estimate.__all__) == {
         "STATUS",
+        "ArmijoDamping",
         "CostProfile",
         "Descent",
         "Functions",
@@ -240,7 +242,7 @@ def test_the_package_offers_what_its_users_name():
 
 
 def test_every_search_has_a_phase_with_a_name():
-    searches = (FullStep(), LineSearch(), TrustRegion(), RatioDamping())
+    searches = (FullStep(), LineSearch(), TrustRegion(), RatioDamping(), ArmijoDamping())
     assert {search.phase for search in searches} == {*PHASES}
 
 

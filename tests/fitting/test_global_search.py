@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
-from exfit.fitting.descents import STAGES, no_doubt
-from exfit.fitting.global_search import FurtherDescents, global_search, local_search
+from exfit.fitting.descents import NO_JUDGE, STAGES, Judge, no_doubt
+from exfit.fitting.global_search import (
+    FurtherDescents,
+    global_search,
+    judged_again,
+    local_search,
+)
 
 MARGIN = 0.01  # of a cost
 WAYS = ("linear", "direct")
@@ -71,8 +76,8 @@ class Scripted:
             announce(line)
         return replace(result, history=tuple(lines), nfev=3, njev=3)
 
-    def margin(self, cost):
-        return MARGIN * cost
+    def margin(self, lowest):
+        return MARGIN * lowest.cost
 
 
 def doubted(*costs):
@@ -83,13 +88,13 @@ def doubted(*costs):
 def judged(searches, doubt, search=global_search):
     """Return what strategy auto comes to, and the lines that were announced."""
     lines = []
-    return search(searches, STAGES, doubt, lines.append), lines
+    return search(searches, STAGES, Judge(doubt, doubt), lines.append), lines
 
 
-def searched(searches, search=global_search):
+def searched(searches, search=global_search, refused=no_doubt):
     """Return what a search by another strategy comes to, and the lines that were announced."""
     lines = []
-    return search(searches, ("lm",), no_doubt, lines.append), lines
+    return search(searches, ("lm",), Judge(refused, no_doubt), lines.append), lines
 
 
 def test_a_local_search_is_the_descent_from_the_start_of_the_case():
@@ -189,6 +194,50 @@ def test_an_interruption_before_any_end_is_passed_on():
         searched(Scripted(KeyboardInterrupt))
 
 
+# ---- minima that the records do not tell apart
+
+LIKE = 1.0 + 0.5 * MARGIN
+WORSE = 1.0 + 2.0 * MARGIN
+
+
+def test_of_minima_that_the_records_do_not_tell_apart_it_is_one_on_which_validations_hold():
+    searches = Scripted(end(1.0), more=[end(1.0), end(LIKE), end(4.0)])
+    found, lines = searched(searches, refused=doubted(1.0))
+    assert searches.calls == ["lm", "further", "refined"]
+    assert (found.best.cost, found.place, found.for_validation) == (LIKE, 1, True)
+    assert (found.best.success, found.notes) == (True, ())
+    assert list(found.history) == lines
+
+
+@pytest.mark.parametrize("refused", [(), (LIKE,), (1.0, LIKE)])
+def test_it_is_the_lowest_where_validations_hold_on_it_or_on_none(refused):
+    found, _ = searched(Scripted(end(1.0), more=[end(LIKE)]), refused=doubted(*refused))
+    assert (found.best.cost, found.place, found.for_validation) == (1.0, 0, False)
+
+
+def test_a_minimum_that_the_records_refute_is_not_taken_for_a_validation():
+    found, _ = searched(Scripted(end(1.0), more=[end(WORSE)]), refused=doubted(1.0))
+    assert (found.best.cost, found.place, found.for_validation) == (1.0, 0, False)
+
+
+def test_validations_are_not_computed_where_there_is_nothing_to_choose_from():
+    judged_ends = []
+    searched(Scripted(end(1.0), more=[end(1.0)]), refused=judged_ends.append)
+    assert judged_ends == []
+
+
+@pytest.mark.parametrize(("other", "taken"), [(LIKE, True), (WORSE, False)])
+def test_a_lower_minimum_found_later_is_judged_like_the_others(other, taken):
+    searches = Scripted(end(1.0), more=[end(other)])
+    found, lines = searched(searches)
+    again = judged_again(searches, found, Judge(doubted(1.0), no_doubt), lines.append)
+    assert (again.best.cost, again.for_validation) == ((other, True) if taken else (1.0, False))
+    assert again.minima.minima[again.place].cost == again.best.cost
+    assert list(again.history) == lines
+    back = judged_again(searches, again._replace(place=0), NO_JUDGE, lines.append)
+    assert not back.for_validation
+
+
 # ---- strategy auto
 
 
@@ -220,18 +269,21 @@ def test_the_history_joins_the_descents_and_ends_with_that_of_the_best(search):
 
 
 def test_a_worse_minimum_is_never_returned_however_little_doubt_there_is_about_it():
-    worse = 1.0 + 2.0 * MARGIN
-    searches = Scripted(end(1.0), end(worse), more=[end(worse)] * 3 + [end(1.0)])
+    searches = Scripted(end(1.0), end(WORSE), more=[end(WORSE)] * 3 + [end(1.0)])
     found, _ = judged(searches, doubted(1.0))
     assert found.best.cost == 1.0
 
 
 def test_of_minima_that_the_records_do_not_tell_apart_it_is_the_one_without_doubt():
-    like = 1.0 + 0.5 * MARGIN
-    searches = Scripted(end(1.0), end(4.0), more=[end(1.0), end(like)])
+    searches = Scripted(end(1.0), end(4.0), more=[end(1.0), end(LIKE)])
     found, _ = judged(searches, doubted(1.0, 4.0))
-    assert (found.best.cost, found.place) == (like, 1)
-    assert found.best.success
+    assert (found.best.cost, found.place) == (LIKE, 1)
+    assert (found.best.success, found.for_validation) == (True, True)
+
+
+def test_in_a_local_search_a_note_says_that_the_validation_decided():
+    found, _ = judged(Scripted(end(1.0), end(LIKE)), doubted(1.0), local_search)
+    assert found.best.cost == LIKE
     assert "no independent test" in found.notes[-1]
 
 

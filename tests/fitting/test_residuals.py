@@ -19,13 +19,13 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.fitting.residuals import (
     CENTRAL_STEP,
-    JACOBIANS,
     LEAST_NOISE,
     ONE_SIDED_STEP,
     Residuals,
     Robust,
     SimulationCounter,
 )
+from exfit.fitting.search import JACOBIANS
 from exfit.models import MODELS
 from exfit.plants import VT0
 from exfit.simulation.inputs import Inputs, InputStep, each

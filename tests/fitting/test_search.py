@@ -7,8 +7,7 @@ from records import recording as recorded
 
 from exfit.analysis.profiles import profile
 from exfit.estimate import STATUS, Stop
-from exfit.fitting.residuals import JACOBIANS, jacobian_error
-from exfit.fitting.search import fitted, search
+from exfit.fitting.search import JACOBIANS, fitted, jacobian_error, search
 from exfit.results.model import AT_TOLERANCE
 from exfit.util.text import to_json
 from exfit.workflows import fit

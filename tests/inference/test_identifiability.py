@@ -344,3 +344,30 @@ def test_columns_are_picked_as_by_qr_with_pivoting(seed):
     rng = np.random.default_rng(seed)
     rows = rng.standard_normal((rng.integers(1, 5), 7)) * rng.uniform(0.1, 10.0, 7)
     assert pivots(rows) == qr(rows, mode="r", pivoting=True)[1][: len(rows)].tolist()
+
+
+@pytest.mark.parametrize("logarithmic", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_what_leads_out_of_an_interval_is_not_said(seed, logarithmic):
+    lin, _ = with_directions(seed, [900.0, 4.0, 2.0], logarithmic)
+    _, found = analysed(lin)
+    assert len(found.unseen) == 2
+    values, sizes = (
+        dict(zip(lin.names, numbers, strict=True)) for numbers in (lin.values, lin.size)
+    )
+    for each in found.unseen:
+        for name, share in each.moves:
+            value, size = values[name], sizes[name]
+            moved = value * np.exp(share) if logarithmic else value + share * size
+            assert each.reached[name] == pytest.approx(moved)
+    assert found.within({}).sentences == found.sentences
+    for each in found.unseen:
+        for name, reached in each.reached.items():
+            low, high = sorted((values[name], reached))
+            assert each in found.within({name: (low, high)}).unseen
+            middle = 0.5 * (low + high)
+            limits = (low, middle) if reached == high else (middle, high)
+            kept = found.within({name: limits})
+            assert each not in kept.unseen
+            for fixing in kept.suggestion:
+                assert not fixing.concerned & each.reached.keys()

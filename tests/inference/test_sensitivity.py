@@ -14,6 +14,7 @@ from exfit.case.load import load_case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference import ResidualBlock, confidence, effects
+from exfit.output.terminal.fits import ranking
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
 from exfit.workflows import fit, identify, simulate
@@ -27,18 +28,27 @@ def design():
     return identify(CONFIGS / "ac1a_typical.yaml", {"vt": 2e-4})
 
 
-def test_the_effect_is_by_how_much_the_simulated_voltage_moves(design):
-    case = load_case(CONFIGS / "ac1a_typical.yaml")
-    for effect in design.own.effects:
-        start = case.values()[effect.parameter]
-        sides = [
-            simulate(case, {effect.parameter: start * (1.0 + side)}).response.signals["vt"]
-            for side in (-SMALL, SMALL)
-        ]
-        slope = (sides[1] - sides[0]) / (2.0 * SMALL)
-        rms = 0.01 * float(np.sqrt(np.mean(slope**2)))
-        assert abs(effect.rms["vt"] - rms) <= CURVED * rms, effect.parameter
-        assert effect.of_noise == pytest.approx(effect.rms["vt"] / 2e-4)
+def near_zero(tmp_path):
+    """Return a case with a parameter on the linear scale that is small against its interval."""
+    content = config("ac8b_unit2_ka_free")
+    content["parameters"]["free"]["KD"]["start"] = 0.05
+    return case_of(content, tmp_path)
+
+
+def test_the_effect_is_by_how_much_the_simulated_voltage_moves(design, tmp_path):
+    small = near_zero(tmp_path)
+    planned = identify(small, {"vt": 2e-4})
+    for case, own in ((load_case(CONFIGS / "ac1a_typical.yaml"), design.own), (small, planned.own)):
+        for effect in own.effects:
+            start = case.values()[effect.parameter]
+            sides = [
+                simulate(case, {effect.parameter: start * (1.0 + side)}).response.signals["vt"]
+                for side in (-SMALL, SMALL)
+            ]
+            slope = (sides[1] - sides[0]) / (2.0 * SMALL)
+            rms = 0.01 * float(np.sqrt(np.mean(slope**2)))
+            assert abs(effect.rms["vt"] - rms) <= CURVED * rms, effect.parameter
+            assert effect.of_noise == pytest.approx(effect.rms["vt"] / 2e-4)
 
 
 def test_the_strongest_comes_first_and_none_is_missing(design):
@@ -72,6 +82,37 @@ def test_channels_count_by_their_noise_and_weights_do_not_matter(seed):
             assert effect.of_noise == pytest.approx(
                 np.sqrt(np.mean((moved / np.repeat(stds, (20, 40))) ** 2))
             )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_neither_bounds_nor_the_scale_of_a_parameter_matter_to_its_effect(seed):
+    rng = np.random.default_rng(seed)
+    slopes, errors = rng.standard_normal((60, 3)), 1e-3 * rng.standard_normal(60)
+    values = np.array([0.011, -3.0, 200.0])
+    ranked = [
+        effects(lin, confidence(lin).noise)
+        for width in (np.abs(values), 1e3 * np.ones(3))
+        for logarithmic in (False, True)
+        for lin in [linearised(values, errors, slopes, width=width, logarithmic=[logarithmic] * 3)]
+    ]
+    assert {effect.label for effect in ranked[0]} == {"a", "b", "c"}
+    for each in ranked:
+        assert [effect.label for effect in each] == [effect.label for effect in ranked[0]]
+        for effect, first in zip(each, ranked[0], strict=True):
+            assert effect.rms == pytest.approx(first.rms)
+            assert effect.of_noise == pytest.approx(first.of_noise)
+
+
+def test_one_percent_of_nothing_is_one_of_the_interval_and_every_table_says_so():
+    width, slopes = np.array([2.0, 5.0]), np.eye(2)
+    lin = linearised([0.0, 1.0], [1e-3, 1e-3], slopes, width=width)
+    ranked = {effect.parameter: effect for effect in effects(lin, confidence(lin).noise)}
+    assert ranked["a"].rms["vt"] / ranked["b"].rms["vt"] == pytest.approx(2.0)
+    assert [ranked[name].percent_of for name in "ab"] == ["interval", "value"]
+    (sentence,) = ranking(list(ranked.values()))
+    assert "a (is 0: 1 % of its interval)" in sentence
+    table = [*csv.DictReader(io.StringIO(effects_table([*ranked.values()])))]
+    assert [row["percent_of"] for row in table] == ["interval", "value"]
 
 
 def test_where_no_noise_is_seen_the_strongest_still_comes_first():

@@ -3,7 +3,7 @@
 import re
 from math import exp, log
 
-from exfit.exchange.records import contradictions
+from exfit.exchange.records import contradictions, unused_of
 from exfit.models.sheet import typical
 
 TRIES = 500
@@ -25,7 +25,7 @@ def within(row, random):
 
 
 def sound(definition, random):
-    """Return values within the sheet that do not contradict each other."""
+    """Return values within the sheet that do not contradict each other, and that all may act."""
     rows = {row.symbol: row for row in definition.model.sheet}
     held = {name: row for name, row in rows.items() if name in definition.names}
     whole = dict(definition.record.icons)
@@ -37,6 +37,7 @@ def sound(definition, random):
 
     values = unseen | drawn_values(held)
     for _ in range(TRIES):
+        values |= dict.fromkeys(unused_of(definition.record, values), 0.0)
         wrong = [*contradictions(definition.model, values)]
         if not wrong:
             return values

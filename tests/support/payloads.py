@@ -19,7 +19,7 @@ MARKUP = (
 HOSTILE = " ".join(MARKUP) + CONTROL_TEXT + "two\nlines"
 HARMLESS = "harmless words `code` of the same\nplaces"
 # keys of texts that must be one of a few words, and of one that is drawn: its form is its picture
-WORDS = ("interval_method", "method", "verdict", "ways", "drawing")
+WORDS = ("interval_method", "method", "percent_of", "verdict", "ways", "drawing")
 
 
 class Structure(HTMLParser):

@@ -43,14 +43,7 @@ TRUTH = {
     "ac8b_unit1": RESULTS["ac8b_unit1", DGN] | {"KPR": 78.84, "KDR": 37.05},
     "ac8b_unit2": RESULTS["ac8b_unit2", DGN],
 }
-MOST_ITERATIONS = 20  # of each phase, as in 4.3 and 4.4
-# central differences; full Gauss-Newton steps, cut in half; a damping that follows the gain ratio
-THESIS = {
-    "jacobian": "central",
-    "iterations": {"lm": MOST_ITERATIONS, "dgn": MOST_ITERATIONS},
-    "dgn": {"step": "full", "cut": "half"},
-    "lm": {"update": "ratio"},
-}
+UNBOUNDED = {"bounds": "none", "scale": "start"}
 MOST_TRIALS = 30  # of an iteration of Levenberg-Marquardt
 
 
@@ -60,14 +53,18 @@ def content_of(name: str) -> dict[str, Any]:
     return content
 
 
+THESIS = content_of("thesis/ac1a_table_1")["estimate"]
+MOST_ITERATIONS = THESIS["iterations"]  # of each phase, as in 4.3 and 4.4
+
+
 def thesis_case(name: str, start: Values, strategy: str) -> Case:
-    """Return a case whose parameters are free of bounds and on a linear scale."""
+    """Return a case with the thesis' settings, whose parameters are relative to their start."""
     content = content_of(name)
     parameters = content["parameters"]
     fixed = {key: value for key, value in parameters.get("fixed", {}).items() if key not in start}
-    free = {key: {"start": value, "scale": "linear"} for key, value in start.items()}
+    free = {key: {"start": value, **UNBOUNDED} for key, value in start.items()}
     content["parameters"] = {"fixed": fixed, "free": free}
-    content["estimate"] = {"strategy": strategy, **THESIS}
+    content["estimate"] = {**THESIS, "strategy": strategy}
     return Case.from_dict(content, folder=CONFIGS, name=name)
 
 
@@ -102,9 +99,7 @@ def fits_of(name: str) -> Fits:
     results: dict[str, exfit.FitResult] = {}
     for method in methods:
         start = STARTS[name] if method != LM_DGN else values_of(results[LM], STARTS[name])
-        results[method] = exfit.fit(
-            thesis_case(name, start, strategy_of(name, method)), search="local"
-        )
+        results[method] = exfit.fit(thesis_case(name, start, strategy_of(name, method)))
     own = CONFIGS / f"{name}.yaml"
     at_truth = exfit.simulate(own, TRUTH[unit_of(name)]).comparison
     assert at_truth is not None
@@ -147,15 +142,8 @@ def stale_levenberg_marquardt(name: str) -> list[Trialled]:
     parameters are relative to their start.
     """
     _, problem = fitted(thesis_case(name, STARTS[name], "lm"))
-    residuals, unit = problem.residuals, problem.residuals.start
-
-    def errors_at(x: Array) -> Array:
-        return residuals(unit * x)
-
-    def jacobian_at(x: Array) -> Array:
-        return residuals.exact(unit * x) * unit
-
-    x = np.ones(len(unit))
+    errors_at, jacobian_at = problem.residuals, problem.residuals.exact
+    x = problem.residuals.start
     errors, jacobian = errors_at(x), jacobian_at(x)
     nu = norm(jacobian.T @ errors)
     rows = [Trialled(nu, half_square(errors), 0, half_square(errors))]
@@ -211,7 +199,7 @@ def gradient_ratios(name: str) -> tuple[float, float]:
     residuals = problem.residuals
     errors, jacobian = residuals(residuals.start), residuals.exact(residuals.start)
     start = np.array([parameter.start for parameter in residuals.free])
-    relative = residuals.start * (jacobian.T @ errors)
+    relative = jacobian.T @ errors
     cost = half_square(errors)
     return norm(relative / start) / cost, norm(relative) / cost
 
@@ -251,9 +239,7 @@ def jacobians_at(k: float, a: float) -> Jacobians:
 
 def first_order_fit() -> exfit.FitResult:
     """Return the fit of k/(s + a) from the start of 3.3."""
-    return exfit.fit(
-        thesis_case("first_order", {"k": FIRST_K, "a": FIRST_A}, "dgn"), search="local"
-    )
+    return exfit.fit(thesis_case("first_order", {"k": FIRST_K, "a": FIRST_A}, "dgn"))
 
 
 # ---- other simulators, other steps

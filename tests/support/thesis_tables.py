@@ -6,6 +6,7 @@ from itertools import zip_longest
 from thesis_numbers import (
     ABSOLUTE,
     APPROXIMATE,
+    COSTS,
     CURVES,
     DGN,
     INSTANTS,
@@ -60,9 +61,6 @@ SHOWN = {
 }
 
 
-HALF = 0.5  # without bounds, a scaled parameter is the value over twice its start
-
-
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table of Markdown."""
     lines = [head, ["---"] * len(head), *rows]
@@ -107,9 +105,18 @@ def settled(result: exfit.FitResult) -> int:
     return next(line.number for line in result.history if line.cost < 1.05 * result.cost)
 
 
+def first_full_step(result: exfit.FitResult) -> dict[str, float]:
+    """Return where the first step of damped Gauss-Newton leads before it is cut."""
+    start, first = result.history[:2]
+    return {
+        name: value + (first.values[name] - value) / first.damping
+        for name, value in start.values.items()
+    }
+
+
 def norm_of(line: Iteration) -> str:
     """Return the norm of g over the parameters relative to their start."""
-    return f"{HALF * line.gradient_norm:.6f}"
+    return f"{line.gradient_norm:.6f}"
 
 
 def cost_of(line: Iteration | Trialled) -> str:
@@ -137,7 +144,11 @@ def parameter_table(name: str) -> str:
     rows = [["start", *map(as_given, start.values()), millionths(first.start_cost)]]
     for method, result in fits.by_method.items():
         theirs = RESULTS[name, method]
-        rows.append([f"{METHODS[method]}, thesis", *(as_given(theirs[key]) for key in start), ""])
+        cost = COSTS.get((name, method))
+        printed = "" if cost is None else as_given(1e6 * float(cost))
+        rows.append(
+            [f"{METHODS[method]}, thesis", *(as_given(theirs[key]) for key in start), printed]
+        )
         found = [short(result.values[symbol]) for symbol in start]
         rows.append([f"{METHODS[method]}, exfit", *found, millionths(result.cost)])
     rows += own_rows(fits.default, start)
@@ -192,7 +203,7 @@ def summary_rows(name: str) -> Iterator[list[str]]:
         yield [
             CASES[name],
             METHODS[method],
-            f"{rows[0][1]} → {rows[-1][1]}" if rows else "",
+            f"{rows[0][1]} → {COSTS.get((name, method), rows[-1][1])}" if rows else "",
             f"{millionths(result.start_cost)} → {millionths(result.cost)}",
             f"{len(rows) - 1}; {result.nit}" if rows else str(result.nit),
             str(result.simulations),

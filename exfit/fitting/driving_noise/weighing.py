@@ -15,14 +15,14 @@ Source: Seber & Wild 1989, sections 2.1.4 and 10.2 (generalised least squares; e
 Carroll, Ruppert, Stefanski & Crainiceanu 2006, chapter 5 (simulation-extrapolation).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.sampling import sampling_of
-from exfit.estimate import LocalMinimum
+from exfit.estimate import LocalMinimum, Progress
 from exfit.fitting.descents import descent_near, minimum_near
 from exfit.fitting.driving_noise.responses import carried_noise, noise_of_inputs, with_added
 from exfit.fitting.experiment import Experiment
@@ -74,16 +74,21 @@ def why_not_weighed(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> 
 
 
 def weighed_by_noise(
-    problem: FitProblem, setups: Sequence[ExperimentSetup], theta: Array
+    problem: FitProblem,
+    setups: Sequence[ExperimentSetup],
+    theta: Array,
+    watch: Callable[[Progress], object] = lambda _: None,
 ) -> tuple[FitProblem, Array, tuple[str, ...]]:
     """Return the problem weighed by the noise of what drives it, its minimum (N,), and notes.
 
     ``theta`` (N,) is the minimum without weights. The noise moves the minimum no longer: where it
-    moved it by much, weights and bias are found anew from the better point. Raises
-    SimulationError where there is no response, KeyboardInterrupt at an interruption.
+    moved it by much, weights and bias are found anew from the better point. ``watch`` gets how far
+    that is. Raises SimulationError where there is no response, KeyboardInterrupt at an
+    interruption.
     """
-    bias = np.zeros_like(theta)
+    bias, cost = np.zeros_like(theta), float(problem.residuals.costs([theta])[0])
     for further in range(MOST_PASSES):
+        watch(Progress("weighing", further, MOST_PASSES, cost))
         at, before = theta, bias
         white = whitened(problem.residuals, setups, at)
         if not further:
@@ -92,6 +97,7 @@ def weighed_by_noise(
         theta = minimum_near(unbiased, theta)
         if np.max(np.abs(theta - at)) < FAR and np.max(np.abs(bias - before)) < SMALL_BIAS:
             break
+    watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))
     return FitProblem(unbiased, unbiased), theta, tuple(noise_notes(unbiased, theta, bias))
 
 

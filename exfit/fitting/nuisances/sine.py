@@ -44,11 +44,16 @@ class Sine:
         changes = np.array([[move.get(name, 0.0) for name in names] for move in moves])
         return np.asarray(columns @ changes.reshape(-1, len(names)).T)
 
+    def frequency_at(self, values: Values) -> float:
+        """Return its frequency, Hz."""
+        return values[f"{self.name}.{FREQUENCY}"] if self.frequency is None else self.frequency
+
+    def amplitude_at(self, values: Values) -> float:
+        """Return its amplitude, pu."""
+        return float(np.hypot(*self._amplitudes(values)))
+
     def _pair(self, time: Array, values: Values) -> Array:
-        frequency = self.frequency
-        if frequency is None:
-            frequency = values[f"{self.name}.{FREQUENCY}"]
-        return cosine_and_sine(frequency, time - self.about)
+        return cosine_and_sine(self.frequency_at(values), time - self.about)
 
     def _amplitudes(self, values: Values) -> Array:
         return np.array([values[f"{self.name}.{part}"] for part in (COSINE, SINE)])

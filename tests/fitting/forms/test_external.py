@@ -159,7 +159,7 @@ def test_an_interruption_of_the_quotients_keeps_the_best_point(record, monkeypat
 def test_a_validation_is_by_the_program(record):
     other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
     values = {name: TRUTH[name] for name in FREE}
-    match = exfit.validate(external(record, **other), values, record)[-1]
+    match = exfit.validate(external(record, **other), values, record, step=0.05, at=1.0)[-1]
     assert match.rmse == pytest.approx(NOISE, rel=0.2)
 
 
