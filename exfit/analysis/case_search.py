@@ -13,7 +13,7 @@ from exfit.analysis.intervals.determination import (
     without_linear_intervals,
 )
 from exfit.analysis.intervals.samples_at_steps import without_contradicting_samples
-from exfit.analysis.judgement import doubt_of
+from exfit.analysis.judgement import judge_of
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
@@ -81,10 +81,13 @@ def search_outcome(
         return SearchOutcome(problem, setups, unseen, found, determined)
     profiled = options.search != "local"
     determined = determination(problem, found, setups, profiled, progress)
+    judge = judge_of(task.case, problem, setups, unseen)
     for _ in range(MOST_MINIMA):
         if determined.lower is None:
             break
-        found = continued_from(determined.lower, found, problem, announce, counter, options)
+        found = continued_from(
+            determined.lower, found, problem, announce, counter, options, judge=judge
+        )
         determined = determination(problem, found, setups, profiled, progress)
     return SearchOutcome(problem, setups, unseen, found, determined)
 
@@ -160,7 +163,7 @@ def weighed_search(
     if reason is not None:
         return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHED} {reason}"))
     try:
-        weighed, theta, notes = weighed_by_noise(problem, setups, found.best.x)
+        weighed, theta, notes = weighed_by_noise(problem, setups, found.best.x, progress)
         found = with_minima_of(weighed, found)
     except KeyboardInterrupt:
         return problem, found._replace(best=stopped(found.best, estimate.Stop.INTERRUPTED))
@@ -193,9 +196,9 @@ def _weighted_search(
 ) -> tuple[FitProblem, SearchResult]:
     def search_of(problem: FitProblem) -> SearchResult:
         external = task.case.external is not None  # whose runs are too dear to judge its ends
-        doubt = None if external else doubt_of(task.case, problem, task.setups, task.unseen)
+        judge = None if external else judge_of(task.case, problem, task.setups, task.unseen)
         return search(
-            task.case, problem, task.method, announce, progress, task.counter, task.options, doubt
+            task.case, problem, task.method, announce, progress, task.counter, task.options, judge
         )
 
     return searched(problem, task.options, search_of, task.counter)

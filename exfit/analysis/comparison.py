@@ -140,14 +140,15 @@ def compare(
         curves = shifted(curves, clocks.apart)
     results, unread = _results(paths)
     at = clocks.step_at if step_at is None else step_at
+    of_curves = {} if at is None else dict(_features_of(curves, judged, at))
     return Agreement(
         tuple(curves),
         tuple(differences(curves, shared)),
         at,
         judged,
-        {} if at is None else dict(_features_of(curves, judged, at)),
+        of_curves,
         results,
-        (*_notes(curves), *clocks.notes(curves, judged, align), *unread),
+        (*_notes(curves), *clocks.notes(curves, judged, align), *_removed(of_curves), *unread),
     )
 
 
@@ -221,6 +222,12 @@ def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tu
                 of_curve = features(time, samples, at, until)
             if of_curve is not None:
                 yield curve.name, of_curve
+
+
+def _removed(of_curves: Mapping[str, Features]) -> Iterator[str]:
+    for name, of_curve in of_curves.items():
+        if of_curve.removed:
+            yield f"{name}: its features are read without {of_curve.removed}"
 
 
 def _notes(curves: Sequence[Curve]) -> Iterator[str]:

@@ -15,7 +15,7 @@ from exfit.analysis.causes.run_quality import (
     voltage_notes,
 )
 from exfit.analysis.intervals.typical_values import typical_values_used
-from exfit.case.bounds import search_bounds
+from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable
 from exfit.dsp.reference_moves import scatter
@@ -142,8 +142,7 @@ def search_range_notes(case: Case) -> Iterator[str]:
     beyond = [
         name
         for name, free in case.free().items()
-        if name in rows
-        and not all(map(rows[name].is_physical, search_bounds(free.min, free.max, rows[name])))
+        if name in rows and not all(map(rows[name].is_physical, bounds_of(free, rows[name])))
     ]
     if beyond:
         yield (

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from exfit import estimate
 from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
+from exfit.analysis.causes import Pace
+from exfit.analysis.causes.pace import time_for_causes
 from exfit.analysis.descriptions.case_description import (
     criteria_of,
     fixed_values,
@@ -32,6 +34,7 @@ from exfit.analysis.solution import (
     fit_notes,
     fitted_parameters,
     iteration_of,
+    without_intervals,
 )
 from exfit.analysis.verdict import verdict_of
 from exfit.case.case import Case
@@ -59,6 +62,8 @@ class FitRequest(NamedTuple):
 def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResult:
     """Return the result of a fit, simulated by a program where one is given."""
     began = clock.perf_counter()
+    timer = _timer(program)
+    search_began = timer()
     case, method, options, progress, search_progress, live = request
     start = case.values()
     setups, problem = fitted(case, program)
@@ -88,9 +93,14 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
     analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
-    minima = minima_of(residuals, found, analysis.uncertainty)
+    walked = problem.compressed if program is None else None
+    minima = minima_of(residuals, found, analysis.uncertainty, walked)
     interrupted = analysis.interrupted or found.interrupted
-    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted)
+    pace = Pace(time_for_causes(options.causes, timer() - search_began), search_progress, timer)
+    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted, pace)
+    verdict = verdict_of(evidence)
+    noted = [*minima_notes(residuals, found, minima, analysis.uncertainty)]
+    analysis = without_intervals(analysis, verdict.no_interval)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     parameters = fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why)
@@ -121,7 +131,7 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
         status=best.status,
         message=best.message,
         success=best.success,
-        interrupted=interrupted,
+        interrupted=interrupted or pace.interrupted,
         phase_ends=analysis.phase_ends,
         history=tuple(history),
         nfev=best.nfev,
@@ -132,15 +142,16 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
         notes=(
             *found.notes,
             *line_notes,
-            *minima_notes(residuals, found, minima, analysis.uncertainty),
+            *noted,
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
             *([] if program is None else program_notes(case, program, [*setups, *unseen])),
             *([LINEAR_ALONE] if case.has_no_equations else []),
+            *filter(None, [pace.sentence]),
         ),
         validation=analysis.validation,
         versions=versions(),
         inputs=hashes,
-        verdict=verdict_of(evidence),
+        verdict=verdict,
         given_values=given_values(case),
         typical_values=analysis.typical_values,
         windows=analysis.windows,
@@ -155,3 +166,8 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
         criteria=criteria_of(case),
         other_program=other_program_of(case, program, [*setups, *unseen]),
     )
+
+
+def _timer(program: ExternalProgram | None) -> Callable[[], float]:
+    """Return the clock of a fit: of its processor, but for a program that runs beside it."""
+    return clock.process_time if program is None else clock.perf_counter

@@ -99,7 +99,7 @@ def iteration_responses(
     sets = {k: values for k, values in complete.items() if values is not None}
     samples, _ = setup.experiment.samples_of_many([*sets.values()])
     for k, own in zip(sets, samples, strict=True):
-        response = compared(channel, channel.as_recorded(own[:, place]))
+        response = compared(channel, own[:, place])
         if np.isfinite(response[channel.kept]).all():
             yield k, response
 

@@ -1,6 +1,6 @@
 """What casts doubt on the end of a search: the noise of its records, and its validations."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.errors import SimulationError
 from exfit.estimate import Result
-from exfit.fitting.descents import Doubt
+from exfit.fitting.descents import Judge
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, noise_of
 from exfit.fitting.setup import ExperimentSetup
@@ -17,29 +17,59 @@ from exfit.inference.wording import digits
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 
+Values = Mapping[str, float]
+
 MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 
 
-def doubt_of(
+def judge_of(
     case: Case,
     problem: FitProblem,
     setups: Sequence[ExperimentSetup],
     unseen: Sequence[ExperimentSetup],
-) -> Doubt:
-    """Return what says why an end of a search may not be the one looked for, "" where it is.
+) -> Judge:
+    """Return what judges the ends of a search.
 
-    ``setups`` are the tests of the fit, ``unseen`` those of the validations. It is in doubt where
-    the search did not converge, where its errors are not white or larger than the noise (or larger
-    than good_enough, where the case gives that), and where a validation is not accepted.
+    ``setups`` are the tests of the fit, ``unseen`` those of the validations. An end is refused
+    where one of these is not accepted. It is in doubt there, where the search did not converge, and
+    where its errors are not white or larger than the noise (or larger than good_enough, where the
+    case gives that).
     """
 
-    def doubt(end: Result) -> str:
-        try:
-            return next(_doubts(case, problem, setups, unseen, end), "")
-        except SimulationError as fault:
-            return str(fault)
+    def refused(end: Result) -> str:
+        return _first(_refusals(case, unseen, *_fitted(problem, setups, end)))
 
-    return doubt
+    def doubt(end: Result) -> str:
+        return _first(_doubts(case, problem, setups, unseen, end))
+
+    return Judge(refused, doubt)
+
+
+def _first(reasons: Iterator[str]) -> str:
+    """Return the first of some reasons, "" where there is none."""
+    try:
+        return next(reasons, "")
+    except SimulationError as fault:
+        return str(fault)
+
+
+def _fitted(
+    problem: FitProblem, setups: Sequence[ExperimentSetup], end: Result
+) -> tuple[Values, list[Comparison]]:
+    """Return the values of an end, and how they compare with the records of the fit."""
+    values = problem.residuals.values(end.x)
+    return values, [
+        compare_with_record(setup.with_enough_substeps(values), setup.name, values)
+        for setup in setups
+    ]
+
+
+def _refusals(
+    case: Case, unseen: Sequence[ExperimentSetup], values: Values, fitted: Sequence[Comparison]
+) -> Iterator[str]:
+    """Yield why validations are not accepted."""
+    for setup in unseen:
+        yield from filter(None, [validation_of(case, fitted, *aligned(case, setup, values)).reason])
 
 
 def _doubts(
@@ -53,11 +83,7 @@ def _doubts(
     if not end.success:
         yield f"the search had not converged: {end.message}"
     residuals = problem.residuals
-    values = residuals.values(end.x)
-    fitted = [
-        compare_with_record(setup.with_enough_substeps(values), setup.name, values)
-        for setup in setups
-    ]
+    values, fitted = _fitted(problem, setups, end)
     good_enough = case.estimate.good_enough
     if good_enough is None:
         for setup, comparison in zip(setups, fitted, strict=True):
@@ -66,8 +92,7 @@ def _doubts(
         rmse = float(np.sqrt(2.0 * end.cost / (residuals.count + len(residuals.priors))))
         if rmse > good_enough.rmse:
             yield f"the error, {rmse:.3e} pu, exceeded good_enough, {good_enough.rmse:g} pu"
-    for setup in unseen:
-        yield from filter(None, [validation_of(case, fitted, *aligned(case, setup, values)).reason])
+    yield from _refusals(case, unseen, values, fitted)
 
 
 def _beyond_noise(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:

@@ -5,13 +5,16 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.analysis.intervals.valleys import valleys
 from exfit.estimate import LocalMinimum
+from exfit.fitting.descents import taken_for_validation
 from exfit.fitting.global_search import SearchResult, is_same
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.model import Minima, Minimum
 from exfit.results.search_summary import multiple
+from exfit.util.text import rounded_value
 
 Values = Mapping[str, float]
 
@@ -22,12 +25,16 @@ MOST_VALUES = 6  # of a minimum, in a sentence
 
 
 def minima_of(
-    residuals: Residuals, search: SearchResult, uncertainty: UncertaintyAnalysis | None
+    residuals: Residuals,
+    search: SearchResult,
+    uncertainty: UncertaintyAnalysis | None,
+    walked: Residuals | None,
 ) -> Minima | None:
     """Return the minima of a search from several starts, in the parameters' own values.
 
     Half the likelihood ratio of two of them is the difference of their costs over the variance of
-    the residuals, which the ``uncertainty`` of the result widens where they are not white. None
+    the residuals, which the ``uncertainty`` of the result widens where they are not white. Ways
+    from one to another are looked for with the residuals ``walked``, unless that is None. None
     where the search came to no minimum, or there were no further starts.
     """
     if search.minima is None or not search.minima.minima:
@@ -40,9 +47,16 @@ def minima_of(
     lowest = min(cost for _, cost in ends)
     variance = variance_of(residuals, lowest, uncertainty)
     chi_squares = [2.0 * (cost - lowest) / variance for _, cost in ends]
+    places: list[int | None] = [None] * len(ends)
+    several = sum(chi_square <= REFUTED for chi_square in chi_squares) > 1
+    if walked is not None and search.place is not None and several:
+        allowed = lowest + 0.5 * REFUTED * variance
+        places = valleys(walked, [x for x, _ in ends], search.place, allowed)
     minima = tuple(
-        Minimum(own_values(residuals, x), cost, local.starts, chi_square, chi_square > REFUTED)
-        for local, (x, cost), chi_square in zip(found.minima, ends, chi_squares, strict=True)
+        Minimum(own_values(residuals, x), cost, each.starts, above, above > REFUTED, valley)
+        for each, (x, cost), above, valley in zip(
+            found.minima, ends, chi_squares, places, strict=True
+        )
     )
     return Minima(minima, found.start_costs, found.end_costs, search.ways)
 
@@ -82,6 +96,9 @@ def minima_notes(
             "done, and this is the best of them"
         )
     own, best = search.own, search.best
+    if search.for_validation:
+        lowest = min(local.cost for local in search.minima.minima)
+        yield taken_for_validation(best.cost / lowest)
     if search.goes_on and not own.success:
         yield (
             f"the descent from the start of the case ended at {times(own.cost, best.cost)} this "
@@ -102,6 +119,7 @@ def _of_others(
 ) -> Iterator[str]:
     """Yield where the start of the case led, if elsewhere, and what the records do not refute."""
     here = own_values(residuals, search.best.x)
+    valleys: dict[object, list[tuple[bool, Minimum]]] = {}
     for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
         from_start = search.goes_on and search.own.success and is_same(end.result, search.own)
         apart = any(
@@ -109,10 +127,45 @@ def _of_others(
             for name, value in minimum.values.items()
         )
         if k != search.place and (from_start or (apart and not minimum.refuted)):
-            subject = (
-                "the descent from the start of the case ended at" if from_start else "there is"
-            )
-            yield f"{subject} {minimum_in_words(minimum, search.best.cost, here)}"
+            own = ("alone", k) if minimum.valley is None else minimum.valley
+            valleys.setdefault(own, []).append((from_start, minimum))
+    for place, members in valleys.items():
+        if place == 0:
+            along = [minimum for _, minimum in members]
+            yield valley_in_words(along, search.best.cost, _above(minima), here, residuals)
+            continue
+        from_start, minimum = max(members, key=lambda member: member[0])  # else the lowest
+        subject = "the descent from the start of the case ended at" if from_start else "there is"
+        yield f"{subject} {minimum_in_words(minimum, search.best.cost, here)}"
+
+
+def _above(minima: Sequence[Minimum]) -> float:
+    """The largest chi-square in the valley of the result."""
+    return max(each.chi_square or 0.0 for each in minima if each.valley == 0)
+
+
+def valley_in_words(
+    others: Sequence[Minimum], cost: float, above: float, here: Values, residuals: Residuals
+) -> str:
+    """Return what moves along the flat valley of the result, in which other minima lie.
+
+    ``above`` is the largest chi-square of them and the result.
+    """
+    values = {name: [here[name], *(each.values[name] for each in others)] for name in here}
+    bounds = {free.name: (free.low, free.high) for free in residuals.free}
+    moves = ", ".join(
+        f"{name} {rounded_value(min(values[name]), None, *bounds[name])} ... "
+        f"{rounded_value(max(values[name]), None, *bounds[name])} "
+        f"(here {rounded_value(here[name], None, *bounds[name])})"
+        for name in most_different({name: (min(own), max(own)) for name, own in values.items()})
+    )
+    count = "another minimum lies" if len(others) == 1 else f"{len(others)} other minima lie"
+    height = f"{'up to ' * (len(others) > 1)}{times(max(each.cost for each in others), cost)}"
+    return (
+        f"{count} in one flat valley with this one, {height} this cost, and the record "
+        f"refutes no point of the way (chi-square up to {above:.2g}, limit {REFUTED}): along it "
+        f"move {moves}"
+    )
 
 
 def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
@@ -134,11 +187,18 @@ def times(cost: float, other: float) -> str:
 
 def differences(there: Values, here: Values) -> str:
     """Return which values of a minimum are others than here: those that differ most."""
+    pairs = {name: (value, here[name]) for name, value in there.items()}
+    return ", ".join(
+        f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in most_different(pairs)
+    )
+
+
+def most_different(pairs: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return the parameters of which two values differ most, in their own order."""
     apart = {
-        name: abs(value - here[name]) / max(abs(value), abs(here[name]), TINY)
-        for name, value in there.items()
+        name: abs(one - other) / max(abs(one), abs(other), TINY)
+        for name, (one, other) in pairs.items()
     }
     remarkable = [name for name in apart if apart[name] > REMARKABLE] or [*apart]
     most = sorted(remarkable, key=lambda name: -apart[name])[:MOST_VALUES]
-    own = [name for name in apart if name in most]
-    return ", ".join(f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in own)
+    return [name for name in apart if name in most]

@@ -105,6 +105,7 @@ def check(case: Case) -> Check:
             *diagram_notes(case),
             *search_range_notes(case),
             *own_value_notes(case),
+            *(note for setup in setups for note in setup.record.notes),
             *dict.fromkeys(_rest_notes(experiments, values)),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import isinf
+from math import inf, isinf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.case_search import SearchTask, weighed_search, with_lines
+from exfit.analysis.causes import Evidence, FittedRecord
 from exfit.analysis.diagnostics import search_range_notes
 from exfit.analysis.intervals.profile_hull import (
     FoundMinimum,
@@ -19,6 +20,7 @@ from exfit.analysis.intervals.profile_hull import (
     profiles_about,
     reasons,
 )
+from exfit.analysis.verdict import verdict_alone
 from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.external.program import ExternalProgram
@@ -33,8 +35,9 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import LEVEL, Interval
-from exfit.results.model import ERRORS_IN_INTERVAL
-from exfit.util.text import near
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.verdict import Verdict
+from exfit.util.text import error_of_interval, near, rounded_value
 
 Array = NDArray[np.float64]
 
@@ -63,7 +66,8 @@ class Profile:
     ``low`` and ``high`` end the interval, None where the cost does not rise as far before what
     ``ends`` says: at the ends of the interval the cost is ``rise`` above the minimum.
     ``linear`` is the interval of the linear theory, if it has one. ``others`` are profiles about
-    other minima that the record does not refute: the interval encloses theirs.
+    other minima that the record does not refute: the interval encloses theirs. ``min`` and ``max``
+    are the bounds.
     """
 
     name: str
@@ -77,30 +81,39 @@ class Profile:
     rise: float
     linear: Interval | None
     others: tuple[Branch, ...] = ()
+    min: float = -inf
+    max: float = inf
 
-    @property
-    def rounding_error(self) -> float | None:
-        """The standard error that tables round it to: of its interval, or of the linear one."""
-        for low, high in ((self.low, self.high), self.linear or (None, None)):
-            if low is not None and high is not None:
-                return (high - low) / ERRORS_IN_INTERVAL
-        return None
+    def rounded(self, number: float | None) -> str:
+        """Return the value, or an end of an interval, as tables print it: within the bounds.
+
+        It has the digits that its interval allows, or else the linear one.
+        """
+        error = error_of_interval(self.low, self.high)
+        if error is None and self.linear is not None:
+            error = error_of_interval(*self.linear)
+        return rounded_value(number, error, self.min, self.max)
 
 
 @dataclass(frozen=True, eq=False)
 class Profiles:
-    """Profiles of some parameters about the minimum ``cost``."""
+    """Profiles of some parameters about the minimum ``cost``, with the ``verdict`` on the fit.
+
+    Where the response misses the records, or does not match them, no profile has an interval.
+    """
 
     name: str
     cost: float
     profiles: tuple[Profile, ...]
     notes: tuple[str, ...]
     interrupted: bool
+    verdict: Verdict
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""
         return {
             "cost": self.cost,
+            "verdict": self.verdict.verdict,
             "level": LEVEL,
             "interrupted": self.interrupted,
             "notes": list(self.notes),
@@ -144,6 +157,7 @@ def profile(
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
     setups, problem, found = _found(case, setups, problem, progress)
+    verdict = _verdict(case, setups, problem, found)
     by_twin = program is not None and not case.has_no_equations
     if by_twin:
         setups, problem = _by_twin(setups, problem, found.best.x)
@@ -163,15 +177,32 @@ def profile(
         name=case.path.stem,
         cost=first.cost,
         profiles=tuple(
-            _profile(case, residuals, uncertainty, each) for each in profiles.by_index.values()
+            _profile(case, residuals, uncertainty, each, verdict)
+            for each in profiles.by_index.values()
         ),
         notes=(
+            *([f"no parameter has an interval: {verdict.misfit}"] if verdict.misfit else []),
             *search_range_notes(case),
             *_notes(found.best, profiles, by_twin),
             *([] if program is None else program_notes(case, program, setups, "profiles")),
         ),
         interrupted=profiles.interrupted,
+        verdict=verdict,
     )
+
+
+def _verdict(
+    case: Case, setups: Sequence[ExperimentSetup], problem: FitProblem, found: SearchResult
+) -> Verdict:
+    """Return what the fit comes to, without its causes."""
+    values = problem.residuals.values(found.best.x)
+    fine = [setup.with_enough_substeps(values) for setup in setups]
+    records = (
+        FittedRecord(recording.test, setup, compare_with_record(setup, setup.name, values))
+        for recording, setup in zip(case.recordings, fine, strict=True)
+    )
+    uncertainty = uncertainty_at(problem, found.best.x, names_of_records(setups))
+    return verdict_alone(Evidence(case, problem.residuals, found.best, tuple(records), uncertainty))
 
 
 def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:
@@ -233,8 +264,12 @@ def _profile(
     residuals: Residuals,
     uncertainty: UncertaintyAnalysis,
     profiles: Sequence[estimate.CostProfile],
+    verdict: Verdict,
 ) -> Profile:
-    """Return the profiles of a parameter about several minima in its own values."""
+    """Return the profiles of a parameter about several minima in its own values.
+
+    It has no interval where the ``verdict`` leaves none.
+    """
     first, *others = profiles
     parameter = residuals.free[first.index]
     low, high = (None if isinf(limit) else parameter.value(limit) for limit in limits_of(profiles))
@@ -247,6 +282,11 @@ def _profile(
     def branch(profile: estimate.CostProfile) -> Branch:
         return Branch(np.array([parameter.value(float(x)) for x in profile.at]), profile.costs)
 
+    linear = uncertainty.confidence.parameters[parameter.name].interval
+    ends = reasons(parameter, profiles)
+    if verdict.misfit:
+        low = high = linear = None
+        ends = (verdict.no_interval, verdict.no_interval)
     return Profile(
         name=parameter.name,
         unit={**units, **case.units()}.get(parameter.name, ""),
@@ -255,8 +295,10 @@ def _profile(
         costs=first.costs,
         low=low,
         high=high,
-        ends=reasons(parameter, profiles),
+        ends=ends,
         rise=uncertainty.rises[parameter.name],
-        linear=uncertainty.confidence.parameters[parameter.name].interval,
+        linear=linear,
         others=tuple(map(branch, others)),
+        min=parameter.low,
+        max=parameter.high,
     )

@@ -47,6 +47,8 @@ class RankedModel:
     refuted_by       the records, fitted or unseen, that another model describes so much better
                      that it is refuted; None where its search did not end well
     typical          the values of the exciter that were typical and not fitted
+    typical_machine  the data of the machine that were, and act: as long as there are any, it is
+                     not shown that the records refute a model, which other data may let match
     """
 
     name: str
@@ -60,6 +62,7 @@ class RankedModel:
     at_bound: tuple[str, ...]
     typical: Mapping[str, float]
     refuted_by: tuple[Records, ...] | None
+    typical_machine: tuple[str, ...] = ()
 
     @property
     def matches(self) -> bool:
@@ -104,10 +107,12 @@ class Likelihood:
         return float(samples @ np.log(self.squares))
 
 
-def ranked(results: Mapping[str, FitResult]) -> tuple[RankedModel, ...]:
+def ranked(
+    results: Mapping[str, FitResult], typical_machine: tuple[str, ...] = ()
+) -> tuple[RankedModel, ...]:
     """Return models by their results, the best first: by unseen records, else by the criterion.
 
-    All results are of the same records.
+    All results are of the same records, and of a machine whose data act that are typical.
     """
     if not results:
         return ()
@@ -127,6 +132,7 @@ def ranked(results: Mapping[str, FitResult]) -> tuple[RankedModel, ...]:
             result,
             criterion - min(criteria),
             tuple(kind for kind, by in refuted.items() if by[k]) if judged[k] else None,
+            typical_machine,
         )
         for k, ((name, result), criterion) in enumerate(zip(results.items(), criteria, strict=True))
     ]
@@ -139,7 +145,11 @@ def _order(model: RankedModel) -> tuple[bool, float, float]:
 
 
 def _ranked(
-    name: str, result: FitResult, bic: float, refuted_by: tuple[Records, ...] | None
+    name: str,
+    result: FitResult,
+    bic: float,
+    refuted_by: tuple[Records, ...] | None,
+    typical_machine: tuple[str, ...],
 ) -> RankedModel:
     own = {key: each for key, each in result.parameters.items() if not each.of_record}
     return RankedModel(
@@ -154,6 +164,7 @@ def _ranked(
         at_bound=tuple(key for key, parameter in own.items() if parameter.at_bound),
         typical={key: result.fixed[key] for key in result.typical if key in result.fixed},
         refuted_by=refuted_by,
+        typical_machine=typical_machine,
     )
 
 
@@ -218,6 +229,14 @@ def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
 def _judgement(judged: Sequence[RankedModel]) -> str:
     """Return which of several models the records do not refute."""
     possible = [model.name for model in judged if model.possible]
+    typical = dict.fromkeys(name for model in judged for name in model.typical_machine)
+    if typical and len(possible) < len(judged):
+        best = listed(possible or [min(judged, key=lambda model: model.bic).name])
+        return (
+            f"with this machine the records match {best} best; that they refute the others is not "
+            f"shown: {listed([*typical])} {'is' if len(typical) == 1 else 'are'} typical, and "
+            "other values may let them match: give the machine's own, or free them under plant.free"
+        )
     if len(possible) > 1:
         return (
             f"the records cannot tell {listed(possible)} apart: none of them is better by "

@@ -1,6 +1,6 @@
 """The solution of a search, and what follows from it: responses, uncertainty, notes."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.behaviour import behaviour_of
-from exfit.analysis.causes import Evidence, FittedRecord
+from exfit.analysis.causes import Evidence, FittedRecord, Pace
 from exfit.analysis.causes.run_quality import switching_notes
 from exfit.analysis.diagnostics import (
     notes,
@@ -18,6 +18,7 @@ from exfit.analysis.diagnostics import (
     tolerance_notes,
 )
 from exfit.analysis.given_values import given_value_notes
+from exfit.analysis.intervals.averages import allowing_for_averages, recorder_averages
 from exfit.analysis.intervals.determination import Determination
 from exfit.analysis.intervals.typical_values import influence_of_typical_values
 from exfit.analysis.intervals.value_errors import (
@@ -33,9 +34,11 @@ from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.case.schema import SINGLE
 from exfit.fitting.channel_weights import balanced, weight_notes
+from exfit.fitting.descents import descent_near
 from exfit.fitting.nuisances.found_lines import with_found_lines
-from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.parameters import FreeParameter, scaled_values
 from exfit.fitting.problem import FitProblem, robust_of
+from exfit.fitting.recorded.shown_instants import instants_of, with_shown_instants
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
@@ -47,6 +50,7 @@ from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
 from exfit.results.model import FittedParameter, Iteration
 from exfit.results.other_values import AsFound, PhaseEnd
+from exfit.results.recorder_averages import RecorderAverages
 from exfit.results.typical_values import TypicalValue, by_weight
 from exfit.results.windows import WindowSpread
 
@@ -78,6 +82,7 @@ class Analysis(NamedTuple):
     typical_values: Mapping[str, TypicalValue]
     as_found: AsFound | None
     windows: WindowSpread | None = None
+    averages: RecorderAverages | None = None
 
     @property
     def why(self) -> str:
@@ -107,6 +112,7 @@ def analysed(
     ends, typical = list[PhaseEnd](), dict[str, TypicalValue]()
     as_found: AsFound | None = None
     windows: WindowSpread | None = None
+    averages: RecorderAverages | None = None
     try:
         ends += phase_ends(case, setups, problem.residuals, history)
         validated = [aligned(case, setup, values) for setup in unseen]
@@ -122,6 +128,8 @@ def analysed(
             typical = influence_of_typical_values(case, problem.compressed, best.x, wider)
             windows = spread_over_windows(case, setups, problem.residuals, values, uncertainty)
             uncertainty = allowing_for(errors, with_spread(uncertainty, windows), *at)
+            averages = recorder_averages(case, problem.residuals, best.x, uncertainty)
+            uncertainty = allowing_for_averages(uncertainty, problem.residuals, averages)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted = unfinished = True
     return Analysis(
@@ -134,7 +142,17 @@ def analysed(
         typical,
         as_found,
         windows,
+        averages,
     )
+
+
+def without_intervals(analysis: Analysis, why: str) -> Analysis:
+    """Return what follows from a solution without intervals, for a reason; as it is without one."""
+    if not why:
+        return analysis
+    known = analysis.uncertainty
+    uncertainty = None if known is None else known.without_intervals(why)
+    return analysis._replace(uncertainty=uncertainty)
 
 
 def fitted_parameters(
@@ -199,9 +217,13 @@ def comparisons_of(
     The tests, ``fine``, have sub-steps enough for it.
     """
     start = residuals.values(residuals.start)
+    moves = residuals.moves(scaled_values(residuals.free, values))
     return tuple(
         with_iteration_responses(
-            compare_with_record(setup, setup.name, values, start), setup, residuals, history
+            compare_with_record(setup, setup.name, values, start, moves=moves),
+            setup,
+            residuals,
+            history,
         )
         for setup in fine
     )
@@ -225,6 +247,7 @@ def fit_notes(
     yield from weight_notes(residuals)
     yield from notes(case, residuals, best, comparisons)
     for recording, setup in zip(case.recordings, setups, strict=True):
+        yield from setup.record.notes
         yield from outlier_notes(setup.record.source.name, setup.channels)
         yield from switching_notes(setup)
         yield from reference_notes(recording.test, setup)
@@ -247,38 +270,40 @@ def fit_notes(
 def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[ExperimentSetup, Values]:
     """Return a test that was not fitted, and the values with what is found about its record.
 
-    What that record leaves open about itself (its instants, its levels) is fitted to it, with the
-    parameters of the unit as they are; so is a periodic disturbance that stands out of what is left
-    then. The test has sub-steps enough. Raises KeyboardInterrupt at an interruption.
+    The instants of its steps are those that the values have, or else those that the record shows:
+    fitted, they would absorb errors of the model. What that record leaves open about itself
+    otherwise (its levels) is fitted to it, with the parameters of the unit as they are; so is a
+    periodic disturbance that stands out of what is left then. The test has sub-steps enough, and
+    bounds within which the record allows the instants. Raises KeyboardInterrupt at an interruption.
     """
-    fine, own = _aligned(case, setup, values)
+    fine, held = setup.with_enough_substeps(values), frozenset[str]()
+    if not case.has_no_equations:  # whose every response is a run
+        fine, held = with_shown_instants(fine, values), instants_of(fine)
+    own = fitted_to_record(case, fine, values, held)
     if not setup.automatic_sines:
         return fine, own
     residuals = Residuals([fine.experiment], fine.free, own)
-    theta = np.array([parameter.scaled(own[parameter.name]) for parameter in fine.free])
-    (disturbed,), _ = with_found_lines([fine], residuals, theta)
-    return _aligned(case, disturbed, values)
+    (disturbed,), _ = with_found_lines([fine], residuals, scaled_values(fine.free, own))
+    fine = disturbed.with_enough_substeps(values)
+    return fine, fitted_to_record(case, fine, values, held)
 
 
-def _aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[ExperimentSetup, Values]:
-    """Return a test with sub-steps enough, and the values with those of its free parameters."""
-    fine = setup.with_enough_substeps(values)
-    if setup.free:
-        robust = robust_of(case)
-        residuals = Residuals([fine.experiment], setup.free, values, robust=robust)
-        if case.estimate.weights == "balanced":
-            residuals = balanced(FitProblem(residuals, residuals), residuals.start).residuals
-        descent = estimate.Descent(
-            functions=estimate.OneByOne(residuals, residuals.exact),
-            bounds=residuals.bounds,
-            method="lm-then-dgn",
-            x_scale=UNIT,
-        )
-        best = descent.run(residuals.start)
-        if best.stop is estimate.Stop.INTERRUPTED:
-            raise KeyboardInterrupt
-        values = residuals.values(best.x)
-    return fine, values
+def fitted_to_record(
+    case: Case, setup: ExperimentSetup, values: Values, held: Collection[str] = ()
+) -> Values:
+    """Return the values with what a record leaves open about itself, fitted to it.
+
+    What is ``held`` stays where the values have it, or at its start. Raises KeyboardInterrupt at
+    an interruption.
+    """
+    values = {**{each.name: each.start for each in setup.free if each.name in held}, **values}
+    free = tuple(each for each in setup.free if each.name not in held)
+    if not free:
+        return values
+    residuals = Residuals([setup.experiment], free, values, robust=robust_of(case))
+    if case.estimate.weights == "balanced":
+        residuals = balanced(FitProblem(residuals, residuals), residuals.start).residuals
+    return residuals.values(descent_near(residuals, residuals.start).x)
 
 
 def validation_of(
@@ -299,6 +324,7 @@ def evidence_of(
     comparisons: Sequence[Comparison],
     analysis: Analysis,
     interrupted: bool,
+    pace: Pace,
 ) -> Evidence:
     """Return what the verdict on a fit and the causes of a poor one are worked out from."""
     return Evidence(
@@ -314,5 +340,7 @@ def evidence_of(
         uncertainty=analysis.uncertainty,
         validation=analysis.validation,
         typical_values=by_weight(analysis.typical_values),
+        averages=analysis.averages,
         interrupted=interrupted,
+        pace=pace,
     )

@@ -18,7 +18,7 @@ from exfit.analysis.causes.run_quality import (
 from exfit.analysis.descriptions.other_program import other_program_of
 from exfit.analysis.given_values import ValuesOrResult, changes_of
 from exfit.analysis.other_values import model_as_found
-from exfit.analysis.solution import aligned, validation_of
+from exfit.analysis.solution import aligned, fitted_to_record, validation_of
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
@@ -26,6 +26,9 @@ from exfit.errors import CaseError
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment
 from exfit.fitting.forms.external import as_by_program
+from exfit.fitting.parameters import scaled_values
+from exfit.fitting.problem import residuals_of
+from exfit.fitting.recorded.shown_instants import instants_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
@@ -153,7 +156,12 @@ def _fitted(
 ) -> ComparedTest:
     setup = build_experiment(case, recording, values).with_enough_substeps(values)
     setup = as_by_program(program, case, setup, values)
-    comparison = compare_with_record(setup, setup.name, values)
+    moves = None
+    if program is None:  # a run of it for each would be many
+        residuals = residuals_of(case, [setup])
+        at = scaled_values(residuals.free, setup.with_start_values(values))
+        moves = residuals.moves(at)
+    comparison = compare_with_record(setup, setup.name, values, moves=moves)
     return ComparedTest(recording, setup, values, comparison)
 
 
@@ -221,11 +229,13 @@ def _validated_by_hand(
     setup = as_by_program(program, case, test.setup, values)
     setup, own_values = aligned(case, setup, values)
     comparison = validation_of(case, fitted, setup, own_values)
+    best = fitted_to_record(case, setup, own_values) if instants_of(setup) else own_values
     comparison = replace(
         comparison,
-        steps=tuple(_steps(setup, own_values, given)),
+        steps=tuple(_steps(setup, comparison, own_values, best, given)),
         notes=(
-            *_notes(test, comparison, fitted, own_values),
+            *comparison.notes,
+            *_notes(test, setup, comparison, fitted, best),
             *_event_notes(case, recording),
             *_run_notes(case, setup, comparison, own_values),
         ),
@@ -242,24 +252,41 @@ def _in_place_of(recording: Recording, record: Record | Path | str, taken: set[s
     return recording.model_copy(update={"name": name, "record": section})
 
 
-def _steps(setup: ExperimentSetup, values: Values, given: GivenSteps) -> Iterator[ValidatedStep]:
-    """Yield the steps that the record holds, as they were found at last or given."""
-    simulator = setup.experiment.with_inputs(values)
+def _steps(
+    setup: ExperimentSetup, comparison: Comparison, values: Values, best: Values, given: GivenSteps
+) -> Iterator[ValidatedStep]:
+    """Yield the steps that the record holds, as they were found at last or given.
+
+    ``best`` are the values whose instants are fitted within what the record allows.
+    """
+    simulator, moved = (setup.experiment.with_inputs(each) for each in (values, best))
+    least = None
+    if instants_of(setup):
+        least = compare_with_record(setup, setup.name, best).rmse
     found = tuple(
         name
         for name, numbers in (("instant", given.instants), ("size", given.sizes))
         if not numbers
     )
-    for step in simulator.inputs.steps:
+    for step, other in zip(simulator.inputs.steps, moved.inputs.steps, strict=True):
         at = step.at + simulator.delay
         if at >= setup.record.time[0]:
-            yield ValidatedStep(step.signal, at, step.step, found)
+            best_at = None if least is None else other.at + moved.delay
+            yield ValidatedStep(step.signal, at, step.step, found, comparison.rmse, best_at, least)
 
 
 def _notes(
-    test: UnplannedTest, comparison: Comparison, fitted: Sequence[Comparison], values: Values
+    test: UnplannedTest,
+    setup: ExperimentSetup,
+    comparison: Comparison,
+    fitted: Sequence[Comparison],
+    best: Values,
 ) -> Iterator[str]:
-    """Yield what must be known of a record that was given by hand."""
+    """Yield what must be known of a record that was given by hand.
+
+    ``setup`` has the bounds within which the record allows its instants, ``best`` those at which it
+    is matched best.
+    """
     record, steady = test.setup.record, test.setup.test.steady
     for match in fitted:
         if match.sha256 == comparison.sha256:
@@ -272,13 +299,13 @@ def _notes(
     if not test.notes and steady is not None:
         causes = unsteady_signals(record, steady, test.setup.channels)
         yield from (cause.sentence for cause in causes)
-    for parameter in test.setup.free:
-        side = parameter.bound(values[parameter.name])
+    for parameter in setup.free:
+        side = parameter.bound(best[parameter.name])
         if side is not None and parameter.name.endswith(".at"):
             way = {"min": "earlier", "max": "later"}[side]
             yield (
                 f"a step {way} than the record shows it would match better than the one at "
-                f"{values[parameter.name]:.4g} s: the response is too {EARLY_OR_LATE[side]}"
+                f"{parameter.start:.4g} s: the response is too {EARLY_OR_LATE[side]}"
             )
 
 

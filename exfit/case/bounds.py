@@ -2,8 +2,18 @@
 
 from math import inf
 
+from exfit.case.schema.values import FreeSection
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Limits, Parameter
+
+UNBOUNDED = -inf, inf
+
+
+def bounds_of(section: FreeSection, row: Parameter | None) -> Limits:
+    """Return the bounds of a free parameter of a case."""
+    if section.bounds == "none":
+        return UNBOUNDED
+    return search_bounds(section.min, section.max, row)
 
 
 def search_bounds(low: float | None, high: float | None, row: Parameter | None) -> Limits:
@@ -13,7 +23,7 @@ def search_bounds(low: float | None, high: float | None, row: Parameter | None) 
     its block is not bypassed, also where its bound of 0 belongs to a start of 0 that another one
     has replaced. Without a data sheet there is no limit.
     """
-    lowest, highest = (-inf, inf) if row is None else row.domain
+    lowest, highest = UNBOUNDED if row is None else row.domain
     if row is not None and row.is_time:
         lowest = max(lowest, SHORTEST)
         low = None if low == 0.0 else low

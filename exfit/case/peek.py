@@ -100,6 +100,12 @@ def limiter_places(text: str, case: Path) -> dict[str, str]:
     }
 
 
+def unused_values(text: str, case: Path) -> dict[str, float]:
+    """Return what the planner's program does without of the unit of a case, by the case's text."""
+    unused = _section(content_of(text, case), ("as_found", "unused"))
+    return {str(name): float(value) for name, value in unused.items()}
+
+
 def _content(case: Path) -> Mapping[str, Any]:
     try:
         return content_of(read_text(case), case)

@@ -59,8 +59,13 @@ class PlannerUnit:
         return f"{Path(self.file).name}, bus {self.bus}, machine {self.id}"
 
 
-def as_found_lines(unit: PlannerUnit, model: str, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield the section that says what was in the planner's base, by the names of the system."""
+def as_found_lines(
+    unit: PlannerUnit, model: str, values: Mapping[str, float], unused: Mapping[str, float]
+) -> Iterator[str]:
+    """Yield the section that says what was in the planner's base, by the names of the system.
+
+    ``unused`` are values there that the planner's program does without.
+    """
     yield "as_found:               # in the planner's base; a report compares it"
     yield f"  source: {quoted(str(unit))}"
     yield f"  bus: {unit.bus}"
@@ -68,8 +73,14 @@ def as_found_lines(unit: PlannerUnit, model: str, values: Mapping[str, float]) -
     yield f"  file: {quoted(unit.file)}"
     yield f"  model: {model}"
     yield "  parameters:"
-    pairs = [f"{name}: {yaml_number(value)}" for name, value in values.items()]
-    yield from _flow_mapping(pairs, "    ")
+    yield from _flow_mapping(_pairs(values), "    ")
+    if unused:
+        yield "  unused:"
+        yield from _flow_mapping(_pairs(unused), "    ")
+
+
+def _pairs(values: Mapping[str, float]) -> list[str]:
+    return [f"{name}: {yaml_number(value)}" for name, value in values.items()]
 
 
 def quoted(text: str) -> str:

@@ -113,6 +113,8 @@ def fit_all(
     Args:
         cases: cases, or the paths of their files.
         strategies: of the descent from the start of a case; none: the own strategy of each case.
+            Several are compared by that descent alone, unless ``search`` or the case says how far
+            to search.
         progress: called with the fit that runs and its iteration, or how far its search from
             further starts is.
         finished: called with every fit that has ended, so that its files can be written.
@@ -158,9 +160,18 @@ def planned(
     ]
     runs = numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
     return tuple(
-        PlannedFit(*combination, search, run)
-        for combination, run in zip(combinations, runs, strict=True)
+        PlannedFit(name, case, strategy, _how_far(case, strategies, search), run)
+        for (name, case, strategy), run in zip(combinations, runs, strict=True)
     )
+
+
+def _how_far(case: Case, strategies: Sequence[str], search: str | None) -> str | None:
+    """Return how far to search, None: as the case says.
+
+    Several strategies are compared: a search that goes on would lead all of them to one minimum.
+    """
+    asked = search is not None or case.estimate.model_fields_set & {"search", "starts"}
+    return "local" if len(strategies) > 1 and not asked else search
 
 
 def run_all(

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from exfit.analysis.intervals.typical_values import typical_values_used
 from exfit.analysis.ranking import RankedModel, ranked, ranking_sentences
 from exfit.case.case import Case
 from exfit.case.other_model import with_exciter
@@ -12,6 +13,7 @@ from exfit.errors import CaseError
 from exfit.fleet.fits import FitRun, FitSeries, PlannedFit, Progress, run_all
 from exfit.models import MODELS, find
 from exfit.models.families import FAMILIES, members, relatives, without_doubles
+from exfit.plants import MACHINE
 from exfit.results.model import FitResult
 from exfit.util.typed import plain
 from exfit.workflows import CaseOrPath, loaded
@@ -125,5 +127,6 @@ def _of_entry(entry: str, own: str, exciters: Sequence[str]) -> Sequence[str]:
 
 def ranking_of(case: Case, series: FitSeries) -> Ranking:
     """Return the ranking of a series of fits of one case, a model each."""
-    models = ranked(series.results)
+    typical = tuple(name for name in typical_values_used(case) if name.startswith(MACHINE))
+    models = ranked(series.results, typical)
     return Ranking(case.path.stem, models, tuple(ranking_sentences(models)), series)

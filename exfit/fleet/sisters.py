@@ -16,6 +16,7 @@ import numpy as np
 from exfit.fleet.summary import CaseSummary
 from exfit.inference.outliers import FEWEST, Estimates, deviations
 from exfit.results.facts import MAKER, MODEL, PLANT, RATED, TYPE, UNIT, stated
+from exfit.results.verdict import WITHOUT_INTERVALS
 
 ERRORS_IN_HALF = NormalDist().inv_cdf(0.975)  # standard errors in half of a 95 % interval
 ALIKE = (MAKER, MODEL, TYPE, RATED)  # facts that sisters share where they are stated
@@ -24,12 +25,22 @@ UNDETERMINED = "not determined"
 WITHOUT_INTERVAL = "no interval"  # that was looked for, as without a global search
 
 
+def missing_interval(case: CaseSummary, name: str) -> str:
+    """Return why a fitted parameter of a case has no closed interval, "" where it has one."""
+    parameter = case.fitted[name]
+    if case.verdict in WITHOUT_INTERVALS:
+        return f"{WITHOUT_INTERVAL}: {case.verdict}"
+    if parameter.low is not None and parameter.high is not None and isfinite(parameter.value):
+        return ""
+    return UNDETERMINED if name in case.unresolved else WITHOUT_INTERVAL
+
+
 class SisterValue(NamedTuple):
     """A parameter of one of several sisters, with its 95 % interval.
 
     ``deviation`` from the others is in standard deviations of such a difference, ``probability``
     that of chance alone to let any of them deviate as much; None where that is not known.
-    ``remark`` is "outlier", what it lies beyond, "not determined", "no interval" or "".
+    ``remark`` is "outlier", what it lies beyond, or `missing_interval`.
     """
 
     case: str
@@ -176,9 +187,7 @@ def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
 
 def _value(case: CaseSummary, name: str) -> SisterValue:
     parameter = case.fitted[name]
-    closed = parameter.low is not None and parameter.high is not None
-    missing = UNDETERMINED if name in case.unresolved else WITHOUT_INTERVAL
-    remark = "" if closed and isfinite(parameter.value) else missing
+    remark = missing_interval(case, name)
     return SisterValue(case.name, parameter.value, parameter.low, parameter.high, remark)
 
 

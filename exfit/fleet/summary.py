@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import nan
+from math import inf, nan
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.results.facts import UNIT, Facts, stated
 from exfit.results.verdict import GOOD, MATCHES
+from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ class SummaryParameter(NamedTuple):
     """A value of the unit, with its 95 % interval where it was fitted.
 
     A side of the interval without a limit is None; ``source`` says where the value comes from,
-    which is an earlier fit where it is "fitted" and the parameter is not ``fitted`` here.
+    which is an earlier fit where it is "fitted" and the parameter is not ``fitted`` here. ``min``
+    and ``max`` are infinite where there is no bound.
     """
 
     value: Annotated[float, nan]
@@ -53,6 +55,12 @@ class SummaryParameter(NamedTuple):
     source: str
     unit: str
     fitted: bool
+    min: Annotated[float, -inf] = -inf
+    max: Annotated[float, inf] = inf
+
+    def rounded(self, number: float) -> str:
+        """Return the value, or an end of its interval, as tables print it: within the bounds."""
+        return rounded_value(number, error_of_interval(self.low, self.high), self.min, self.max)
 
 
 class SummaryValidation(NamedTuple):
@@ -218,10 +226,13 @@ def _validation(validations: "Sequence[Comparison]") -> SummaryValidation:
 def _unresolved(result: "FitResult") -> tuple[str, ...]:
     """Return what the records do not determine, as the verdict counts it.
 
-    A parameter whose interval was not looked for, as without a global search, is none of these.
+    A parameter whose interval was not looked for, as without a global search, or that has none as
+    the response misses the records, is none of these.
     """
     from exfit.analysis.intervals.determination import NEEDS_PROFILE, UNFINISHED
 
+    if result.verdict is not None and result.verdict.misfit:
+        return ()
     return tuple(
         name
         for name, parameter in result.parameters.items()
@@ -244,8 +255,10 @@ def _parameters(result: "FitResult") -> dict[str, SummaryParameter]:
             low, high = (None, None) if fitted is None else fitted.interval or (None, None)
             unit = units.get(name, "") if fitted is None else fitted.unit
             source = result.source_of(name)
-            free = fitted is not None
-            parameters[name] = SummaryParameter(value, low, high, source, unit, free)
+            bounds = () if fitted is None else (fitted.min, fitted.max)
+            parameters[name] = SummaryParameter(
+                value, low, high, source, unit, fitted is not None, *bounds
+            )
     return parameters
 
 

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from exfit.results.description import UnitDescription
-from exfit.results.model import ERRORS_IN_INTERVAL, FitResult
+from exfit.results.model import FitResult
 from exfit.results.saturation import SaturationResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.v_curve import VCurve
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.util.text import rounded
+from exfit.util.text import ERRORS_IN_INTERVAL, error_of_interval, rounded_value
 from exfit.util.typed import plain
 
 StepResult = SaturationResult | VCurve | FitResult
@@ -24,7 +25,8 @@ class EnteredValue:
     ``name`` is that of a parameter (machine.S10), or of the base of a signal (ifd.base) in
     ``unit``; ``interval`` holds it with 95 % confidence. ``given`` is what the file of the
     programme has in its place, None where it has nothing, and ``given_source`` where that comes
-    from; ``excluded`` says whether that lies outside the interval.
+    from; ``excluded`` says whether that lies outside the interval. The value was fitted between
+    ``min`` and ``max``.
     """
 
     name: str
@@ -37,12 +39,12 @@ class EnteredValue:
     given_source: str = ""
     entered: bool = True
     excluded: bool = False
+    min: Annotated[float, -inf] = -inf
+    max: Annotated[float, inf] = inf
 
-    @property
-    def error(self) -> float:
-        """The standard error to which tables round."""
-        low, high = self.interval
-        return (high - low) / ERRORS_IN_INTERVAL
+    def rounded(self, number: float) -> str:
+        """Return the value, or an end of its interval, as tables print it: within the bounds."""
+        return rounded_value(number, error_of_interval(*self.interval), self.min, self.max)
 
     @property
     def std_error(self) -> float:
@@ -55,7 +57,7 @@ class EnteredValue:
         """What to look into, in a sentence; "" where nothing contradicts the value."""
         if not self.excluded or self.given is None:
             return ""
-        low, high = (rounded(end, self.error) for end in self.interval)
+        low, high = map(self.rounded, self.interval)
         measured = f"{low} ... {high} {self.unit}".rstrip()
         used = f"the value of {'the test' if self.entered else 'the file'} is used"
         return (

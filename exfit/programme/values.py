@@ -116,7 +116,16 @@ def _fitted(
 ) -> Iterator[EnteredValue]:
     low, high = parameter.interval or (None, None)
     if low is not None and high is not None:
-        yield EnteredValue(name, parameter.value, (low, high), source, test, parameter.unit)
+        yield EnteredValue(
+            name,
+            parameter.value,
+            (low, high),
+            source,
+            test,
+            parameter.unit,
+            min=parameter.min,
+            max=parameter.max,
+        )
 
 
 def _beside(value: EnteredValue, given: float | None, source: str, entered: bool) -> EnteredValue:

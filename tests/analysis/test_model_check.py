@@ -103,10 +103,10 @@ def test_it_names_what_is_bypassed_and_what_is_taken_as_typical(tmp_path):
 
 
 def test_it_names_a_model_whose_diagram_is_in_doubt(tmp_path):
-    text = WITHOUT_RECORD.partition("  free:")[0].replace("AC1A", "AC5C")
+    text = WITHOUT_RECORD.partition("  free:")[0].replace("AC1A", "DC4C")
     found = check(parse_case(text, tmp_path / "bump.yaml"))
-    assert f"AC5C {MODELS['AC5C'].doubt}" in found.notes
-    assert MODELS["AC5C"].doubt.startswith("rests on one public diagram")
+    assert f"DC4C {MODELS['DC4C'].doubt}" in found.notes
+    assert MODELS["DC4C"].doubt.startswith("rests on one public diagram")
 
 
 def test_it_reports_the_sub_steps_of_a_fast_case(tmp_path):

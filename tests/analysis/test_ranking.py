@@ -1,17 +1,22 @@
 """Which models records refute: laws of the criterion, with errors whose truth is known."""
 
 from dataclasses import replace
+from io import StringIO
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from cases import FIRST_ORDER, TIME, TRUTH
+from rich.console import Console
 
 import exfit
 from exfit.analysis.ranking import STRONG, Likelihood, _gap, ranked, ranking_sentences
+from exfit.output import terminal
 from exfit.results.comparisons import Overlay
 from exfit.results.verdict import NOT_CONVERGED, Verdict
 
 SAMPLES = 2000
+NO_SERIES = SimpleNamespace(failed={}, not_run=())
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +177,17 @@ def test_models_none_of_which_matches_are_reported(result):
 def test_no_model_at_all_is_no_ranking():
     assert ranked({}) == ()
     assert [*ranking_sentences(())] == []
+
+
+def test_with_typical_data_of_the_machine_no_model_is_called_refuted(result):
+    errors = 1e-3 * white(1)
+    fits = {"A": with_errors(result, errors), "B": with_errors(result, 2.0 * errors)}
+    assert "refute all of these models but A" in " ".join(ranking_sentences(ranked(fits)))
+    said = " ".join(ranking_sentences(ranked(fits, ("machine.S10",))))
+    assert "refute all" not in said
+    assert "is not shown: machine.S10 is typical" in said
+    for typical, meaning in (((), "not refuted"), (("machine.S10",), "matches best")):
+        page = Console(file=StringIO(), width=80)
+        models = ranked(fits, typical)
+        terminal.ranking(page, SimpleNamespace(models=models, sentences=(), series=NO_SERIES))
+        assert f"* {meaning}" in page.file.getvalue()

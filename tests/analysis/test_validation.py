@@ -1,19 +1,22 @@
 """A record that is given by hand: its steps are found in it, and it is judged by the fit."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 import yaml
-from places import ROOT
+from places import CONFIGS, ROOT
+from records import SAMPLES, config
+from records import case_of as case_in
 from tiers import few_of
 
 from exfit.case.case import Case
 from exfit.case.load import load_case
-from exfit.case.schema import ChannelSection, StepSection
+from exfit.case.schema import ChannelSection, Limit, StepSection
 from exfit.errors import CaseError, RecordError
 from exfit.records.record import Record
-from exfit.workflows import read_record, validate
+from exfit.workflows import fit, read_record, simulate, validate, validation_result
 
 AC1A = {"KA": 364.1523, "TA": 0.0542, "KF": 0.0413, "TF": 1.458, "TE": 1.6724, "KC": 0.486}
 UNIT1 = {"KPR": 78.84, "KIR": 2.4636, "KDR": 37.05, "TDR": 0.1638, "TE": 1.4044, "KC": 0.0301}
@@ -28,6 +31,8 @@ TRUTH = {
     "ac8b_on_line": {"KPR": 80, "KIR": 5, "KDR": 10, "TDR": 0.1, "TE": 1.2, "KC": 0.55},
     "first_order": {"k": 4.0, "a": 2.0},
 }  # sample_data/README.md
+THESIS = {"ac1a": "ac1a_typical", "ac8b_unit1": "ac8b_unit1", "ac8b_unit2": "ac8b_unit2"}
+NOISE = 1e-4  # pu, of the records
 UP, DOWN = (1.0, 0.05), (1.0, -0.05)
 STEPS = [
     ("ac1a_up", "ac1a_typical", [UP]),
@@ -69,13 +74,16 @@ def by_hand(record, name, alone=True, **given):
 def test_the_steps_of_every_sample_record_are_found_in_it_and_the_truth_is_accepted(
     record, name, steps
 ):
-    """To 2 ms and 1 %: AC8B is not quite at rest where its step down is recorded."""
+    """To 4 ms and 1 %: the record alone shows the instant to 2 or 3 ms, with a probability of 95 %.
+
+    AC8B is not quite at rest where its step down is recorded.
+    """
     match = by_hand(record, name)
     assert match.accepted, match.reason
     assert len(match.steps) == len(steps)
     for found, (at, size) in zip(match.steps, steps, strict=True):
         assert found.signal == "vref"
-        assert found.at == pytest.approx(at, abs=2e-3)
+        assert found.at == pytest.approx(at, abs=4e-3)
         assert found.size == pytest.approx(size, rel=0.01)
 
 
@@ -94,6 +102,39 @@ def test_the_record_of_another_unit_is_not_accepted(unit, name, sign):
     match = by_hand(f"{unit}_{sign}", name)
     assert not match.accepted
     assert f"on {unit}_{sign} the error is" in match.reason
+
+
+def three_ways(unit, way, values, limit=3.0 * NOISE):
+    """Return how values do on a record of the thesis that the case names, or that is given by hand.
+
+    The last has the instant of its step given, too. The ``limit`` of the error is that of the case.
+    """
+    case = replace(case_of(THESIS[unit], alone=False), accept=Limit(rmse=limit))
+    if way == "up":
+        (up,) = case.recordings
+        case = replace(case, validations=(up.model_copy(update={"name": "up"}),))
+    record = ROOT / "sample_data" / f"{unit}_{way}.csv"
+    by_hand = ({}, {"record": record}, {"record": record, "at": 1.0})
+    return [validate(case, values, **given)[-1] for given in by_hand]
+
+
+@pytest.mark.parametrize(
+    ("unit", "way", "share"), few_of(product(THESIS, ("up", "down"), (0.01, 0.03, 0.1)), 4)
+)
+def test_three_ways_to_one_validation_give_one_verdict_however_wrong_the_model(unit, way, share):
+    """An instant fitted to the whole response hid up to 40 % of the error."""
+    truth, gain = TRUTH[THESIS[unit]], "KA" if unit == "ac1a" else "KPR"
+    for of_gain, of_te in ((1, 0), (0, 1), (1, 1)):
+        wrong = {
+            gain: truth[gain] * (1.0 + share) ** of_gain,
+            "TE": truth["TE"] * (1.0 + share) ** of_te,
+        }
+        named, found, given = three_ways(unit, way, {**truth, **wrong})
+        assert named.accepted == found.accepted == given.accepted
+        (step,) = found.steps
+        assert step.at == pytest.approx(1.0, abs=4e-3)
+        assert step.rmse == found.rmse >= step.best_rmse
+        assert given.steps[0].best_at is None
 
 
 def test_a_late_response_is_not_hidden_by_a_later_step():
@@ -227,3 +268,30 @@ def test_a_step_before_the_whole_record_is_refused_with_what_to_write():
     del content["validate"][0]["record"]["window"]
     with pytest.raises(RecordError, match=r"has a step at -1 s; leave this step out"):
         validate(Case.from_dict(content, folder=ROOT / "configs"), TRUTH["ac1a_windows"])
+
+
+WITHOUT_A_FITTED_RECORD = {
+    "without a test": {},
+    "with a test": {"test": {"vref": [{"at": 1.0, "step": 0.05}]}},
+}
+
+
+@pytest.mark.parametrize("sections", WITHOUT_A_FITTED_RECORD.values(), ids=WITHOUT_A_FITTED_RECORD)
+def test_a_case_that_has_only_records_under_validate_is_validated_with_given_values(
+    tmp_path, sections
+):
+    content = config("ac1a_typical")
+    del content["record"], content["test"]
+    case = case_in(content | sections, tmp_path)
+    (match,) = validate(case, TRUTH["ac1a_typical"])
+    whole = validate(load_case(CONFIGS / "ac1a_typical.yaml"), TRUTH["ac1a_typical"])[-1]
+    assert match.rmse == whole.rmse  # of the same record, beside a fitted one
+    result = validation_result(case, TRUTH["ac1a_typical"])
+    assert [test.name for test in result.tests] == ["down-step"]
+    assert [*result.inputs] == ["case", "validate.down-step"]
+    (by_hand,) = validate(case, TRUTH["ac1a_typical"], SAMPLES / "ac1a_up.csv")
+    assert by_hand.validation
+    with pytest.raises(CaseError, match="record: missing; a fit needs a record"):
+        fit(case)
+    with pytest.raises(CaseError, match=r"test\.duration: missing; there is no record"):
+        simulate(case)

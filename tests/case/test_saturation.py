@@ -4,12 +4,20 @@ from math import exp
 
 import numpy as np
 import pytest
+import yaml
+from oracle import SATURATED
+from places import CONFIGS
 from records import case_of, config
 from scipy.integrate import solve_ivp
 
 from exfit.case.case import Case
+from exfit.case.saturation import has_saturation
 from exfit.errors import CaseError
 from exfit.exchange.export import export
+from exfit.exchange.fields import Field
+from exfit.exchange.records import alternatives, read_values, record_fields
+from exfit.models import MODELS
+from exfit.models.sheet import typical
 from exfit.output.report.sections.model import saturation
 from exfit.workflows import check, fit, simulate
 
@@ -147,3 +155,47 @@ def test_a_model_without_saturation_has_no_such_constants():
     described["parameters"].setdefault("fixed", {})["AEX"] = A
     with pytest.raises(CaseError, match="AEX: not a parameter of SEXS"):
         Case.from_dict(described)
+
+
+WITH_POINTS = [(name, form) for name, form in SATURATED if has_saturation(MODELS[name].sheet)]
+ANYWHERE = ((0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (3.0, 3.0), (4.0, 2.0))  # E1, E2
+
+
+def unsaturated(E1, E2):
+    return {"E1": E1, "SE1": 0.0, "E2": E2, "SE2": 0.0}
+
+
+@pytest.mark.parametrize("case", WITH_POINTS, ids="-".join)
+def test_two_points_of_zero_are_no_saturation_wherever_they_lie(case):
+    name, form = case
+    content = yaml.safe_load((CONFIGS / "models" / f"{name.lower()}.yaml").read_text())
+    content |= {"saturation": form, "test": {**content["test"], "duration": 2.0}}
+    fixed = content["parameters"].setdefault("fixed", {})
+
+    def response(E1, E2):
+        fixed.update(unsaturated(E1, E2))
+        return simulate(Case.from_dict(content)).response.signals["vt"]
+
+    expected = response(1.0, 2.0)
+    assert np.ptp(expected) > 1e-3
+    for points in ANYWHERE:
+        np.testing.assert_array_equal(response(*points), expected)
+
+
+@pytest.mark.parametrize("name", list(dict.fromkeys(name for name, _ in WITH_POINTS)))
+def test_a_record_without_saturation_is_read_and_written_wherever_its_points_lie(name):
+    for definition in alternatives(MODELS[name]):
+        for E1, E2 in ANYWHERE:
+            values = typical(MODELS[name].sheet) | unsaturated(E1, E2)
+            fields = [Field(text, 1) for text in record_fields(definition, values)]
+            read = read_values(definition, 1, tuple(fields))
+            assert read.faults == []
+            assert unsaturated(*sorted((E1, E2))).items() <= read.values.items()
+
+
+@pytest.mark.parametrize(("symbol", "points"), [("E1", (0.0, 4.0)), ("E2", (4.0, 0.0))])
+def test_a_point_at_zero_voltage_beside_a_saturation_is_refused(symbol, points):
+    curve = {"E1": points[0], "E2": points[1], f"S{symbol}": 0.0}
+    curve |= {"SE2" if symbol == "E1" else "SE1": 0.1}
+    with pytest.raises(CaseError, match=rf"{symbol}: 0 is no point of a saturation curve"):
+        Case.from_dict(content("quadratic", curve))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.causes.evidence import Evidence, FittedRecord
+from exfit.analysis.causes.lines import offset_found
 from exfit.analysis.causes.suspicion import Suspicion
 from exfit.analysis.causes.trials import (
     Opened,
@@ -36,7 +37,6 @@ CLIPPED_RATIO = 4.0  # times as many as have the next value: rounded noise has f
 FARTHEST_OFFSET = 1.0  # pu
 TESTED_AT = 0.02  # pu: how far from rated voltage units are tested, for the most part
 CHECK_BASE = "check its base, unit and, of phases, connection"
-CHECK_ZERO = "check the zero of the recorder, or let the fit find it: offset: {start, min, max}"
 LEAVE_VT0_OUT = "leave vt0 out: it is then the mean of the record before the step"
 RARE = 5.0  # log-likelihood: vt has a wrong base less often than other things are wrong
 
@@ -132,11 +132,17 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
                 offset = trial.values["cause.offset"] - channel.offset
                 return Cause(
                     f"an offset of {place}: {offset:+.3g} pu more would match",
-                    CHECK_ZERO,
+                    check_zero(channel, offset),
                 )
 
             residuals = with_opened(evidence.residuals, number, [opened])
             yield from tried(evidence, residuals, 1, cause)
+
+
+def check_zero(channel: Channel, more: float = 0.0) -> str:
+    """Return what to do about the offset of a channel, which ``more`` of it would match."""
+    line = offset_found(channel.signal, channel.offset + more, FARTHEST_OFFSET)
+    return f"check the zero of the recorder, or let the fit find it: {line}"
 
 
 def is_found(experiment: Experiment, channel: Channel, kind: str) -> bool:

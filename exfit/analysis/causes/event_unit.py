@@ -48,21 +48,6 @@ FORMS = {
 }
 
 
-def other_unit_in_event(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield what of a unit in a grid event would match if it were otherwise than in the case."""
-    if not evidence.case.kind.finds_rest:
-        return
-    for recognise in (
-        other_swing,
-        missing_governor,
-        missing_stabiliser,
-        idle_control,
-        other_motion,
-        other_transformer,
-    ):
-        yield from recognise(evidence)
-
-
 def of_case(evidence: Evidence, other: Case) -> Residuals:
     """Return the residuals of the same records by a unit as another case has it.
 

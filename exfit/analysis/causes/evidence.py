@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from exfit import estimate
+from exfit.analysis.causes.pace import Pace
 from exfit.analysis.intervals.determination import NEEDS_PROFILE
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
@@ -12,6 +13,7 @@ from exfit.fitting.residuals import Residuals, noise_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
+from exfit.results.recorder_averages import RecorderAverages
 from exfit.results.typical_values import TypicalValue
 
 
@@ -47,7 +49,8 @@ class Evidence:
     ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
     ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
     known; ``typical_values`` are those that matter, with what they would move, the weightiest
-    first. ``interrupted``: the search, or what follows it, was cut short.
+    first; ``averages`` are those of the recorder that it does not exclude. ``interrupted``: the
+    search, or what follows it, was cut short. ``pace`` watches the search for causes.
     """
 
     case: Case
@@ -57,7 +60,9 @@ class Evidence:
     uncertainty: UncertaintyAnalysis | None
     validation: Sequence[Comparison] = ()
     typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
+    averages: RecorderAverages | None = None
     interrupted: bool = False
+    pace: Pace = field(default_factory=Pace)
 
     @cached_property
     def values(self) -> Mapping[str, float]:

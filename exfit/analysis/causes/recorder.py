@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from exfit.analysis.causes.evidence import Evidence
 from exfit.analysis.causes.linear import LinearFit, blocks, linear_fit
+from exfit.analysis.causes.lines import delay_found
 from exfit.analysis.causes.suspicion import CERTAIN, LAST, Suspicion, suspected
 from exfit.analysis.causes.trials import Opened, Trial, tried, with_experiment, with_opened
-from exfit.dsp.filtering import Filtering, MovingAverage
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.step_detection import find_step
 from exfit.fitting.experiment import Channel
+from exfit.fitting.forms.averaged import finds_instant, with_averages
 from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.ripple import MAINS, Ripple
@@ -180,39 +181,36 @@ def _spikes(errors: Array) -> Places:
 
 
 def averaging(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the recorder shows averages, by the window that matches best."""
+    """Yield that the recorder shows averages, by the window that matches best.
+
+    Where the fit finds the instant of the step, that makes up for the delay of averages.
+    """
     for number, experiment in enumerate(evidence.residuals.experiments):
-        record = evidence.records[number]
-        plain = all(channel.filtering is None for channel in experiment.channels)
-        moved = any(each.kind in ("at", "shift", "delay") for each in experiment.nuisances)
-        if not plain or moved:
+        if any(channel.filtering is not None for channel in experiment.channels):
             continue
-        time, delay = record.setup.record.time, experiment.simulator.delay
         window = _likeliest_window(evidence, number)
         if window is None:
             continue
-        channels = tuple(
-            replace(
-                channel,
-                filtering=Filtering(time, channel.kept, None, MovingAverage(window)),
-            )
-            for channel in experiment.channels
-        )
-        opened = Opened(
-            Nuisance("cause.delay", "delay"), delay + 0.5 * window, delay - window, delay + window
+        delay = experiment.simulator.delay
+        averaged = with_averages(experiment, window)
+        changed = with_experiment(evidence.residuals, number, averaged)
+        late = Nuisance("cause.delay", "delay")
+        found = finds_instant(experiment)
+        opened = (
+            [] if found else [Opened(late, delay + 0.5 * window, delay - window, delay + window)]
         )
 
         def cause(trial: Trial, window: float = window, number: int = number) -> Cause:
+            late = trial.values.get("cause.delay")
+            after = "" if late is None else f", and is {1e3 * late:.0f} ms late"
+            delay = "" if late is None else f", {delay_found(late, window)}"
             return Cause(
-                f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms, "
-                f"and is {1e3 * trial.values['cause.delay']:.0f} ms late",
-                f"averaged: {window:.3g} on its channels, delay: {{start, min, max}}",
+                f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
+                f"{after}",
+                f"averaged: {window:.3g} on its channels{delay}",
             )
 
-        changed = with_experiment(
-            evidence.residuals, number, replace(experiment, channels=channels)
-        )
-        yield from tried(evidence, with_opened(changed, number, [opened]), 2, cause)
+        yield from tried(evidence, with_opened(changed, number, opened), 1 + len(opened), cause)
 
 
 def _likeliest_window(evidence: Evidence, number: int) -> float | None:
@@ -220,19 +218,18 @@ def _likeliest_window(evidence: Evidence, number: int) -> float | None:
     experiment = evidence.residuals.experiments[number]
     time = evidence.records[number].setup.record.time
     step = float(median(np.diff(time)))
+    found = finds_instant(experiment)
     costs = {}
-    for window in WINDOWS:
-        if not step < window < 0.1 * (time[-1] - time[0]):
+    for window in sorted({step, *(window for window in WINDOWS if window > step)}):
+        if not window < 0.1 * (time[-1] - time[0]):
             continue
-        filtering = Filtering(time, np.ones(len(time), dtype=bool), None, MovingAverage(window))
-        channels = tuple(replace(channel, filtering=filtering) for channel in experiment.channels)
-        nuisance = Nuisance("cause.delay", "delay")
-        averaged = replace(
-            experiment, channels=channels, nuisances=(*experiment.nuisances, nuisance)
-        )
-        late = experiment.simulator.delay + 0.5 * window
-        values = {**evidence.values, "cause.delay": late}
-        moves = [*evidence.residuals.moves(evidence.solution.x), {"cause.delay": 1.0}]
+        averaged = with_averages(experiment, window)
+        values, moves = evidence.values, [*evidence.residuals.moves(evidence.solution.x)]
+        if not found:
+            nuisance = Nuisance("cause.delay", "delay")
+            averaged = replace(averaged, nuisances=(*averaged.nuisances, nuisance))
+            values = {**values, "cause.delay": experiment.simulator.delay + 0.5 * window}
+            moves.append({"cause.delay": 1.0})
         errors, slopes = averaged.tangents(values, moves)
         if not np.isfinite(slopes).all():
             return None

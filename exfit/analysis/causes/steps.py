@@ -1,6 +1,6 @@
 """Steps that were not made as the case says: sign, size, instant, number."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.analysis.causes.evidence import Evidence, FittedRecord
 from exfit.analysis.causes.linear import LinearFit, linear_fit
+from exfit.analysis.causes.lines import delay_found, step_found
 from exfit.analysis.causes.suspicion import Suspicion
 from exfit.analysis.causes.trials import (
     Opened,
@@ -32,12 +33,6 @@ LEAST_CHANGE = 0.02  # of the size of a step: no one errs by less
 USUAL_CHANGE = 0.05  # errors of a step's size are rarely less
 RARE = 5.0  # log-likelihood of what is rare
 FARTHEST_DELAY = 2.0  # s
-CORRECT_STEP = "correct step, or let the fit find it: step: {start, min, max}"
-CORRECT_INSTANT = "correct at, or let the fit find it: at: {start: auto}; or give delay"
-SAME_CLOCK = (
-    "put all channels on one clock, or let the fit find it: delay: {start, min, max}; phasors and "
-    "powers may be filtered differently"
-)
 INSTANTS = 60  # at which a further step is looked for
 LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
@@ -94,7 +89,7 @@ def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
             return Cause(
                 f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
                 f"has {given} pu",
-                CORRECT_STEP,
+                correct_step([trial.values[each.nuisance.name] for each in opened]),
             )
 
         residuals = with_opened(evidence.residuals, number, opened)
@@ -109,6 +104,17 @@ def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
 def _sizes(size: float) -> tuple[float, float]:
     low, high = sorted((size / LARGEST_FACTOR, size * LARGEST_FACTOR))
     return low, high
+
+
+def correct_step(sizes: Sequence[float]) -> str:
+    """Return what to do about steps of other sizes, those that would match."""
+    return f"correct step, or let the fit find it, {', '.join(map(step_found, sizes))}"
+
+
+def correct_instant(delay: float) -> str:
+    """Return what to do about a record that is late, by a delay (s) that would match."""
+    line = delay_found(delay, FARTHEST_DELAY)
+    return f"correct at, or let the fit find it, under vref: `at: {{start: auto}}`; or {line}"
 
 
 def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
@@ -128,11 +134,16 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
             size = f"{1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'}"
             if evidence.case.kind.finds_rest:
                 compared = f"what is compared{evidence.name_of(number)} is recorded {size}"
-                return Cause(f"the clocks: {compared} than what drives the unit", SAME_CLOCK)
+                return Cause(
+                    f"the clocks: {compared} than what drives the unit",
+                    "put all channels on one clock, or let the fit find it: "
+                    f"{delay_found(delay + late, FARTHEST_DELAY)}; phasors and powers may be "
+                    "filtered differently",
+                )
             return Cause(
                 f"the instant of the step{evidence.name_of(number)}, or a delay of the recorder: "
                 f"the record is {size} than the case",
-                CORRECT_INSTANT,
+                correct_instant(delay + late),
             )
 
         residuals = with_opened(evidence.residuals, number, [opened])
@@ -230,6 +241,6 @@ def _moved(experiment: Experiment, times: Array, slopes: Array, samples: Array, 
     columns = []
     for k, channel in enumerate(experiment.channels):
         later = np.interp(times - by, times, slopes[:, k], left=0.0)
-        filtered = channel.slopes(samples[:, k], channel.as_recorded(later)[:, None])
+        filtered = channel.slopes(samples[:, k], later[:, None])
         columns.append(channel.weight * filtered[:, 0])
     return np.concatenate(columns)

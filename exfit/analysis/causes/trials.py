@@ -14,7 +14,7 @@ from exfit.errors import SimulationError
 from exfit.estimate.run import NotFinite
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance
-from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.results.verdict import Cause
 
@@ -79,7 +79,8 @@ def freed_within(
 def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     """Return the better end of two descents, from the case's start and from the solution.
 
-    None where neither has a response. Raises KeyboardInterrupt at an interruption.
+    None where neither has a response. Raises KeyboardInterrupt at an interruption, OutOfTime when
+    the time for causes is over.
     """
     own = {
         free.name: x for free, x in zip(evidence.residuals.free, evidence.solution.x, strict=True)
@@ -91,7 +92,7 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     ends = list[estimate.Result]()
     for point in (start, np.clip(solution, low, high)):
         if not ends or ends[0].cost > AT_NOISE * evidence.noise_cost:
-            end = _descended(residuals, point)
+            end = _descended(evidence, residuals, point)
             ends += [] if end is None else [end]
     if not ends:
         return None
@@ -99,7 +100,8 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     return Trial(best.cost, residuals.values(best.x))
 
 
-def _descended(residuals: Residuals, start: Array) -> estimate.Result | None:
+def _descended(evidence: Evidence, residuals: Residuals, start: Array) -> estimate.Result | None:
+    evidence.pace.goes_on()
     descent = estimate.Descent(
         functions=estimate.OneByOne(residuals, residuals.exact),
         bounds=residuals.bounds,
@@ -107,10 +109,10 @@ def _descended(residuals: Residuals, start: Array) -> estimate.Result | None:
         max_iterations=MOST_ITERATIONS,
         gtol=TOLERANCE,
         xtol=TOLERANCE,
-        x_scale=UNIT,
+        x_scale=residuals.units,
     )
     try:
-        end = descent.run(start)
+        end = descent.run(start, lambda line: evidence.pace.goes_on(line.cost))
     except (SimulationError, NotFinite):
         return None
     if end.stop is estimate.Stop.INTERRUPTED:

@@ -1,6 +1,6 @@
 """What the case says of the unit: machine data, limits, bounds, the model itself."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import log, sqrt
 
@@ -8,8 +8,10 @@ import numpy as np
 
 from exfit.analysis.causes.evidence import Evidence
 from exfit.analysis.causes.linear import DEPENDENT, linear_fit
+from exfit.analysis.causes.lines import freeing
 from exfit.analysis.causes.suspicion import CERTAIN, Suspicion, likelihood
 from exfit.analysis.causes.trials import Trial, freed_within, tried, with_freed
+from exfit.case.case import Case
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.parameters import FreeParameter
@@ -28,7 +30,6 @@ SATURATION = (f"{MACHINE}S10", f"{MACHINE}S12")
 USUAL_ERROR = 0.5  # of the logarithm of a value that is given
 RARE = 5.0  # log-likelihood: other fixed values are wrong less often than machine data
 OF_SCATTER = 10.0  # variance of the logarithm of a squared scatter, times the samples it is from
-MOST_NUMBERS = 3  # that a cause brings with it
 STRUCTURE = 0.01  # of the error beyond the noise: what leaves more is less likely than the model
 
 
@@ -88,10 +89,8 @@ def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> It
 
     def cause(trial: Trial) -> Cause:
         pairs = [f"{name} {trial.values[name]:.3g} (given {fixed[name]:g})" for name in names]
-        return Cause(
-            f"the {part}: {listed(pairs)} would match",
-            remedy_of(names),
-        )
+        starts = {name: trial.values[name] for name in names}
+        return Cause(f"the {part}: {listed(pairs)} would match", remedy_of(evidence.case, starts))
 
     def prior(trial: Trial) -> float:
         ratios = [log(trial.values[name] / fixed[name]) for name in names]
@@ -105,10 +104,10 @@ def of_machine(names: Sequence[str]) -> bool:
     return names[0].startswith(MACHINE)
 
 
-def remedy_of(names: Sequence[str]) -> str:
-    """Return what to do about values that may be wrong."""
-    sources = "nameplate and test reports" if of_machine(names) else "the data sheet"
-    return f"check {sources}, or free {listed(names)}"
+def remedy_of(case: Case, starts: Mapping[str, float]) -> str:
+    """Return what to do about values that may be wrong; a fit of them begins with ``starts``."""
+    sources = "nameplate and test reports" if of_machine([*starts]) else "the data sheet"
+    return ", ".join(filter(None, [f"check {sources}", freeing(case, starts)]))
 
 
 def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:
@@ -199,10 +198,9 @@ def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
-    """Return suspicions, the likeliest first, with that of the model among them.
+    """Return suspicions, the likeliest first, and last that of the model.
 
-    It comes behind what explains nearly all, but no later than second where nothing explains the
-    error down to the noise of the records.
+    None of another one was tried: it is what is left where nothing else is wrong.
     """
     samples = max(1, evidence.residuals.samples)
     noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
@@ -210,11 +208,8 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
     if beyond <= 0.0 or not evidence.case.kind.has_exciter:
         return [*suspicions]
     own = likelihood(evidence, noise + STRUCTURE * beyond)
-    place = sum(suspicion.likelihood > own for suspicion in suspicions)
-    if not any(each.likelihood > likelihood(evidence, noise, MOST_NUMBERS) for each in suspicions):
-        place = min(place, 1)
     cause = Cause(
         f"the model: the unit may be of another type than {evidence.case.subject}",
         "compare others: exfit rank CASE --models A,B",
     )
-    return [*suspicions[:place], Suspicion(cause, own), *suspicions[place:]]
+    return [*suspicions, Suspicion(cause, own)]

@@ -37,7 +37,7 @@ from exfit.results.description import (
 from exfit.results.model import FittedParameter
 from exfit.util.criteria import Criteria
 from exfit.util.root import on_disk
-from exfit.util.text import rounded
+from exfit.util.text import rounded_value
 
 Estimated = tuple[float, float | None]  # a value, and half of its 95 % interval
 Identified = Mapping[str, Estimated]  # what a fit found about its records, by name
@@ -46,7 +46,8 @@ Value = TypeVar("Value")
 
 def labelled_records(case: Case) -> list[str]:
     """Return the labels of the records of a case: of those fitted, then of the validations."""
-    fitted = [f"records.{recording.name}" for recording in case.records] or ["record"]
+    fitted = [f"records.{recording.name}" for recording in case.records]
+    fitted = fitted or ["record" for _ in case.recordings]
     return [*fitted, *(f"validate.{recording.name}" for recording in case.validations)]
 
 
@@ -266,7 +267,7 @@ def _given(
     number, half = identified
     sign = "+" if form.startswith("+") and number > 0.0 else ""
     error = "" if half is None else f" +- {half:.2g}"
-    return f"{sign}{rounded(number, half)}{error} {unit} (found by the fit)"
+    return f"{sign}{rounded_value(number, half)}{error} {unit} (found by the fit)"
 
 
 def identified_values(

@@ -212,7 +212,8 @@ def with_intervals(
 ) -> UncertaintyAnalysis:
     """Return the uncertainty with the intervals of complete profiles in place of its own.
 
-    Of several profiles of a parameter, by its place among the free ones, it is the hull.
+    Of several profiles of a parameter, by its place among the free ones, it is the hull. What
+    linear theory says against them is left out.
     """
     parameters = dict(uncertainty.confidence.parameters)
     for index, (first, *others) in profiles.items():
@@ -220,7 +221,20 @@ def with_intervals(
             name = free[index].name
             each = [first, *filter(complete, others)]
             parameters[name] = of_profiles(parameters[name], free[index], each)
-    return with_parameters(uncertainty, parameters)
+    known = uncertainty.identifiability.within(
+        {
+            parameter.name: interval_or_bounds(parameters[parameter.name], parameter)
+            for parameter in free
+            if parameters[parameter.name].method in ("profile", "hull")
+        }
+    )
+    return with_parameters(replace(uncertainty, identifiability=known), parameters)
+
+
+def interval_or_bounds(own: Uncertainty, parameter: FreeParameter) -> tuple[float, float]:
+    """Return an interval whose open sides end at the bounds."""
+    low, high = own.interval or (None, None)
+    return parameter.low if low is None else low, parameter.high if high is None else high
 
 
 def of_profiles(

@@ -14,7 +14,6 @@ from exfit import estimate
 from exfit.analysis.intervals.profile_hull import FoundMinimum
 from exfit.estimate.lockstep import finish_all
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import SideBySide
 from exfit.signals import SIGNALS
@@ -71,7 +70,7 @@ def minima_between_samples(problem: FitProblem, x: Array) -> list[FoundMinimum]:
                 bounds=(within_low, within_high),
                 method="lm-then-dgn",
                 max_iterations=MOST_ITERATIONS,
-                x_scale=UNIT,
+                x_scale=problem.residuals.units,
             )
             beside = BESIDE_SAMPLE * instant.experiment.simulator.step
             for value in (first + beside, last - beside):

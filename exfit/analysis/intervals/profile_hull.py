@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.fitting.global_search import SearchResult
-from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals, SideBySide
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def profiles_about(
             residuals.bounds,
             beside=None if minimum is solution else beside(solution, profiles),
             points=points,
-            x_scale=UNIT,
+            x_scale=residuals.units,
             watch=progress,
         )
         interrupted = not all(map(complete, about_minimum))

@@ -20,7 +20,6 @@ from exfit.case.schema import ChannelSection, Recording
 from exfit.dsp.noise import noise
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -288,7 +287,7 @@ def _fitted(setup: ExperimentSetup, residuals: Residuals, values: Values) -> Win
         bounds=own.bounds,
         method="lm-then-dgn",
         max_iterations=MOST_ITERATIONS,
-        x_scale=UNIT,
+        x_scale=own.units,
     )
     best = descent.run(own.start)
     if best.stop is estimate.Stop.INTERRUPTED:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.fitting.parameters import UNIT, FreeParameter, Prior
+from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.fitting.uncertainty import shared_reason
 from exfit.inference import (
     Confidence,
@@ -198,7 +198,7 @@ def profiled(
             form.bounds,
             points=POINTS_OF_PROFILE,
             workers=1,
-            x_scale=UNIT,
+            x_scale=units_of(form.free),
         )
         profiles |= {form.free[each.index].name: PointProfile(form, each) for each in made}
     return profiles
@@ -212,7 +212,7 @@ def descended(problem: PointProblem, theta: Array) -> estimate.Result:
         problem.jacobian,
         problem.bounds,
         STRATEGY,
-        x_scale=UNIT,
+        x_scale=units_of(problem.free),
         jacobian_error=DIFFERENCE_ERROR,
     )
 

@@ -118,7 +118,7 @@ def saturation_curve(
         ifd=ifd,
         direction=direction,
     )
-    return replace(result, notes=tuple(notes(result)))
+    return replace(result, notes=tuple(notes(result))).as_judged()
 
 
 def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from exfit.analysis.steady.field_on_load import field_on_load
 from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad, base_of
 from exfit.analysis.steady.v_curve import v_curve
-from exfit.case.bounds import search_bounds
-from exfit.case.schema import FreeSection, PointColumn, SteadyTest, Unknown
+from exfit.case.schema import PointColumn, SteadyTest, Unknown
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.parameters import FreeParameter, Prior
+from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
-from exfit.models.sheet import Parameter
 from exfit.records.points import Points
 from exfit.records.units import needs_base
 from exfit.results.v_curve import VCurve
@@ -87,10 +85,3 @@ def measurement_of(
     high = start * FARTHEST_BASE if base.max is None else base.max
     free = FreeParameter(base_of(signal), min(max(start, low), high), low, high, logarithmic=True)
     return FieldMeasurement(measured, unit, free.start, column.noise, free)
-
-
-def free_parameter(symbol: str, section: FreeSection, row: Parameter) -> FreeParameter:
-    """Return a parameter of a machine as a fit moves it."""
-    prior = None if section.prior is None else Prior(section.prior.mean, section.prior.sigma)
-    bounds = search_bounds(section.min, section.max, row)
-    return FreeParameter(symbol, section.start, *bounds, section.scale == "log", prior)

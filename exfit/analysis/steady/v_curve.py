@@ -66,6 +66,9 @@ def v_curve(
     }
     fitted = {} if fit is None else _parameters(fields, problem.free, fit)
     machine_data = {symbol: values[symbol] for symbol in data}
+    verdict = _verdict(readings, fitted, fit, causes_of(fields, values, problem))
+    if verdict.misfit:
+        fitted = {name: each.without_interval(verdict.no_interval) for name, each in fitted.items()}
     return VCurve(
         machine=machine.name,
         p=points.p,
@@ -75,7 +78,7 @@ def v_curve(
         given=dict(data),
         machine_data=machine_data,
         parameters=fitted,
-        verdict=_verdict(readings, fitted, fit, causes_of(fields, values, problem)),
+        verdict=verdict,
         undetermined=() if fit is None else fit.undetermined,
         notes=() if fit is None else fit.notes,
         levels=tuple(power_levels(machine, machine_data, points)),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.analysis.translation.start import StartValue
 from exfit.analysis.translation.steps import TranslationTask
-from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Model, Parameter
@@ -61,7 +61,7 @@ def search(
         bounds=residuals.bounds,
         max_iterations=ITERATIONS,
         ftol=GAIN,
-        x_scale=UNIT,
+        x_scale=residuals.units,
     )
     minima = estimate.multistart(_best_starts(residuals, effort), [descent], watch=watch)
     if minima.interrupted:

@@ -30,22 +30,22 @@ def carried_noise(
     recorded inputs, or where the response to them diverges.
     """
     experiment, at = setup.experiment, setup.with_start_values(values)
-    simulator = experiment.with_inputs(at)
-    if not simulator.inputs.recorded:
+    if not experiment.simulator.inputs.recorded:
         return []
-    parameters, generator = experiment.parameters(at), np.random.default_rng(SEED)
+    generator = np.random.default_rng(SEED)
     steady = -np.inf if setup.test.steady is None else setup.test.steady
 
-    def response(simulator: Simulator) -> Array:
-        return simulator.samples(parameters, experiment.signals)[0]
+    def noisy_response() -> Array:
+        simulator = _noisier(experiment.simulator, generator, steady)
+        return replace(experiment, simulator=simulator).samples(at)[0]
 
     try:
-        usual = response(simulator)
-        noisy = [response(_noisier(simulator, generator, steady)) for _ in range(realisations)]
+        usual = experiment.samples(at)[0]
+        noisy = [noisy_response() for _ in range(realisations)]
     except SimulationError:
         return []
     return [
-        np.stack([channel.filtered(channel.as_recorded(own[:, k] - usual[:, k])) for own in noisy])
+        np.stack([channel.filtered(own[:, k] - usual[:, k]) for own in noisy])
         for k, channel in enumerate(experiment.channels)
     ]
 

@@ -1,16 +1,18 @@
 """What a fit comes to, by one rule, which docs/verdict.md states."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from exfit.analysis.causes import Evidence, causes_of
 from exfit.analysis.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.analysis.verdict.residual_tests import residual_tests
-from exfit.analysis.verdict.score_tests import contradictions
+from exfit.analysis.verdict.score_tests import Contradiction, contradictions
 from exfit.estimate import Stop
 from exfit.inference.wording import digits, listed
 from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.recorder_averages import RecorderAverages
 from exfit.results.typical_values import first_of
 from exfit.results.verdict import (
     GOOD,
@@ -26,22 +28,66 @@ from exfit.results.verdict import (
 )
 
 MOST_CAUSES = 5  # that a reader is given
+VALUES = "values of the case"
+UNTESTED = f"interrupted before the {VALUES} were tested"
 OTHER_WAY = -0.3  # correlation of response and record: below it no noise and no lag explains it
 
 
 def verdict_of(evidence: Evidence) -> Verdict:
-    """Return what a fit comes to, why, and the likeliest causes."""
-    tests = residual_tests(evidence)
+    """Return what a fit comes to, why, and the likeliest causes.
+
+    An interruption in what follows the tests of its residuals leaves the verdict as it is.
+    """
+    try:
+        tests = residual_tests(evidence)
+    except KeyboardInterrupt:
+        tests, evidence = (), replace(evidence, interrupted=True)
+        evidence.pace.stopped((), interrupted=True)
     words, reason = _judged(evidence, tests)
-    carried = any(test.carried > NEGLIGIBLE for test in tests)
-    contradicted = contradictions(evidence) if words == GOOD and not carried else []
-    if contradicted:
-        words, reason = MATCHES, contradicted[0].reason
     matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)
+    averages = evidence.averages
+    good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
+    contradicted: list[Contradiction | RecorderAverages] = []
+    try:
+        contradicted += _contradictions(evidence, tests) if good_but_for_averages else ()
+    except KeyboardInterrupt:
+        words, reason = MATCHES, UNTESTED
+        evidence.pace.stopped((VALUES,), interrupted=True)
+    contradicted += _shown(averages, matched, reason)
+    contradicted.sort(key=lambda each: -each.likelihood)
+    if contradicted and good_but_for_averages:
+        words, reason = MATCHES, contradicted[0].reason
     causes = (*(each.cause for each in contradicted), *causes_of(evidence, matched))
     if words == MATCHES:
-        causes = (*causes, *_undetermined(evidence))
+        causes = (*causes, *_in_doubt(averages), *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
+
+
+def _contradictions(evidence: Evidence, tests: Sequence[ResidualTests]) -> list[Contradiction]:
+    """Values of the case that the record contradicts, none where its noise is carried."""
+    carried = any(test.carried > NEGLIGIBLE for test in tests)
+    return [] if carried else contradictions(evidence)
+
+
+def _shown(
+    averages: RecorderAverages | None, matched: bool, reason: str
+) -> tuple[RecorderAverages, ...]:
+    """Averages that the record shows, unless a trial is to name them."""
+    if averages is None or not averages.shown:
+        return ()
+    return (averages,) if matched or averages.reason in reason else ()
+
+
+def _in_doubt(averages: RecorderAverages | None) -> Iterator[Cause]:
+    """Yield that the recorder may average, where that matters and the record does not show it."""
+    if averages is not None and averages.matters and not averages.shown:
+        yield averages.cause
+
+
+def verdict_alone(evidence: Evidence) -> Verdict:
+    """Return what a fit comes to and why, by its residuals alone: without causes."""
+    tests = residual_tests(evidence)
+    return Verdict(*_judged(evidence, tests), residuals=tests)
 
 
 def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[VerdictWords, str]:
@@ -121,6 +167,8 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
             yield f"{match.name} is not accepted"
     if evidence.typical_values:
         yield f"typical values matter: {first_of([*evidence.typical_values])}"
+    if evidence.averages is not None and evidence.averages.matters:
+        yield evidence.averages.reason
     yield from _not_noise(tests, evidence)
     if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
         yield "the search ended before a minimum"

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.causes import Evidence
-from exfit.analysis.causes.channels import CHECK_BASE, CHECK_ZERO, LEAVE_VT0_OUT, is_found
+from exfit.analysis.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
 from exfit.analysis.causes.linear import LinearFit, blocks, linear_model, moving
-from exfit.analysis.causes.steps import CORRECT_INSTANT, CORRECT_STEP
+from exfit.analysis.causes.steps import correct_instant, correct_step
 from exfit.analysis.causes.trials import Opened, freed_within, with_freed, with_opened
 from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
 from exfit.analysis.intervals.typical_values import parameters_of
@@ -214,7 +214,7 @@ def _held_value(evidence: Evidence, names: Sequence[str]) -> Held:
     words = listed([f"{name} = {fixed[name]:.4g}" for name in names])
     return Held(
         words,
-        remedy_of(names),
+        remedy_of(evidence.case, {name: fixed[name] for name in names}),
         rare=0.0 if of_machine(names) else RARE,
         std_error=max(std_errors.get(name, 0.0) / abs(fixed[name]) for name in names),
     )
@@ -234,9 +234,13 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
     for place, step in enumerate(steps):
         if step.step and ("step", place) not in found:
             words = f"the step of {step.step:+g} pu{of_record}"
-            yield Held(words, CORRECT_STEP, step.step), opened("step", step.step, place)
+            yield (
+                Held(words, correct_step([step.step]), step.step),
+                opened("step", step.step, place),
+            )
     if not kinds & {"at", "shift", "delay"} and steps:
-        held = Held(f"the instant of the step{of_record}", CORRECT_INSTANT, unit="s")
+        remedy = correct_instant(experiment.simulator.delay)
+        held = Held(f"the instant of the step{of_record}", remedy, unit="s")
         yield held, opened("delay", experiment.simulator.delay)
     if VT0 in experiment.own and "vt0" not in kinds:
         given = evidence.records[number].given_vt0
@@ -271,4 +275,4 @@ def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Arra
                 rare = RARE if channel.signal == "vt" else 0.0
                 yield Held(f"the base of {place}", CHECK_BASE, rare=rare), simulated
             if channel.signal != "vt" and not is_found(experiment, channel, "offset"):
-                yield Held(f"the zero of {place}", CHECK_ZERO, unit="pu"), constant
+                yield Held(f"the zero of {place}", check_zero(channel), unit="pu"), constant

@@ -10,7 +10,10 @@ from exfit.util.text import show
 def bound_faults(section: ContentNode) -> Iterator[Fault]:
     """Yield why ``start``, ``min`` and ``max`` of a section contradict each other."""
     start, low, high = (section.at(key).number for key in ("start", "min", "max"))
-    if low is not None and high is not None and low >= high:
+    if section.content.get("bounds") == "none":
+        given = [key for key in ("min", "max") if key in section]
+        yield from (section.at(key).fault("not allowed with bounds: none") for key in given)
+    elif low is not None and high is not None and low >= high:
         yield section.at("min").fault(f"{show(low)} is not below max = {show(high)}")
     elif start is not None and _outside(start, low, high):
         limits = " ... ".join("?" if limit is None else show(limit) for limit in (low, high))

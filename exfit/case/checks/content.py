@@ -39,12 +39,12 @@ from exfit.util.strategies import DEFAULT_SEARCH
 
 WITH_PARAMETERS = ("parameters", "plant", "stabiliser", "governor")
 LM_UPDATES = {
-    "radius": "radius",
-    "nu": "ratio",
-    "nu_min": "ratio",
-    "increase": "ratio",
-    "decrease": "ratio",
-}  # settings of Levenberg-Marquardt by the update that uses them
+    "radius": ("radius",),
+    "nu": ("ratio", "armijo"),
+    "nu_min": ("ratio",),
+    "increase": ("ratio",),
+    "decrease": ("ratio",),
+}  # settings of Levenberg-Marquardt by the updates that use them
 
 
 def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[Fault]:
@@ -91,7 +91,8 @@ def _fact_faults(about: ContentNode) -> Iterator[Fault]:
 def _missing_test_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield tests that are missing, and one that is given beside several records."""
     several = (*content.at("records").entries, *content.at("validate").entries)
-    for recording in several if "records" in content else (content, *several):
+    own_test = "records" not in content and not _validates_alone(content)
+    for recording in (content, *several) if own_test else several:
         if "test" not in recording and recording.is_section and not kind.finds_rest:
             yield recording.at("test").fault("is missing")
     if "records" not in content:
@@ -99,6 +100,11 @@ def _missing_test_faults(content: ContentNode, kind: PlantKind) -> Iterator[Faul
     for key in ("test", "record"):
         if key in content:
             yield content.at(key).fault("not allowed with records: each of them has its own")
+
+
+def _validates_alone(content: ContentNode) -> bool:
+    """Return whether a case has records under validate, and none to fit."""
+    return "record" not in content and bool(content.at("validate").entries)
 
 
 def _kind(recording: ContentNode, kind: PlantKind) -> PlantKind:
@@ -136,7 +142,7 @@ def _recording_faults(
         yield from level_faults(record.at("channels"), plant.at("network"), kind)
     elif kind.plays_back:
         yield record.fault(f"is missing: plant {kind.name} plays it back")
-    elif recording is content:
+    elif recording is content and not _validates_alone(content):
         yield from missing_without_record(test)
 
 
@@ -144,14 +150,15 @@ def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
     """Yield settings that nothing uses."""
     estimate = content.at("estimate")
     jacobian = estimate.content.get("jacobian", "exact")
-    if "difference_step" in estimate and jacobian == "exact":
-        differences = "central, forward or backward"
-        yield estimate.at("difference_step").fault(f"only with estimate.jacobian: {differences}")
+    for key in ("difference_step", "differences"):
+        if key in estimate and jacobian == "exact":
+            differences = "central, forward or backward"
+            yield estimate.at(key).fault(f"only with estimate.jacobian: {differences}")
     lm = estimate.at("lm")
     update = lm.content.get("update", "radius")
     for key, needed in LM_UPDATES.items():
-        if key in lm and update in LM_UPDATES.values() and update != needed:
-            yield lm.at(key).fault(f"only with estimate.lm.update: {needed}")
+        if key in lm and update in ("radius", "ratio", "armijo") and update not in needed:
+            yield lm.at(key).fault(f"only with estimate.lm.update: {' or '.join(needed)}")
     if "starts" in estimate and estimate.content.get("search", DEFAULT_SEARCH) == "local":
         yield estimate.at("starts").fault("only with estimate.search: global")
     if (

@@ -149,10 +149,17 @@ def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]
 def _scale_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
     """Yield what the scale of a search lacks: a bound above 0, or a size by which to search."""
     start, low, high = (section.at(key).number for key in ("start", "min", "max"))
-    lowest, highest = search_bounds(low, high, row)
-    if section.content.get("scale", "log") == "linear":
+    unbounded = section.content.get("bounds") == "none"
+    lowest, highest = search_bounds(low, high, None if unbounded else row)
+    scale = section.content.get("scale", "log")
+    if scale == "start" and start == 0.0:
+        yield section.at("start").fault("0 is no size by which to search: use another scale")
+    elif scale != "log":
         if start == 0.0 and not isfinite(highest - lowest) and lowest in (0.0, -inf):
             yield section.at("start").fault("0 gives no size by which to search: give min and max")
+    elif unbounded:
+        text = "none leaves no min above 0, as scale: log needs: use scale: linear, start or raw"
+        yield section.at("bounds").fault(text)
     elif low is not None and low <= 0.0:
         text = f"{show(low)} is not above 0, as scale: log needs; or scale: linear"
         yield section.at("min").fault(text)
@@ -169,7 +176,8 @@ def _bypass_faults(time: ContentNode) -> Iterator[Fault]:
         text = f"{show(low)} is below {limit}; a free time must not cross it"
         yield time.at("min").fault(text)
     elif "min" not in time and start is not None and start < SHORTEST:
-        yield time.at("start").fault(f"{show(start)} is below {limit}; give a min as well")
+        advice = "" if time.content.get("bounds") == "none" else "; give a min as well"
+        yield time.at("start").fault(f"{show(start)} is below {limit}{advice}")
 
 
 def _prior_faults(prior: ContentNode) -> Iterator[Fault]:

@@ -95,10 +95,11 @@ class DgnSection(Section):
 class LmSection(Section):
     """Settings of Levenberg-Marquardt."""
 
-    update: Literal["radius", "ratio"] = Field(
+    update: Literal["radius", "ratio", "armijo"] = Field(
         default="radius",
         description="What the damping follows: the radius of a trust region, or, as in textbooks, "
-        "the ratio of achieved to promised decrease.",
+        "the ratio of achieved to promised decrease; or, with armijo, the norm of the gradient, "
+        "and steps are cut in half until Armijo's rule holds.",
     )
     radius: Positive = Field(
         default=0.5,
@@ -107,8 +108,8 @@ class LmSection(Section):
     )
     nu: NotNegative | None = Field(
         default=None,
-        description="Damping at the start; default: the norm of the gradient there. "
-        "update: ratio only.",
+        description="Damping at the start, with armijo everywhere; default: the norm of the "
+        "gradient there. update: ratio or armijo only.",
     )
     nu_min: Positive = Field(
         default=1e-3,
@@ -156,6 +157,11 @@ class Estimate(Section):
         "the parameter, on the linear scale of the width of its bounds; default: 6.1e-6, and "
         "1.5e-8 for forward and backward.",
     )
+    differences: Literal["absolute", "relative"] = Field(
+        default="absolute",
+        description="Whether h is the step itself or, on any scale, a share of the parameter's "
+        "value; where that is 0, h is the step.",
+    )
     iterations: IterationLimit = Field(
         default=MOST_ITERATIONS,
         description="Largest number of iterations in each phase of the strategy: one number, or "
@@ -172,7 +178,7 @@ class Estimate(Section):
     armijo: Annotated[Finite, Field(gt=0, lt=0.5), USABLE] = Field(
         default=1e-4,
         description="Share of the promised decrease of the cost that a trial must achieve: "
-        "Armijo's constant of dgn; lm with update: radius uses it, too.",
+        "Armijo's constant of dgn; lm uses it, too, unless with update: ratio.",
     )
     dgn: DgnSection = Field(
         default_factory=DgnSection, description="Settings of damped Gauss-Newton."
@@ -203,6 +209,12 @@ class Estimate(Section):
     starts: Annotated[Count, Field(le=MOST_STARTS)] = Field(
         default=FURTHER_STARTS,
         description="Number of further starts of the global search.",
+    )
+    causes: NotNegative | None = Field(
+        default=None,
+        description="Processor time, s, that the search for the causes of a misfit may take, of "
+        "which trials need most. Default: 30, or three times what the fit took until then if that "
+        "is more.",
     )
 
     @property

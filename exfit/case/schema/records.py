@@ -18,7 +18,16 @@ from exfit.case.schema.columns import Filter, Time
 from exfit.case.schema.phasors import PhasorsSection, StatusSection
 from exfit.case.schema.plants import AloneOnLoad, OffLine, OnLine
 from exfit.case.schema.tests import BumpTest
-from exfit.case.schema.values import Count, Findable, Number, Positive, Section, Text, thawed
+from exfit.case.schema.values import (
+    Count,
+    Findable,
+    NotNegative,
+    Number,
+    Positive,
+    Section,
+    Text,
+    thawed,
+)
 from exfit.signals import RECORDED
 from exfit.util.file_names import LONGEST_NAME
 
@@ -60,11 +69,11 @@ class Compared(Section):
         description="Leaves out samples that are farther from the running median than this many "
         "standard deviations of the noise.",
     )
-    averaged: Positive | None = Field(
+    averaged: NotNegative | None = Field(
         default=None,
         description="Length over which the recorder averages around each sample, s; the simulation "
         "is averaged in the same way. If it averages over the time before the sample, give half "
-        "of this length as delay.",
+        "of this length as delay. 0: it does not average.",
     )
     sine: SineSection | None = Field(
         default=None,
@@ -176,6 +185,11 @@ class RecordFile(Section):
     )
     gaps: Literal["refuse", "skip"] = Field(
         default="refuse", description="Whether samples without a value are refused or left out."
+    )
+    repeats: Literal["refuse", "first", "last"] = Field(
+        default="refuse",
+        description="Which of several rows with one time stamp is used; rows that are alike are "
+        "one, whatever it is.",
     )
     resample: Positive | None = Field(
         default=None,

@@ -41,6 +41,11 @@ class AsFoundSection(Section):
         description="Its values: KA of the exciter, machine.H, stabiliser.KS. What is missing is "
         "as in the case; of another exciter it has its typical value.",
     )
+    unused: Frozen[Number] = Field(
+        default_factory=nothing,
+        description="Values of its records that the planner's program reads and does without, such "
+        "as TA of ST3C in PSS/E: 0 in the case; an export writes them back.",
+    )
 
 
 class CriteriaSection(Section):

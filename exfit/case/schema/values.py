@@ -147,8 +147,15 @@ class FreeSection(Section):
     max: Number | None = Field(
         default=None, description="Upper bound; default: as far as the equations allow."
     )
-    scale: Literal["log", "linear"] = Field(
-        default="log", description="Scale on which it is fitted; log requires min > 0."
+    bounds: Literal["equations", "none"] = Field(
+        default="equations",
+        description="What ends the search without min or max: the limits of the equations, or "
+        "nothing; none allows neither min nor max.",
+    )
+    scale: Literal["log", "linear", "start", "raw"] = Field(
+        default="log",
+        description="Scale on which it is fitted: its logarithm, which requires min > 0; its share "
+        "of the width of its bounds, or of its start; or the parameter itself.",
     )
     prior: PriorSection | None = Field(
         default=None, description="Prior knowledge, which adds one residual."

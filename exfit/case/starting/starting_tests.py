@@ -7,7 +7,7 @@ from typing import NamedTuple, NoReturn
 
 from exfit.case.starting.bases import Base
 from exfit.errors import ExfitError, FileError
-from exfit.records.contradictions import LARGEST_STEP, size_in_words
+from exfit.records.contradictions import LARGEST_STEP, sign_disputed_by, size_in_words
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
 from exfit.records.rejection import REMEDY, BreakerOpening
@@ -190,14 +190,18 @@ def _refuse_rejection(inspection: Inspection, opening: BreakerOpening) -> NoRetu
 def _sized(
     inspection: Inspection, test: DetectedTest, index: int, amount: float | None
 ) -> float | None:
-    """Return the size (pu) of a step; raises ExfitError where the record contradicts it."""
+    """Return the size (pu) of a step, None where it, or the way it went, is open.
+
+    Raises ExfitError where the record contradicts it.
+    """
     if amount is None:
         return None
     change = test.changes[index]
     place = f"{inspection.path}: step {amount:g} at {test.steps[index].at:.4g} s"
     _refuse_impossible(place, amount)
     if change is None:
-        return amount if index == 0 else None
+        disputed = sign_disputed_by(inspection.channels, inspection.steps, test.steps[index])
+        return amount if index == 0 and (amount < 0.0 or not disputed) else None
     if index == 0 and amount < 0.0 < change:
         raise ExfitError(f"{place}: vt rises there, by {100.0 * change:.2g} %")
     return copysign(amount, change)

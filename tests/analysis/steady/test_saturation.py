@@ -135,9 +135,11 @@ def test_what_is_extrapolated_is_not_good():
 def test_points_that_lie_far_beside_their_curve_do_not_match_it():
     vt, ifd = noisy_loop()
     scattered = ifd * (1.0 + 0.1 * np.resize([1.0, -1.0], len(ifd)))  # five times the limit
-    verdict = saturation_curve(vt, scattered).verdict
-    assert verdict.verdict == NO_MATCH
-    assert "pu rms beside a curve of form quadratic, beyond" in verdict.reason
+    result = saturation_curve(vt, scattered)
+    assert result.verdict.verdict == NO_MATCH
+    assert "pu rms beside a curve of form quadratic, beyond" in result.verdict.reason
+    for value in (result.curve.ifd_base, result.curve.S10, result.curve.S12):
+        assert (value.interval, value.why) == ((None, None), result.verdict.no_interval)
 
 
 def test_a_misread_point_is_named():

@@ -107,6 +107,16 @@ def test_what_would_match_is_named_alone_whatever_the_bounds_of_what_is_fitted(l
     assert cause.cause.startswith("the points are matched much better by Xd = 1.07")
 
 
+def test_what_is_fitted_to_points_that_do_not_match_has_no_interval():
+    measured = points()
+    turned = measured._replace(q=-measured.q)
+    curve = v_curve(SALIENT, TRUTH, turned, [free("Xd", 1.2, 0.4, 4.0)])
+    assert curve.verdict.verdict == "no match"
+    assert curve.determined == ()
+    (parameter,) = curve.parameters.values()
+    assert (parameter.interval, parameter.why) == (None, curve.verdict.no_interval)
+
+
 def test_values_lead_back_to_the_saliency_that_is_searched_in_place_of_xq():
     fields = FieldsOnLoad(SALIENT, points())
     problem = fields.problem(TRUTH, [free("Xq", 0.7, 0.3, 1.2)])
