@@ -191,7 +191,8 @@ def _simulated(
         simulator = setup.experiment.with_inputs(setup.with_start_values(values))
         simulated = simulation_notes(case, simulator, at, response)
         by_twin = simulation_by_twin_notes(case, simulator, response.signals)
-        return SimulationResult(response, comparison, (*simulated, *notes, *by_twin))
+        left_out = setup.record.notes
+        return SimulationResult(response, comparison, (*left_out, *simulated, *notes, *by_twin))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     simulator = with_enough_substeps(simulator, at, case.path)

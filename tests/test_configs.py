@@ -1,14 +1,20 @@
 """The cases that come with exfit: each runs as it stands, and each model has one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from places import CONFIGS
+from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.fitting.recordings import measured
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.workflows import simulate
+from exfit.workflows import fit, simulate
+
+CASES = sorted(CONFIGS.glob("*.yaml"))
+MANY = 64  # starts, that find the lowest cost
 
 
 def test_a_model_has_a_case_of_its_typical_data(model):
@@ -26,9 +32,20 @@ def test_no_case_is_left_of_a_model_that_is_gone():
     assert {path.stem.upper() for path in (CONFIGS / "models").iterdir()} == set(MODELS)
 
 
-@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_a_case_reads_and_its_records_are_there(path):
     case = load_case(path)
     assert case.recordings
     for one in (*case.recordings, *case.validations):
         assert measured(case, one.test, one.record).time.size > 100
+
+
+@pytest.mark.parametrize("name", few_of([path.stem for path in CASES], 2))
+def test_a_case_is_fitted_well_at_its_lowest_cost_and_its_validations_hold(name):
+    case = load_case(CONFIGS / f"{name}.yaml")
+    result = fit(case)
+    assert result.holds, result.verdict
+    assert all(match.accepted for match in result.validation)
+    many = case.estimate.model_copy(update={"starts": MANY})
+    lowest = fit(replace(case, estimate=many, validations=(), accept=None)).cost
+    assert result.cost <= 1.005 * lowest

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 from matplotlib.figure import Figure
-from places import ROOT
+from places import REFERENCE, ROOT
 from test_layers import MAY_IMPORT
 
 import exfit
@@ -289,17 +289,24 @@ def test_the_table_of_sources_says_of_each_model_of_2016_what_its_file_does():
     of_2016 = " ".join(row.split("|")[3] for row in listed.splitlines()).split()
     older = {"DC3A", "PSS1A"}  # which the edition of 2016 did not change
     _, _, table = text.partition("| model | diagrams |")
-    rows = [row.split("|")[1:3] for row in table.partition("\n\n")[0].splitlines()[2:]]
+    rows = [row.split("|")[1:4] for row in table.partition("\n\n")[0].splitlines()[2:]]
+    rows = [[cell.strip() for cell in row] for row in rows]
     shelves = {**MODELS, **STABILISERS, **LIMITERS}
-    doubts = {name.strip(): shelves[name.strip()].doubt for name, _ in rows}
+    doubts = {name: shelves[name].doubt for name, _, _ in rows}
     assert set(doubts) == {*of_2016} - older
     assert len(rows) == len(doubts)
-    for name, diagrams in rows:
-        doubt = doubts[name.strip()]
-        one = doubt.startswith("rests on one public diagram")
-        expected = "one" if one else "two that differ" if doubt else "two"
-        assert diagrams.strip() == expected, name
+    for name, diagrams, curve in rows:
+        if doubts[name]:
+            one = doubts[name].startswith("rests on one public diagram")
+            assert diagrams == ("one" if one else "two that differ"), name
+        else:  # a curve settles what one diagram, or two that differ, leave open
+            assert diagrams == "two" or curve, name
     assert all(model.doubt == "" for name, model in shelves.items() if name not in doubts)
+    compared = {name: curve for name, _, curve in rows if curve in ("PowerWorld", "PSS/E")}
+    for program, beginning in (("PowerWorld", "powerworld_"), ("PSS/E", "psse_")):
+        files = REFERENCE.glob(f"{beginning}*.csv")
+        held = {path.stem.split("_")[1].upper() for path in files} & set(doubts)
+        assert held == {name for name, curve in compared.items() if curve == program} - {"OEL2C"}
 
 
 @pytest.mark.long

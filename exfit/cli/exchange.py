@@ -1,7 +1,6 @@
 """The commands import and export."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -12,9 +11,6 @@ from exfit.cli.play_in import export_play_in
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
-
-if TYPE_CHECKING:
-    from exfit.results.model import FitResult
 
 MOST_BUSES = 999_999
 BUSES = click.IntRange(1, MOST_BUSES)
@@ -183,6 +179,7 @@ def _export_one(
 ) -> None:
     """Write the records of one fit, at the bus that is given, or where they were found."""
     from exfit.exchange.export import export as exported
+    from exfit.exchange.export import place_of
     from exfit.exchange.formats import FORMATS, format_of
     from exfit.results.io import load_result, result_file
 
@@ -190,10 +187,12 @@ def _export_one(
         refuse_existing(output, force)
     source = result_file(result)
     fit = load_result(source)
-    own_bus, own_id = _place_as_found(fit, source)
     try:
+        if bus is None or machine_id is None:
+            own_bus, own_id = place_of(fit)
+            bus, machine_id = bus or own_bus, machine_id or own_id
         files = format_of(output or "") if form is None else FORMATS[form]
-        records = exported(fit, bus or own_bus, machine_id or own_id, model, files=files)
+        records = exported(fit, bus, machine_id, model, files=files)
     except ExfitError as fault:
         texts = (f"{source}: {text}" for text in str(fault).splitlines())
         raise FileError(texts) from None
@@ -202,27 +201,9 @@ def _export_one(
         echo(f"written to {output}")
 
 
-def _place_as_found(fit: "FitResult", source: Path) -> tuple[int, str]:
-    """Return the bus and the machine id of a unit where it was found, 1 where that is not said.
-
-    Raises ExfitError for what no record can hold.
-    """
-    found = fit.as_found
-    place = (None, None) if found is None else (found.bus, found.machine_id)
-    bus, machine_id = (1 if place[0] is None else place[0]), place[1] or "1"
-    if not 1 <= bus <= MOST_BUSES or not _is_machine_id(machine_id):
-        raise ExfitError(
-            f"{source}: as_found: bus {bus}, id {machine_id!r} are not those of a record; "
-            "give them with --bus and --id"
-        )
-    return bus, machine_id
-
-
-def _is_machine_id(text: str) -> bool:
-    return 1 <= len(text) <= 2 and text.isascii() and text.isalnum()
-
-
 def _machine_id(value: str | None) -> str | None:
-    if value is not None and not _is_machine_id(value):
+    from exfit.exchange.file_format import is_machine_id
+
+    if value is not None and not is_machine_id(value):
         raise click.BadParameter(f"{value!r} is not one or two letters or digits.")
     return value

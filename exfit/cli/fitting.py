@@ -73,8 +73,9 @@ def fit(
 
     Several cases, or several strategies, are all checked first, then fitted one after the other,
     every case with every strategy: each fit has a folder CASE-STRATEGY in runs/fits, or in DIR,
-    and fits.csv, fits.json and fits.png there show them side by side. Ctrl-C ends them and keeps
-    what is done. Exit code 3: not all are done and well.
+    and fits.csv, fits.json and fits.png there show them side by side. Several strategies are
+    compared by the descent from the start of each case alone, unless --search or the case says how
+    far to search. Ctrl-C ends them and keeps what is done. Exit code 3: not all are done and well.
 
     With --watch it fits again when CASE, its model file, one of its records or the file of
     --parameters changes, and shows the former values beside the new ones; a case with a fault

@@ -101,6 +101,9 @@ def _report(plan: "ImportPlan", units: "Sequence[ImportedUnit]", folder: Path) -
         echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
     for line in first_texts(_lines_of(units, NO_MODEL)):
         echo(f"no model: {line}", err=True)
+    if plan.units.classical:
+        count = f"{plan.units.classical} GENCLS without an exciter"
+        echo(f"not units to verify: {count}, constant voltages behind a reactance", err=True)
     refused = [*_lines_of(units, REFUSED), *plan.faults]
     if refused:
         raise FileError(refused)

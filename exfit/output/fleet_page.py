@@ -3,24 +3,29 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any, get_args
 
 from exfit.fleet.folder import Fleet
-from exfit.fleet.sisters import OUTLIER, WITHOUT_INTERVAL, SisterGroup, SisterParameter, SisterValue
+from exfit.fleet.sisters import (
+    OUTLIER,
+    SisterGroup,
+    SisterParameter,
+    SisterValue,
+    missing_interval,
+)
 from exfit.fleet.summary import CaseSummary, SummaryCurve, SummaryParameter
 from exfit.inference.outliers import FEWEST, LEVEL
 from exfit.output.fleet_pictures import HEIGHT, WIDTH, Thumbnail, picture
 from exfit.output.report.page import TEMPLATES, environment
 from exfit.results.side_by_side import NOT_ACCEPTED
 from exfit.results.verdict import GOOD, MATCHES, VerdictWords
-from exfit.util.text import rounded
 
 REPORT, RESULT, FAILED = "report.html", "result.json", "failed.json"
 MOST_PICTURES = 3  # of a case: more are in its report
 MOST_SISTERS = 40  # of a table; of more units only those that stand out are in it
-ERRORS_IN_INTERVAL = 4.0  # standard errors: as many digits as the interval allows
 STATUSES = ("failed", "timed out", "crashed", "refused", "not run", "no record")
 VERDICTS: Sequence[str] = (*get_args(VerdictWords), NOT_ACCEPTED, "interrupted")
 STYLES: Mapping[str, str] = {GOOD: "good", MATCHES: "fair", "no record": "none", "not run": "none"}
@@ -50,11 +55,20 @@ class CaseView:
 
 
 @dataclass(frozen=True)
+class SisterCell:
+    """A parameter of a unit among its sisters, with its value and its interval in words."""
+
+    value: SisterValue
+    text: str
+    interval: str
+
+
+@dataclass(frozen=True)
 class SisterRow:
-    """A unit among its sisters: its name, and a value of each parameter, None where it has none."""
+    """A unit among its sisters: its name, and a cell for each parameter, None where it has none."""
 
     name: str
-    values: tuple[SisterValue | None, ...]
+    cells: tuple[SisterCell | None, ...]
 
 
 @dataclass(frozen=True)
@@ -87,8 +101,6 @@ def fleet_page(fleet: Fleet, groups: Sequence[SisterGroup]) -> str:
         height=HEIGHT,
         css="".join(_template(name) for name in ("report.css", "fleet.css")),
         script=_template("fleet.js"),
-        value_words=_value_words,
-        interval_words=_interval,
     )
     return text
 
@@ -164,32 +176,36 @@ def _parameter_view(
     if name in case.unresolved:
         marks.append("unresolved")
     elif value.low is None and value.high is None:
-        marks.append(WITHOUT_INTERVAL)
-    error = _error(value.low, value.high)
+        marks.append(missing_interval(case, name))
     unit = "" if value.unit in ("", "pu", "-") else f" {value.unit}"
     return ParameterView(
-        name, rounded(value.value, error) + unit, _interval(value), ", ".join(marks)
+        name, value.rounded(value.value) + unit, _interval(value), ", ".join(marks)
     )
 
 
-def _error(low: float | None, high: float | None) -> float | None:
-    return None if low is None or high is None else (high - low) / ERRORS_IN_INTERVAL
-
-
-def _interval(value: SummaryParameter | SisterValue) -> str:
+def _interval(value: SummaryParameter) -> str:
     """Return the interval of a value in words, in the digits that it allows itself."""
-    error = _error(value.low, value.high)
     if value.low is not None and value.high is not None:
-        return f"{rounded(value.low, error)} … {rounded(value.high, error)}"
+        return f"{value.rounded(value.low)} … {value.rounded(value.high)}"
     if value.low is not None:
-        return f"above {rounded(value.low)}"
-    return "" if value.high is None else f"below {rounded(value.high)}"
+        return f"above {value.rounded(value.low)}"
+    return "" if value.high is None else f"below {value.rounded(value.high)}"
+
+
+def _cell(case: CaseSummary, name: str, values: Mapping[str, SisterValue]) -> SisterCell | None:
+    """Return a parameter of a unit; ``values`` are those of its sisters by case."""
+    value = values.get(case.name)
+    if value is None:
+        return None
+    own = case.fitted[name]
+    return SisterCell(value, own.rounded(own.value), _interval(own))
 
 
 def _sister_view(group: SisterGroup) -> SisterView:
     columns = [{value.case: value for value in p.values} for p in group.parameters]
+    names = [parameter.name for parameter in group.parameters]
     rows = [
-        SisterRow(case.name, tuple(column.get(case.name) for column in columns))
+        SisterRow(case.name, tuple(map(partial(_cell, case), names, columns)))
         for case in group.cases
     ]
     if len(rows) <= MOST_SISTERS:
@@ -197,8 +213,3 @@ def _sister_view(group: SisterGroup) -> SisterView:
     remarkable = {value.case for p in group.parameters for value in p.remarkable}
     kept = tuple(row for row in rows if row.name in remarkable)
     return SisterView(group, kept, len(rows) - len(kept))
-
-
-def _value_words(value: SisterValue) -> str:
-    """Return a value in the digits that its interval allows."""
-    return rounded(value.value, _error(value.low, value.high))

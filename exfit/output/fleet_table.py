@@ -8,7 +8,7 @@ import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from exfit.fleet.sisters import SisterGroup, SisterParameter, SisterValue
+from exfit.fleet.sisters import SisterGroup, SisterParameter, SisterValue, missing_interval
 from exfit.fleet.summary import CaseSummary, SummaryParameter
 from exfit.results.tables import DIGITS
 from exfit.signals import SIGNALS
@@ -85,7 +85,7 @@ def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup])
             text_cell(name),
             *_interval(value),
             text_cell(value.unit),
-            *_beside_sisters(compared.get((case.name, name))),
+            *_beside_sisters(compared.get((case.name, name)), missing_interval(case, name)),
         ]
         for case in _by_name(cases)
         for name, value in case.fitted.items()
@@ -99,9 +99,10 @@ def text_cell(text: str) -> str:
     return f"'{line}" if STARTS_FORMULA.match(line) else line
 
 
-def _beside_sisters(place: tuple[SisterParameter, SisterValue] | None) -> list[str]:
+def _beside_sisters(place: tuple[SisterParameter, SisterValue] | None, remark: str) -> list[str]:
+    """Return what the comparison says of a parameter, of one without sisters a remark alone."""
     if place is None:
-        return [""] * len(PARAMETER_COLUMNS[11:])
+        return [""] * len(PARAMETER_COLUMNS[11:-1]) + [remark]
     parameter, value = place
     numbers = (parameter.centre, parameter.spread, value.deviation, value.probability)
     return [str(len(parameter.values)), *map(_number, numbers), text_cell(value.remark)]

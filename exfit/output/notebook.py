@@ -6,7 +6,7 @@ from exfit.errors import ExfitError
 from exfit.output.plots import overlay
 from exfit.output.terminal.terminal import interval, number
 from exfit.results.model import FitResult, FittedParameter
-from exfit.util.text import near, percentage, rounded
+from exfit.util.text import near, percentage
 
 __all__ = ["Figure", "fit_figure", "fit_html"]
 
@@ -44,6 +44,7 @@ def fit_html(result: FitResult) -> str:
 
     template = Environment(autoescape=True, trim_blocks=True).from_string(TABLE)
     causes = () if result.verdict is None else result.verdict.causes
+    no_interval = "" if result.verdict is None else result.verdict.in_place_of_interval
     unresolved = () if result.knowledge is None else result.knowledge.sentences
     return template.render(
         result=result,
@@ -51,7 +52,7 @@ def fit_html(result: FitResult) -> str:
         records=", ".join(comparison.record for comparison in result.comparisons),
         fit_percent=percentage(result.comparison.fit_percent),
         rows=[
-            (parameter.meaning, _cells(name, parameter))
+            (parameter.meaning, _cells(name, parameter, no_interval))
             for name, parameter in result.parameters.items()
         ],
         remarks=[
@@ -62,17 +63,16 @@ def fit_html(result: FitResult) -> str:
     )
 
 
-def _cells(name: str, parameter: FittedParameter) -> tuple[str, ...]:
-    """Return what the table says of a parameter."""
-    digits = parameter.rounding_error
+def _cells(name: str, parameter: FittedParameter, no_interval: str) -> tuple[str, ...]:
+    """Return what the table says of a parameter; ``no_interval`` in place of its interval."""
     note = f" ({parameter.interval_note})" if parameter.interval_note else ""
     bound = f", on its {parameter.at_bound}" if parameter.at_bound else ""
     return (
         name,
         number(parameter.start),
-        f"{rounded(parameter.value, digits)}{bound}",
+        f"{parameter.rounded(parameter.value)}{bound}",
         number(parameter.linear_error, 2),
-        f"{interval(parameter.interval, digits)}{note}",
+        no_interval or f"{interval(parameter.interval, parameter.rounded)}{note}",
         parameter.unit,
     )
 

@@ -46,10 +46,13 @@ def of_fit(result: "FitResult") -> PlannedFigures:
 
     drawings: dict[str, PlannedFigure] = {}
     single = result.comparison.name == SINGLE
+    title = f"{result.name}: {result.model} fitted to "
     if single:
-        title = f"{result.name}: {result.model} fitted to {result.comparison.record}"
-        overlay = partial(plots.overlay, result.comparison, title)
-        drawings["overlay.png"] = PlannedFigure("measured, start values and fitted", overlay)
+        overlay = partial(plots.overlay, result.comparison, title + result.comparison.record)
+    else:
+        title += f"{len(result.comparisons)} records"
+        overlay = partial(plots.overlays, result.comparisons, title)
+    drawings["overlay.png"] = PlannedFigure("measured, start values and fitted", overlay)
     drawings |= of_phase_ends(result)
     if any(match.iteration_responses is not None for match in result.comparisons):
         iterations = partial(plots.iterations, result)

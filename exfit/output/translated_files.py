@@ -6,7 +6,7 @@ from exfit.analysis.translation.steps import network_of
 from exfit.case.starting.suggestion import relative
 from exfit.case.translated_case import translated_case
 from exfit.errors import ExfitError
-from exfit.exchange.export import comment_lines, export
+from exfit.exchange.export import comment_lines, export, place_of
 from exfit.exchange.records import alternatives
 from exfit.models.sheet import Model
 from exfit.plants import INFINITE_BUS, MACHINE, NETWORK, OPEN_CIRCUIT
@@ -38,7 +38,7 @@ def files_of_translation(
 def records_of_translation(translation: Translation, result: FitResult) -> str:
     """Return the PSS/E records of a translation, or a comment that says why there are none."""
     try:
-        return export(result, 1, "1", translation=translation).text
+        return export(result, *place_of(result), translation=translation).text
     except ExfitError as fault:
         texts = [f"No record is written: {text}." for text in str(fault).splitlines()]
         return "\n".join([*(line for text in texts for line in comment_lines(text)), ""])

@@ -1,12 +1,14 @@
 """A simulated response beside its record."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.features import Features, features
-from exfit.dsp.recorded_features import RecordedResponse, recorded_features
+from exfit.dsp.features import Features, RemovedLine, features
+from exfit.dsp.recorded_features import FoundByRecord, RecordedResponse, recorded_features
+from exfit.fitting.experiment import Channel
 from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.comparisons import (
     Comparison,
@@ -27,6 +29,8 @@ from exfit.simulation.limit_hits import limiter_actions
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
+SMALL = 1e-6  # of a move: the instant of a step is linear in what moves it
+
 
 def compare_with_record(
     setup: ExperimentSetup,
@@ -34,11 +38,13 @@ def compare_with_record(
     values: Values,
     start: Values | None = None,
     of_record: Values | None = None,
+    moves: Sequence[Values] | None = None,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
     The setup has sub-steps enough for both; ``of_record`` is what was found about the record
-    itself. The comparison is not judged.
+    itself. ``moves`` are what was found by the record: which values each moves, and how fast; by
+    default what was found about it. The comparison is not judged.
     """
     at = setup.with_start_values(values)
     samples, substeps = setup.experiment.samples(at)
@@ -46,25 +52,24 @@ def compare_with_record(
     overlays = {
         channel.signal: Overlay(
             compared(channel, setup.experiment.measured(channel, at)),
-            compared(channel, channel.as_recorded(samples[:, k])),
-            None if first is None else compared(channel, channel.as_recorded(first[:, k])),
+            compared(channel, samples[:, k]),
+            None if first is None else compared(channel, first[:, k]),
             _reference(setup, at, samples[0, k]) if channel.signal == "vt" else None,
         )
         for k, channel in enumerate(setup.channels)
     }
     errors = setup.experiment.compared(samples, at)
     channels = {signal: match_of(overlay) for signal, overlay in overlays.items()}
-    vt = overlays.get("vt")
+    if moves is None:
+        moves = [{parameter.name: 1.0} for parameter in setup.free]
     return Comparison(
         name=name,
         record=setup.record.source.name,
         cost=0.5 * float(errors @ errors),
         accepted=True,
         channels=channels,
-        features=StepFeatures(
-            measured=None if vt is None else _measured_features(setup, vt, at),
-            simulated=None if vt is None else _simulated_features(setup, vt, at),
-        ),
+        features=_step_features(setup, overlays, samples, at, moves),
+        notes=setup.record.notes,
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
         substeps=substeps,
@@ -110,22 +115,77 @@ def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | No
     return vt0 + simulator.input("vref")
 
 
-def _measured_features(setup: ExperimentSetup, vt: Overlay, values: Values) -> Features | None:
+def _step_features(
+    setup: ExperimentSetup,
+    overlays: Mapping[str, Overlay],
+    samples: Array,
+    values: Values,
+    moves: Sequence[Values],
+) -> StepFeatures:
+    """Return the features of vt without its periodic disturbances, in the record and simulated.
+
+    ``samples`` (M, channels) are the simulated ones.
+    """
+    vt = overlays.get("vt")
+    if vt is None:
+        return StepFeatures(None, None)
+    k = list(overlays).index("vt")
+    channel = setup.channels[k]
+    alone = samples[:, k] - setup.experiment.disturbances(values)[:, k]
+    simulated = compared(channel, alone)
+    measured = vt.measured - (vt.simulated - simulated)
+    return StepFeatures(
+        _measured_features(setup, channel, Overlay(measured, simulated), values, moves),
+        _simulated_features(setup, simulated, values),
+    )
+
+
+def _measured_features(
+    setup: ExperimentSetup, channel: Channel, vt: Overlay, values: Values, moves: Sequence[Values]
+) -> Features | None:
     """Return the features of the record, with the error that its noise leaves them."""
     kept = np.isfinite(vt.measured) & np.isfinite(vt.simulated)
     time = setup.record.time[kept]
     window = _first_move(setup, time, values)
     if window is None:
         return None
-    return recorded_features(RecordedResponse(time, vt.measured[kept], vt.simulated[kept], *window))
+    found = _found_by_record(setup, channel, time, values, moves)
+    response = RecordedResponse(time, vt.measured[kept], vt.simulated[kept], *window, found)
+    measured = recorded_features(response)
+    if measured is None:
+        return None
+    removed = (
+        RemovedLine(sine.frequency_at(values), sine.amplitude_at(values))
+        for sine in setup.experiment.sines
+        if sine.signal == channel.signal
+    )
+    return replace(measured, without=(*removed, *measured.without))
 
 
-def _simulated_features(setup: ExperimentSetup, vt: Overlay, values: Values) -> Features | None:
+def _found_by_record(
+    setup: ExperimentSetup, channel: Channel, time: Array, values: Values, moves: Sequence[Values]
+) -> FoundByRecord | None:
+    """Return how the response depends on what was found by the record, None on nothing."""
+    if not moves:
+        return None
+    curve, errors = setup.experiment.undisturbed_slopes(channel.signal, values, moves)
+    instants = [_first_move(setup, time, values)] + [
+        _first_move(setup, time, {**values, **{n: values[n] + SMALL * d for n, d in move.items()}})
+        for move in moves
+    ]
+    at = np.array([np.nan if window is None else window[0] for window in instants])
+    found = FoundByRecord(curve, errors, (at[1:] - at[0]) / SMALL)
+    return found if all(np.isfinite(each).all() for each in vars(found).values()) else None
+
+
+def _simulated_features(
+    setup: ExperimentSetup, simulated: Array, values: Values
+) -> Features | None:
     """Return the features of the response."""
-    kept = np.isfinite(vt.simulated)
+    kept = np.isfinite(simulated)
     time = setup.record.time[kept]
     window = _first_move(setup, time, values)
-    return None if window is None else features(time, vt.simulated[kept], *window)
+    return None if window is None else features(time, simulated[kept], *window)
 
 
 def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[float, float] | None:

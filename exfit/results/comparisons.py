@@ -107,19 +107,30 @@ class StepFeatures:
 class ValidatedStep(NamedTuple):
     """A step of a record that was given by hand: when (s) and by how much (pu).
 
-    ``found`` says what the record shows of it and no one gave: instant, size.
+    ``found`` says what the record shows of it and no one gave: instant, size. The error ``rmse``
+    (pu) is that at the instants that are judged. If they were found, it is least, ``best_rmse``,
+    with the step at ``best_at``, within what the record allows.
     """
 
     signal: str
     at: float
     size: float
     found: tuple[str, ...]
+    rmse: float | None = None
+    best_at: float | None = None
+    best_rmse: float | None = None
 
     @property
     def text(self) -> str:
         """The step in words."""
         source = f"{' and '.join(self.found)} found in the record" if self.found else "given"
-        return f"{self.signal} {self.size:+.4g} pu at {self.at:.4g} s, {source}"
+        step = f"{self.signal} {self.size:+.4g} pu at {self.at:.4g} s, {source}"
+        if self.rmse is None:
+            return step
+        judged = f"{step}: rmse {self.rmse:.3e} pu"
+        if self.best_at is None or self.best_rmse is None:
+            return judged
+        return f"{judged}, and {self.best_rmse:.3e} pu fitted, at {self.best_at:.4g} s, not judged"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """The file of a fit, result.json: written and read by the description that its classes are."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
 WHOLE_FIT, WHOLE_PROGRAMME, VALIDATION = "result.json", "programme.json", "validation.json"
-VERSION = 9  # of the file; a file without a version is of the first
+VERSION = 10  # of the file; a file without a version is of the first
 
 
 def result_text(result: FitResult) -> str:
@@ -69,7 +70,20 @@ def load_result(path: str | PathLike[str]) -> FitResult:
         raise ExfitError(f"{source}: {fault}; fit again") from None
     for text in contradictions(result):
         raise ExfitError(f"{source}: {text}; fit again")
-    return result
+    return result if version == VERSION else _without_false_intervals(result)
+
+
+def _without_false_intervals(result: FitResult) -> FitResult:
+    """Return a fit of an earlier version without intervals where its verdict leaves none."""
+    why = "" if result.verdict is None else result.verdict.no_interval
+    if not why:
+        return result
+    known = result.knowledge
+    return replace(
+        result,
+        parameters={name: each.without_interval(why) for name, each in result.parameters.items()},
+        knowledge=None if known is None else known.without_intervals(why),
+    )
 
 
 def _refuse_later(source: Path, version: Any) -> None:

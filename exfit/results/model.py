@@ -4,7 +4,7 @@ The classes describe result.json, too: `results.io` writes and reads it by their
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
@@ -30,7 +30,7 @@ from exfit.results.verdict import NO_MATCH, Verdict
 from exfit.results.windows import WindowSpread
 from exfit.util.criteria import Criteria
 from exfit.util.sources import TYPICAL
-from exfit.util.text import rounded
+from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE, KEY, plain
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
-ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
 
 
 @dataclass(frozen=True)
@@ -114,10 +113,16 @@ class FittedParameter:
     @property
     def rounding_error(self) -> float | None:
         """The standard error that tables round to, of the interval where that is not linear."""
-        low, high = self.interval or (None, None)
-        if self.linear_error is not None or low is None or high is None:
-            return self.std_error
-        return (high - low) / ERRORS_IN_INTERVAL
+        known = None if self.linear_error is not None else self.interval
+        return self.std_error if known is None else error_of_interval(*known) or self.std_error
+
+    def rounded(self, number: float | None) -> str:
+        """Return the value, or an end of its interval, as tables print it: within the bounds."""
+        return rounded_value(number, self.rounding_error, self.min, self.max)
+
+    def without_interval(self, why: str) -> "FittedParameter":
+        """Return the parameter without its interval, for a reason."""
+        return replace(self, interval=None, interval_method=None, why=why)
 
     @property
     def determined(self) -> bool:
@@ -135,7 +140,8 @@ class Minimum(NamedTuple):
     """A minimum of the cost: the values there, and how many descents led to it.
 
     ``chi_square`` is how far it lies above the lowest one, in variances of the residuals; it is
-    ``refuted`` where that exceeds the limit of the likelihood ratio at 95 %. None: not known.
+    ``refuted`` where that exceeds the limit of the likelihood ratio at 95 %; minima in one
+    ``valley``, 0 for that of the result, count as one. None: not known.
     """
 
     values: Mapping[str, float]
@@ -143,6 +149,7 @@ class Minimum(NamedTuple):
     starts: int
     chi_square: float | None = None
     refuted: bool | None = None
+    valley: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +158,7 @@ class Minima:
 
     ``start_costs`` (starts,) are inf where there is no response, ``end_costs`` (starts,) nan where
     a start was not refined; those of the case's own start come first. ``ways`` (starts,) says what
-    each descent began with: the strategy of the case, its linear phase, or the model itself; it is
-    empty in results of an earlier version.
+    each descent began with: the strategy of the case, its linear phase, or the model itself.
     """
 
     DERIVED: ClassVar = {"starts": "starts", "refined": "refined", "failed": "failed"}
@@ -372,8 +378,7 @@ class FitResult:
     def plot(self, record: str | None = None) -> "Figure":
         """Return a figure of the fitted response beside a record of the fit or of its validation.
 
-        ``record`` is its name, by default the first. Raises ExfitError where there is no such
-        record.
+        ``record`` is its name, by default the first. Raises ExfitError for a name of none.
         """
         from exfit.output.notebook import fit_figure
 
@@ -388,8 +393,7 @@ class FitResult:
     def __repr__(self) -> str:
         """Return the model, the record, the match and the values in one line."""
         values = ", ".join(
-            f"{name}={rounded(each.value, each.rounding_error)}"
-            for name, each in self.parameters.items()
+            f"{name}={each.rounded(each.value)}" for name, each in self.parameters.items()
         )
         state = "" if self.verdict is None else f", {self.verdict.verdict}"
         to = ", ".join(match.record for match in self.comparisons)

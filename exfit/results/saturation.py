@@ -1,7 +1,7 @@
 """The result of an open-circuit saturation test: the curve's numbers, each with its interval."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from exfit.inference.confidence import Interval
 from exfit.inference.wording import listed
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, Verdict
+from exfit.util.text import rounded_value
 from exfit.util.typed import IN_FILE
 
 Array = NDArray[np.float64]
@@ -36,6 +37,14 @@ class MeasuredValue:
     def determined(self) -> bool:
         """Whether the points limit the value on both sides."""
         return None not in self.interval
+
+    def rounded(self, number: float | None) -> str:
+        """Return the value, or an end of its interval, as tables print it."""
+        return rounded_value(number, self.std_error)
+
+    def without_interval(self, why: str) -> "MeasuredValue":
+        """Return the value without its interval, for a reason."""
+        return replace(self, interval=(None, None), why=why)
 
     def times(self, factor: float) -> "MeasuredValue":
         """Return the value in another unit, which is 1 / ``factor`` of its own; factor > 0."""
@@ -72,6 +81,18 @@ class FittedCurve:
     ifd: Array = field(metadata=IN_FILE)
     low: Array = field(metadata=IN_FILE)
     high: Array = field(metadata=IN_FILE)
+
+    def without_intervals(self, why: str) -> "FittedCurve":
+        """Return the curve without the intervals of its numbers, for a reason."""
+        loop = self.hysteresis
+        return replace(
+            self,
+            ifd_base=self.ifd_base.without_interval(why),
+            S10=self.S10.without_interval(why),
+            S12=self.S12.without_interval(why),
+            offset=self.offset.without_interval(why),
+            hysteresis=loop and loop.without_interval(why),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +138,20 @@ class SaturationResult:
         errors = self.ifd / curve.ifd_base.value - np.interp(self.vt, curve.vt, curve.ifd) - loop
         errors[list(self.left_out)] = np.nan
         return np.asarray(errors)
+
+    def as_judged(self) -> "SaturationResult":
+        """Return the test without intervals where the points do not match the curve."""
+        why = self.verdict.no_interval
+        if not why:
+            return self
+
+        efd_base, resistance = self.efd_base, self.resistance
+        return replace(
+            self,
+            curves=tuple(curve.without_intervals(why) for curve in self.curves),
+            efd_base=efd_base and efd_base.without_interval(why),
+            resistance=resistance and resistance.without_interval(why),
+        )
 
     @property
     def highest(self) -> float:

@@ -20,10 +20,13 @@ def search_summary(minima: Minima, cost: float) -> str:
 def _ends(minima: Minima, cost: float) -> Iterator[str]:
     """Yield how many descents led to the minimum of the result, to others, nowhere."""
     others = [minimum for minimum in minima.minima if minimum.cost != cost]
-    here = sum(minimum.starts for minimum in minima.minima) - sum(each.starts for each in others)
+    here = sum(minimum.starts for minimum in minima.minima if minimum.cost == cost)
     yield f"{here} of {minima.starts} descents lead to this {'minimum' if here else 'point'}"
-    yield from _minima([minimum for minimum in others if not minimum.refuted], cost)
-    yield from _refuted([minimum for minimum in others if minimum.refuted], cost)
+    along = sum(minimum.starts for minimum in others if minimum.valley == 0)
+    if along:
+        yield f"{along} to others in its flat valley"
+    yield from _elsewhere(others, cost)
+    yield from _refuted(others, cost)
     if minima.failed:
         yield f"{minima.failed} to none: no response"
     unfinished = int(np.count_nonzero(np.isnan(minima.end_costs))) - minima.failed
@@ -31,20 +34,22 @@ def _ends(minima: Minima, cost: float) -> Iterator[str]:
         yield f"{unfinished} not done"
 
 
-def _minima(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
-    """Yield how many descents led to each minimum that the records do not refute."""
+def _elsewhere(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
+    """Yield how many descents led to each minimum beyond the valley that the records leave open."""
     for minimum in minima:
-        verdict = "" if minimum.refuted is None else " (not refuted)"
-        yield f"{minimum.starts} to one {_height(minimum, cost)}{verdict}"
+        if minimum.valley != 0 and not minimum.refuted:
+            verdict = "" if minimum.refuted is None else " (not refuted)"
+            yield f"{minimum.starts} to one {_height(minimum, cost)}{verdict}"
 
 
 def _refuted(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
     """Yield how many descents led to minima that the records refute."""
-    if len(minima) == 1:
-        yield f"{minima[0].starts} to one {_height(minima[0], cost)} (refuted)"
-    elif minima:
-        descents = sum(minimum.starts for minimum in minima)
-        yield f"{descents} to {len(minima)} others, {_height(minima[0], cost)} or more (refuted)"
+    refuted = [minimum for minimum in minima if minimum.refuted]
+    if len(refuted) == 1:
+        yield f"{refuted[0].starts} to one {_height(refuted[0], cost)} (refuted)"
+    elif refuted:
+        descents = sum(minimum.starts for minimum in refuted)
+        yield f"{descents} to {len(refuted)} others, {_height(refuted[0], cost)} or more (refuted)"
 
 
 def _height(minimum: Minimum, cost: float) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from exfit.results.model import FitResult
+from exfit.util.text import rounded_value
 
 INTERRUPTED, NOT_ACCEPTED = "interrupted", "not accepted"  # beside the verdicts
 DIGITS = 9  # significant digits of a number in the table
@@ -15,14 +16,14 @@ class ParameterValue(NamedTuple):
     """A parameter of one of several results: its value, and whether it was fitted there.
 
     ``at_bound`` is the bound that it lies on; it is not ``resolved`` where the record does not
-    determine it; ``rounding_error`` is the standard error that tables round it to.
+    determine it; ``text`` is the value as tables print it.
     """
 
     value: float
     fitted: bool
     at_bound: str | None
     resolved: bool
-    rounding_error: float | None = None
+    text: str
 
 
 def outcome_of(result: FitResult) -> str:
@@ -65,11 +66,10 @@ def _value(result: FitResult, values: Mapping[str, float], name: str) -> Paramet
         return None
     parameter = result.parameters.get(name)
     if parameter is None:
-        return ParameterValue(values[name], False, None, True)
+        return ParameterValue(values[name], False, None, True, rounded_value(values[name]))
     resolved = result.knowledge is None or parameter.determined
-    return ParameterValue(
-        parameter.value, True, parameter.at_bound, resolved, parameter.rounding_error
-    )
+    text = parameter.rounded(parameter.value)
+    return ParameterValue(parameter.value, True, parameter.at_bound, resolved, text)
 
 
 def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:

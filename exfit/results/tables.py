@@ -130,10 +130,11 @@ def effects_table(effects: Sequence[ParameterEffect]) -> str:
     writer = csv.writer(out, lineterminator="\n")
     labels = [*effects[0].rms] if effects else []
     columns = [f"{label.replace(' ', '_')}_rms" for label in labels]
-    writer.writerow(["parameter", *columns, "of_noise"])
+    writer.writerow(["parameter", *columns, "of_noise", "percent_of"])
     for effect in effects:
         numbers = (*effect.rms.values(), effect.of_noise)
-        writer.writerow([effect.parameter, *(f"{number:.{DIGITS}g}" for number in numbers)])
+        cells = (f"{number:.{DIGITS}g}" for number in numbers)
+        writer.writerow([effect.parameter, *cells, effect.percent_of])
     return out.getvalue()
 
 

@@ -1,5 +1,6 @@
 """What a fit comes to: one of five verdicts, and what may be wrong where it is not good."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import nan
 from typing import Annotated, ClassVar, Final, Literal
@@ -14,6 +15,10 @@ MISSES: Final = "misses the record"
 NO_MATCH: Final = "no match"
 NOT_CONVERGED: Final = "not converged"
 
+WITHOUT_INTERVALS: Mapping[str, tuple[str, str]] = {
+    MISSES: ("none: misses", "the response misses the record"),
+    NO_MATCH: ("none: no match", "the response does not match the record"),
+}  # verdicts beside which no value has an interval: what tables have in its place, and why
 REJECTED = 0.01  # a probability below it
 NEGLIGIBLE = 1e-3  # of the variance of the scatter: what inputs carry is not tested for
 VISIBLE = 0.005  # of the range of a signal: the width of a line in its figure
@@ -98,6 +103,24 @@ class Verdict:
     def matches(self) -> bool:
         """Whether the response matches the records as far as their noise lets a reader see."""
         return self.verdict in (GOOD, MATCHES)
+
+    @property
+    def misfit(self) -> str:
+        """Why no parameter has an interval, "" where the response matches or the search failed.
+
+        An interval says how far noise may have moved a value: beside a misfit it says nothing.
+        """
+        return WITHOUT_INTERVALS.get(self.verdict, ("", ""))[1]
+
+    @property
+    def no_interval(self) -> str:
+        """What is said of each parameter where there is a `misfit`, else ""."""
+        return self.misfit and f"has no interval: {self.misfit}"
+
+    @property
+    def in_place_of_interval(self) -> str:
+        """What a column of intervals has where there is a `misfit`, else ""."""
+        return WITHOUT_INTERVALS.get(self.verdict, ("", ""))[0]
 
     @property
     def sentence(self) -> str:

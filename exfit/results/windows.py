@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from exfit.results.verdict import REJECTED
-from exfit.util.text import rounded
+from exfit.util.text import rounded_value
 
 WindowKind = Literal["step", "first half", "second half"]
 
@@ -52,14 +52,14 @@ class WindowSpread:
     def sentence(self) -> str:
         """What the windows say of the parameter."""
         steps = [window for window in self.windows if window.kind == "step"]
-        values = ", ".join(rounded(window.value, window.std_error) for window in steps)
+        values = ", ".join(rounded_value(window.value, window.std_error) for window in steps)
         least, most = (pick(self.windows, key=lambda w: w.value) for pick in (min, max))
-        ends = " ... ".join(rounded(end.value, end.std_error) for end in (least, most))
+        ends = " ... ".join(rounded_value(end.value, end.std_error) for end in (least, most))
         each = f"{self.name} is {values} {self.unit} by the {len(steps)} steps one by one"
         spread = f"{ends} {self.unit} over {len(self.windows)} windows"
         if not self.moves:
             return f"{each}, {spread}: no more than noise spreads them"
         return (
             f"{each}, {spread}: more than noise spreads them (p {self.p_value:.1g}), as the "
-            "hysteresis of the iron does; the interval holds all of them"
+            "hysteresis of the iron does; an interval that is given holds all of them"
         )

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import floor, isfinite, log10
+from math import floor, inf, isfinite, log10
 from types import NoneType
 from typing import Any
 
@@ -62,6 +62,8 @@ def yaml_number(value: float) -> str:
 
 DIGITS = 5  # of a number without an error
 DIGITS_OF_ERROR = 2  # that a number is printed to
+LEAST_DIGITS = 3  # of a number, however large its error
+ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
 MOST_DIGITS = 7  # of a number whose error is as good as none
 MOST_DECIMALS = 7  # of a number: a smaller one has an exponent
 LARGEST_PERCENTAGE = 1e6  # with two decimals: a larger one has an exponent
@@ -120,24 +122,46 @@ def show(value: float) -> str:
     return f"{value:.12g}"
 
 
-def rounded(value: float | None, error: float | None = None) -> str:
+def rounded(value: float | None, error: float | None = None, least: int | None = None) -> str:
     """Return a number in the digits that its standard error allows, a dash for None.
 
-    They are those of the error's first two; without an error they are five.
+    They are those of the error's first two, ``least`` of the number at least; without an error they
+    are five, or ``least``.
     """
     if value is None:
         return "-"
     if error is None or not isfinite(error) or error <= 0.0 or not isfinite(value):
-        return f"{value:.{DIGITS}g}"
+        return f"{value:.{max(DIGITS, least or 0)}g}"
     decimals = DIGITS_OF_ERROR - 1 - floor(log10(error))
     if value != 0.0:
-        decimals = min(decimals, MOST_DIGITS - 1 - floor(log10(abs(value))))
+        first = floor(log10(abs(value)))
+        decimals = min(decimals, MOST_DIGITS - 1 - first)
+        decimals = decimals if least is None else max(decimals, least - 1 - first)
     if decimals < -MOST_DECIMALS:
-        return f"{value:.{DIGITS}g}"
+        return f"{value:.{max(DIGITS, least or 0)}g}"
     if decimals > MOST_DECIMALS:
         digits = max(decimals + floor(log10(abs(value))), 0) if value else 0
         return f"{value:.{digits}e}"
     return f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
+
+
+def rounded_value(
+    value: float | None, error: float | None = None, low: float = -inf, high: float = inf
+) -> str:
+    """Return the value of a parameter as `rounded`, but in three digits at least.
+
+    It has as many more as keep it between its bounds ``low`` and ``high``.
+    """
+    text, least = rounded(value, error, LEAST_DIGITS), LEAST_DIGITS
+    while value is not None and low <= value <= high and not low <= float(text) <= high:
+        least += 1
+        text = rounded(value, error, least)
+    return text
+
+
+def error_of_interval(low: float | None, high: float | None) -> float | None:
+    """Return the standard error that a 95 % interval says, None where a side is open."""
+    return None if low is None or high is None else (high - low) / ERRORS_IN_INTERVAL
 
 
 def percentage(value: float) -> str:

@@ -1012,7 +1012,7 @@ def test_the_parameters_that_a_new_case_frees_are_listed_below_a_data_sheet(run,
     assert [line for line in lines if line.startswith("free")] == last
 
 
-@pytest.mark.parametrize("name", ["AC1A", "AC5C", "OEL2C", "PSS4C"])
+@pytest.mark.parametrize("name", ["AC1A", "DC4C", "OEL3C", "PSS4C"])
 def test_what_is_not_settled_about_a_diagram_is_noted_below_its_data_sheet(run, name):
     described = {**MODELS, **LIMITERS, **STABILISERS}[name]
     _, _, note = run("models", name).out.partition("note: ")

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 from matplotlib.figure import Figure
+from places import CONFIGS, SAMPLES
 from rich.console import Console
 from tiers import few_of
 
@@ -100,6 +101,35 @@ def test_a_validation_that_is_not_accepted_is_explained_below_the_table(run):
     assert "dgn: not accepted: " in ran.out
     assert "lm: not accepted: " in ran.out
     assert max(map(len, ran.out.splitlines())) <= WIDTH
+
+
+@pytest.mark.parametrize(
+    ("estimate", "options", "alone"),
+    [
+        ({}, (), True),
+        *few_of(
+            [
+                ({}, ("--search", "global"), False),
+                ({"search": "global"}, (), False),
+                ({"starts": 2}, (), False),
+            ],
+            1,
+        ),
+    ],
+)
+def test_several_strategies_are_compared_by_their_descents_unless_more_is_asked(
+    run, estimate, options, alone
+):
+    """Full steps alone end 130 times as high: a global search hides that."""
+    content = yaml.safe_load((CONFIGS / "ac1a_typical.yaml").read_text())
+    del content["validate"]
+    content["record"]["file"] = str(SAMPLES / "ac1a_up.csv")
+    Path("a.yaml").write_text(yaml.safe_dump({**content, "estimate": estimate}))
+    ran = run("fit", "a.yaml", "--strategy", "gn", "--strategy", "lm", "--no-plots", *options)
+    runs = json.loads(Path("runs/fits/fits.json").read_text())["runs"]
+    full_steps, damped = (entry["result"]["cost"] for entry in runs)
+    assert (full_steps > 100.0 * damped) == alone
+    assert ("the descent from the start of its case alone" in ran.out) == alone
 
 
 def test_one_case_with_one_strategy_is_a_fit_as_ever(run):

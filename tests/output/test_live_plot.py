@@ -2,12 +2,14 @@
 
 import unicodedata
 from io import StringIO
+from threading import Event
 
 import numpy as np
 import pytest
 from records import case_of, config
 from rich.cells import cell_len
 from rich.console import Console
+from rich.text import Text
 
 from exfit import workflows
 from exfit.analysis.iteration_responses import LiveResponse
@@ -147,6 +149,20 @@ def test_a_file_and_a_terminal_without_such_characters_ask_for_no_plot():
     assert terminal.LiveIterations(Console(file=StringIO()), "case").live is None
     assert terminal.LiveIterations(screen(80, 24, "ascii"), "case").live is None
     assert terminal.LiveIterations(screen(80, 24), "case").live is not None
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_a_fit_that_is_silent_says_how_far_it_is(monkeypatch, is_terminal):
+    """Whatever it is doing: nothing is announced between the lines."""
+    monkeypatch.setattr(progress, "QUIET", 0.01)
+    console = Console(file=StringIO(), width=80, height=24, force_terminal=is_terminal)
+    said = Event()
+    monkeypatch.setattr(terminal.LiveIterations, "_progress", lambda _: said.set() or Text("here"))
+    with terminal.LiveIterations(console, "title", 30).running() as shown:
+        shown(line(0))
+        said.clear()
+        assert said.wait(60.0)
+    assert "here" in console.file.getvalue()
 
 
 def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):

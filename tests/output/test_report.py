@@ -4,6 +4,8 @@ import json
 import re
 import shutil
 import sys
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -30,7 +32,8 @@ from exfit.output.report.charts import Axis, Chart, Panel, Series, drawing, tick
 from exfit.output.report.sections.matches import fitted_matches, live_data
 from exfit.output.report.verdict import headline
 from exfit.results.io import load_result, result_file
-from exfit.util.text import rounded
+from exfit.results.other_values import AsFound
+from exfit.util.text import rounded, rounded_value
 
 MOST = 3_000_000  # bytes of a page
 ABOUT = {"Plant": "Höllental", "Unit": 2, "Rated": "120 MVA, 13.8 kV", "Tested by": "A & B"}
@@ -175,12 +178,14 @@ def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_
     assert rows.keys() == fitted.keys()
     for symbol, one in fitted.items():
         row = rows[symbol]
-        error = rounding_error(one)
-        assert row[1:3] == [f"{one['start']:.5g}", rounded(one["value"], error)]
+        of_value = partial(
+            rounded_value, error=rounding_error(one), low=one["min"], high=one["max"]
+        )
+        assert row[1:3] == [f"{one['start']:.5g}", of_value(one["value"])]
         if one["interval"] is None:
             assert row[3] == one["why"].replace("`", "")
         else:
-            low, high = (None if x is None else rounded(x, error) for x in one["interval"])
+            low, high = (None if x is None else of_value(x) for x in one["interval"])
             limits = f"below {high}" if low is None else f"above {low}"
             limits = f"{low} … {high}" if low and high else limits
             method = "" if one["interval_method"] == "linear" else one["interval_method"]
@@ -319,6 +324,17 @@ def test_the_dynamics_record_is_reported_with_its_warnings_or_why_there_is_none(
     for warning in found.warnings:
         assert warning in pages("ac8b").text
     assert "FIRST_ORDER has no PSS/E record" in pages("first order").text
+
+
+def test_the_dynamics_record_is_at_the_place_where_the_unit_was_found(fits, pages):
+    result = load_result(fits("ac8b"))
+    assert "Bus 1 and machine 1 stand for those of the unit" in pages("ac8b").text
+    found = AsFound(
+        "unit.dyr", result.model, result.values, why="made up", bus=101, machine_id="G1"
+    )
+    page = Page(html(replace(result, as_found=found), "run"))
+    assert "Bus 101 and machine G1 are those of the planner's file" in page.text
+    assert " ".join(export(result, 101, "G1").text.split()) in page.text
 
 
 def test_a_playback_shows_what_was_played_in_and_no_features_of_a_step(pages):

@@ -12,13 +12,16 @@ import pytest
 import yaml
 from cases import FILES_OF_A_FIT
 from places import ROOT
+from records import case_of, config
 
 from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.overrides import read_parameters
 from exfit.output import figure_files, plots, run_folder
+from exfit.output.report.page import html
 from exfit.results import fit_files
+from exfit.results.io import load_result
 from exfit.results.tables import DIGITS, parameter_file, table
 from exfit.util.files import write
 from exfit.util.text import to_json
@@ -383,3 +386,30 @@ def test_a_fit_is_written_even_where_it_cannot_be_remembered(fitted, tmp_path, m
     run_folder.write_fit(fitted, tmp_path / "run")
     assert "result.json" in names(tmp_path / "run")
     assert run_folder.last_fit(CASE) is None
+
+
+def test_files_with_percent_signs_in_their_names_are_as_any_and_several_have_an_overlay(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    home = tmp_path / "100 %d%20"
+    home.mkdir()
+    content, records = config("ac8b_unit2_both"), {}
+    for section, name in zip(content["records"], ("up5%d", "down%20%s"), strict=True):
+        file = home / f"{name} %(x)s.csv"
+        file.write_bytes(Path(section["record"]["file"]).read_bytes())
+        section["name"], section["record"]["file"] = name, file.name
+        records[name] = file.name
+    path = case_of(content, home).path.rename(home / "unit %s.yaml")
+    result = workflows.fit(path)
+    assert {match.name: match.record for match in result.comparisons} == records
+    run = home / "run %d"
+    drawn = run_folder.write_fit(result, run).draw()
+    assert drawn == ()
+    written = {file.name for file in run.iterdir()}
+    assert {"overlay.png", "result.json"} <= written
+    for name in records:
+        assert {f"{name}.csv", f"{name}.png", f"{name}-lm.png"} <= written
+        assert len(columns(run / f"{name}.csv")["t"]) == 1001
+    page = html(load_result(run), run)
+    assert all(f">{name}" in page and file in page for name, file in records.items())

@@ -6,13 +6,21 @@ from dataclasses import replace
 
 import pytest
 from cases import local_case
+from fleets import row
+from pages import Page
 from rich.console import Console
 
 from exfit import workflows
+from exfit.fleet.folder import Fleet
+from exfit.fleet.sisters import sisters
+from exfit.fleet.summary import summary_of
 from exfit.output import terminal
+from exfit.output.fleet_page import fleet_page
 from exfit.output.notebook import fit_html
+from exfit.output.report.page import html as report_html
+from exfit.output.terminal.side_by_side import side_by_side
 from exfit.output.terminal.terminal import interval
-from exfit.results.verdict import MISSES, Cause, Verdict
+from exfit.results.verdict import MATCHES, MISSES, Cause, Verdict
 
 SENTENCE = (
     "KD, TE and KA can move together (KD +51 %, TE +10 %, KA +9.7 %): vt changes by 3.2e-6 pu rms, "
@@ -81,12 +89,13 @@ def shown(result, width):
 
 
 def with_interval(result, method, interval):
-    """Return a fit whose parameters all have this interval, found so."""
+    """Return a fit that matches, whose parameters all have this interval, found so."""
     parameters = {
         name: replace(parameter, interval=interval, interval_method=method)
         for name, parameter in result.parameters.items()
     }
-    return replace(result, parameters=parameters)
+    verdict = replace(result.verdict, verdict=MATCHES)
+    return replace(result, parameters=parameters, verdict=verdict)
 
 
 @pytest.mark.parametrize("width", [60, 80])
@@ -140,6 +149,43 @@ def test_a_value_has_the_digits_of_the_interval_that_stands_beside_it(missed):
         assert parameter.rounding_error == pytest.approx((high - low) / 4.0, rel=0.05)
     for parameter in with_interval(missed, "linear", (low, high)).parameters.values():
         assert parameter.rounding_error == parameter.std_error
+
+
+def printed(text):
+    """Return the numbers of a text that are near the upper bound."""
+    return [float(number) for number in re.findall(r"\b0\.(?:29\d+|30*)\b", text)]
+
+
+def test_every_table_has_three_digits_of_a_value_and_none_beyond_its_bounds(missed, tmp_path):
+    bound, error = 0.29967, 2278.0
+    limited = {"min": 0.1, "max": bound, "std_error": error, "start": 0.15}
+    for interval_of, method in (((0.11, bound), "profile"), (None, None)):
+        known = {"interval": interval_of, "interval_method": method, **limited}
+        result = replace(
+            missed,
+            parameters={
+                name: replace(parameter, value=0.29966, **known)
+                for name, parameter in missed.parameters.items()
+            },
+        )
+        stream = io.StringIO()
+        side_by_side(Console(file=stream, width=80), {"one": result, "other": result})
+        cases = [row(name, parameters=summary_of(result, "", 1.0).parameters) for name in "abcd"]
+        batch = fleet_page(Fleet(tmp_path, tuple(cases)), sisters(cases))
+        page = Page(report_html(result, tmp_path))
+        tables = {
+            "terminal": "\n".join(shown(result, 80)),
+            "side by side": stream.getvalue(),
+            "notebook": fit_html(result),
+            "line": repr(result),
+            "batch": Page(batch).text.rpartition("mean")[0],  # which is of several units
+            "report": str(page.tables["Fitted parameters"]),
+            "as found": str(page.tables["Start and verified: the parameters that differ"]),
+        }
+        for name, text in tables.items():
+            values = printed(text)
+            assert len(values) >= len(result.parameters), name
+            assert max(values) <= bound, name
 
 
 def test_what_does_not_match_is_nowhere_called_good_or_converged(missed):

@@ -28,7 +28,19 @@ import thesis_tables as tables
 from gallery import same, smaller
 from places import ROOT, SAMPLES
 from thesis_figures import Curve, Panel
-from thesis_numbers import APPROXIMATE, DGN, FIRST_A, FIRST_K, INSTANTS, LM, LM_DGN, TOOLBOX, A, K
+from thesis_numbers import (
+    APPROXIMATE,
+    COSTS,
+    DGN,
+    FIRST_A,
+    FIRST_K,
+    INSTANTS,
+    LM,
+    LM_DGN,
+    TOOLBOX,
+    A,
+    K,
+)
 from thesis_runs import (
     MOST_ITERATIONS,
     THESIS,
@@ -214,6 +226,7 @@ def page() -> str:
         fits=fits_of,
         settings=yaml.safe_dump({"estimate": THESIS}, sort_keys=False).strip(),
         most_iterations=MOST_ITERATIONS,
+        costs=COSTS,
         jacobians=jacobians_at,
         gradient_ratios=gradient_ratios,
         simulated=simulated_twice,

@@ -4,7 +4,7 @@ from exfit.output.plots.agreement import agreement
 from exfit.output.plots.designed_test import designed_test
 from exfit.output.plots.fit_series import fit_series
 from exfit.output.plots.iterations import iterations
-from exfit.output.plots.overlays import overlay
+from exfit.output.plots.overlays import overlay, overlays
 from exfit.output.plots.ranking import ranking
 from exfit.output.plots.records import inspection
 from exfit.output.plots.responses import overview, response
@@ -26,6 +26,7 @@ __all__ = [
     "inspection",
     "iterations",
     "overlay",
+    "overlays",
     "overview",
     "png",
     "profiles",

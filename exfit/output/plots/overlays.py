@@ -16,6 +16,7 @@ from exfit.output.plots.style import (
     START,
     new_figure,
     panels,
+    short,
     tidy,
 )
 from exfit.results.comparisons import REFERENCE, Comparison, Overlay
@@ -26,6 +27,7 @@ from exfit.util.text import percentage
 Array = NDArray[np.float64]
 
 FAINT = 0.4  # opacity of what is not compared
+LONGEST = 40  # letters of a record's name
 SHADE = 0.15  # of when a limiter acts
 
 
@@ -47,6 +49,25 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
         _signal(axes[above + 2 * k], comparison, name, overlaid, label)
         _error(axes[above + 2 * k + 1], comparison, overlaid)
     _limiters(list(axes[above::2]), comparison)
+    axes[-1].set_xlabel("time (s)")
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def overlays(comparisons: Sequence[Comparison], title: str) -> Figure:
+    """Return the signal that judges each of several records, measured and simulated.
+
+    Below it is their difference; the other signals are in the figure of each record.
+    """
+    figure = new_figure(1.0 + 3.4 * len(comparisons))
+    axes = panels(figure, 2 * len(comparisons), height_ratios=[3.0, 1.0] * len(comparisons))[:, 0]
+    for comparison, signal, error in zip(comparisons, axes[::2], axes[1::2], strict=True):
+        overlaid = comparison.overlays[comparison.judged_by]
+        _signal(signal, comparison, comparison.judged_by, overlaid, "")
+        signal.set_title(short(comparison.name, LONGEST), fontsize=10, loc="left")
+        _error(error, comparison, overlaid)
+        error.set_xlim(signal.get_xlim())
+        _limiters([signal], comparison)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=11)
     return figure

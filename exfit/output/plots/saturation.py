@@ -23,7 +23,7 @@ def saturation(result: SaturationResult, title: str) -> Figure:
 
 
 def _curve(axes: Axes, result: SaturationResult) -> None:
-    fitted = result.curve
+    fitted, no_interval = result.curve, result.verdict.in_place_of_interval
     base = fitted.ifd_base.value
     low, high, mean = (base * ifd for ifd in (fitted.low, fitted.high, fitted.ifd))
     measured = (fitted.vt <= result.highest) | (1.2 not in fitted.extrapolated)
@@ -35,9 +35,10 @@ def _curve(axes: Axes, result: SaturationResult) -> None:
         linewidth=1.1,
         label=f"air-gap line, {base:.4g} {result.unit} per pu",
     )
-    axes.fill_betweenx(
-        fitted.vt, low, high, color=SIMULATED, alpha=0.18, linewidth=0.0, label="95 % band"
-    )
+    if not no_interval:
+        axes.fill_betweenx(
+            fitted.vt, low, high, color=SIMULATED, alpha=0.18, linewidth=0.0, label="95 % band"
+        )
     axes.plot(mean[measured], fitted.vt[measured], color=SIMULATED, linewidth=1.4, label="curve")
     if not measured.all():
         beyond = fitted.vt >= fitted.vt[measured][-1]
@@ -51,7 +52,7 @@ def _curve(axes: Axes, result: SaturationResult) -> None:
         end = line + base * level * value.value
         axes.plot([line, end], [level, level], "|-", color="black", linewidth=0.9, markersize=9)
         axes.annotate(
-            f"{name} = {value.value:.3g} ({_interval(value)})",
+            f"{name} = {value.value:.3g} ({no_interval or _interval(value)})",
             (line, level),
             xytext=(-8.0, 0.0),
             textcoords="offset points",

@@ -23,7 +23,6 @@ from exfit.output.plots.style import (
 )
 from exfit.results.model import FitResult, Minima
 from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHED_BY_NOISE
-from exfit.util.text import rounded
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
@@ -97,7 +96,7 @@ def trajectories(result: FitResult) -> Figure:
                 ax.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
         unit = f" {parameter.unit}" if parameter.unit else ""
         bound = f" (on its {parameter.at_bound})" if parameter.at_bound else ""
-        value = rounded(parameter.value, parameter.rounding_error)
+        value = parameter.rounded(parameter.value)
         ax.set_title(f"{short(name, LONGEST)} = {value}{unit}{bound}", fontsize=9)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         tidy(ax)

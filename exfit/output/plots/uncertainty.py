@@ -35,6 +35,7 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     What belongs to a record is left out.
     """
     responses = analysis.sensitivity
+    labels = {effect.parameter: effect.label for effect in analysis.effects}
     figure = new_figure(1.2 + 3.0 * len(responses), legend="right")
     column = panels(figure, len(responses))[:, 0]
     for axes, response in zip(column, responses, strict=True):
@@ -44,7 +45,7 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
                 STYLES[place // len(COLORS) % len(STYLES)],
                 color=COLORS[place % len(COLORS)],
                 linewidth=1.3,
-                label=name,
+                label=labels.get(name, name),
             )
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
@@ -117,7 +118,8 @@ def profiles(profiled: Profiles) -> Figure:
             rise = np.maximum(costs - profiled.cost, 0.0) / profile.rise
             axes.plot(at, rise, "o", color=color, markersize=3)
             axes.plot(*smooth(at, rise), color=color, linewidth=1.3)
-        axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
+        if not profiled.verdict.misfit:
+            axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
         for limit in (profile.low, profile.high):
             if limit is not None:
                 axes.axvline(limit, color=LIMIT, linewidth=1.0)
@@ -127,7 +129,10 @@ def profiles(profiled: Profiles) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(4))
         tidy(axes)
     figure.supylabel("rise of the cost / rise at the 95 % limit", fontsize=10)
+    why = profiled.verdict.misfit
     figure.suptitle(
-        f"{profiled.name}: the cost along each parameter, the others fitted", fontsize=11
+        f"{profiled.name}: the cost along each parameter, the others fitted"
+        f"{f'; no interval: {why}' if why else ''}",
+        fontsize=11,
     )
     return figure

@@ -24,7 +24,7 @@ from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.sources import by_source
-from exfit.util.text import percentage, rounded
+from exfit.util.text import percentage
 
 STYLES = {GOOD: "bold green", MATCHES: "bold yellow"}  # of verdicts; of the others bold red
 
@@ -103,7 +103,7 @@ def source_counts(result: FitResult) -> str:
 
 def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
     """Yield in one sentence which parameter matters first."""
-    ranked = (f"{effect.parameter}{NO_BREAK}{number(effect.of_noise, 2)}" for effect in effects)
+    ranked = (f"{effect.label}{NO_BREAK}{number(effect.of_noise, 2)}" for effect in effects)
     if effects:
         yield f"1 % of each moves the response by, in units of the noise: {', '.join(ranked)}"
 
@@ -120,14 +120,14 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
     numbers = ("start", *former, "fitted", "95 % interval", "error")
     marks = {name: ", ".join(_marks(each)) for name, each in result.parameters.items()}
     remark = ("",) if any(marks.values()) else ()
+    no_interval = "" if result.verdict is None else result.verdict.in_place_of_interval
     table = plain_table("parameter", *numbers, "unit", *remark, numbers=numbers)
     for name, parameter in result.parameters.items():
         vague = result.knowledge is not None and parameter.why
         style = "yellow" if parameter.at_bound or not parameter.physical or vague else ""
-        digits = parameter.rounding_error
-        old = () if before is None else (rounded(before.values.get(name), digits),)
-        values = (number(parameter.start), *old, rounded(parameter.value, digits))
-        limits = interval(parameter.interval, digits)
+        old = () if before is None else (parameter.rounded(before.values.get(name)),)
+        values = (number(parameter.start), *old, parameter.rounded(parameter.value))
+        limits = no_interval or interval(parameter.interval, parameter.rounded)
         mark = (marks[name],) if remark else ()
         table.add_row(
             name, *values, limits, _error(result, name), parameter.unit, *mark, style=style

@@ -28,7 +28,7 @@ from exfit.results.model import FitResult, Iteration
 from exfit.results.saturation import SaturationResult
 from exfit.results.v_curve import VCurve
 from exfit.results.verdict import GOOD, NOT_CONVERGED
-from exfit.util.text import percentage, rounded
+from exfit.util.text import percentage
 
 KIND, VERDICT, SECONDS = 10, 27, 7  # characters of the columns behind the name
 FEWEST_OF_NAME = 12  # characters: on a narrower terminal verdicts are shortened
@@ -152,8 +152,8 @@ def _values(console: Console, values: Sequence[EnteredValue]) -> None:
         table.add_row(
             value.name,
             value.unit,
-            rounded(value.value, value.error),
-            interval(value.interval, value.error),
+            value.rounded(value.value),
+            interval(value.interval, value.rounded),
             value.source,
             value.test,
             given,

@@ -2,8 +2,9 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from itertools import zip_longest
+from threading import Event, Thread
 
 from rich.console import Console
 from rich.live import Live
@@ -26,11 +27,14 @@ OTHER_LINES = 5  # beside the history: title, what is hidden, names of columns, 
 PLOT_HEIGHTS = (20, 14)  # lines of a plot beside the history and below it
 PLOT_WIDTH = 100  # characters at most
 SHARE_OF_TIME = 0.03  # of the time of a fit: so much may be spent on showing it
+QUIET = 5.0  # s: after so long without a line one says that the fit goes on
 FORMATS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>6}", "{:>5}", "{:>5}")
 STAGES = {
     "screening": ("screening", "points"),
     "refining": ("search", "further starts"),
     "profiling": ("profiles", "sides"),
+    "weighing": ("weighing by noise", "passes"),
+    "causes": ("causes", "tried"),
 }  # in words, and what is counted
 HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "capped", "inner", "nfev")
 
@@ -38,7 +42,8 @@ HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "capped", "inner", "nfe
 class LiveIterations:
     """Shows the iterations of a fit as they come: a live table, or lines in a file or pipe.
 
-    A terminal with room for it has a plot of the response beside the table or below it. ``most`` is
+    Where nothing comes for some seconds, how long the fit has taken is shown all the same. A
+    terminal with room for it has a plot of the response beside the table or below it. ``most`` is
     the largest number of iterations of a phase, or of each phase by name.
     """
 
@@ -51,19 +56,39 @@ class LiveIterations:
         self._live: Live | None = None
         self._starts: Progress | None = None
         self._next = 0.0  # when it may be drawn again
+        self._began = self._shown = time.monotonic()
 
     @contextmanager
     def running(self) -> Iterator["LiveIterations"]:
         """Show the table for as long as the fit runs."""
-        if not self.console.is_terminal:
-            yield self
-            return
-        with Live(console=self.console, auto_refresh=False) as self._live:
+        live = Live(console=self.console, auto_refresh=False) if self.console.is_terminal else None
+        ended = Event()
+        waiting = Thread(target=self._wait, args=(ended,), daemon=True)
+        with live or nullcontext() as self._live:
+            waiting.start()
             try:
                 yield self
             finally:
-                if self.lines:
+                ended.set()
+                waiting.join()
+                if self._live is not None and self.lines:
                     self._live.update(self.picture(), refresh=True)
+
+    def _wait(self, ended: Event) -> None:
+        """Show how long the fit has taken whenever nothing else was shown for a while."""
+        with suppress(OSError):  # an output that is lost is the command's to report
+            while not ended.wait(max(self._shown + QUIET - time.monotonic(), 0.0)):
+                if time.monotonic() - self._shown < QUIET:
+                    continue
+                if self._live is None:
+                    self._print(self._progress().plain if self.lines else self.title)
+                elif self.lines:
+                    self._live.update(self.picture(), refresh=True)
+                self._shown = time.monotonic()
+
+    def _print(self, line: str) -> None:
+        self._shown = time.monotonic()
+        self.console.print(line, soft_wrap=True)
 
     @property
     def live(self) -> Callable[[LiveResponse], None] | None:
@@ -82,18 +107,23 @@ class LiveIterations:
         if self._live is None:
             columns = _fitting(self.console.width)
             if len(self.lines) == 1:
-                self.console.print(_row(HISTORY[:columns]), soft_wrap=True)
-            self.console.print(_row(_cells(iteration)[:columns]), soft_wrap=True)
+                self._print(_row(HISTORY[:columns]))
+            self._print(_row(_cells(iteration)[:columns]))
         else:
             self._draw(self._live)
 
     def starts(self, progress: Progress) -> None:
-        """Show how far the search from further starts is, or the profiles."""
-        self._starts = progress
+        """Show how far what follows the iterations is: further starts, profiles, causes.
+
+        A file or pipe has a line at its beginning, where that is announced, and at its end.
+        """
+        before, self._starts = self._starts, progress
         if self._live is not None:
             self._draw(self._live)
-        elif progress.done == progress.total:
-            self.console.print(_of_search(progress), soft_wrap=True)
+            return
+        begins = progress.done == 0 and (before is None or before.stage != progress.stage)
+        if begins or progress.done == progress.total:
+            self._print(_of_search(progress))
 
     def _draw(self, live: Live) -> None:
         """Draw, unless that was done so lately that it would slow down the fit."""
@@ -101,6 +131,7 @@ class LiveIterations:
         if began < self._next:
             return
         live.update(self.picture(), refresh=True)
+        self._shown = time.monotonic()
         ended = time.perf_counter()
         self._next = ended + (ended - began) / SHARE_OF_TIME
 
@@ -145,7 +176,9 @@ class LiveIterations:
         share = last.cost / first.cost if first.cost > 0.0 else 1.0
         cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
         text = f"iteration {last.number}{limit}: {cost}"
-        return Text(text if self._starts is None else _of_search(self._starts), style="dim")
+        text = text if self._starts is None else _of_search(self._starts)
+        seconds = time.monotonic() - self._began
+        return Text(f"{text}, {seconds:.0f} s" if seconds >= QUIET else text, style="dim")
 
 
 def _most(iterations: int | Mapping[str, int]) -> str:

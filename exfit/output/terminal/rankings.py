@@ -7,7 +7,8 @@ from exfit.fleet.ranking import Ranking
 from exfit.output.terminal.terminal import number, paragraph, plain_table, remarks, show_table
 
 NOT_REFUTED = "*"  # behind the name of a model
-LEGEND = "rmse in pu; BIC above the lowest; * not refuted by the records"
+LEGEND = "rmse in pu; BIC above the lowest; *"
+MEANING = {False: "not refuted by the records", True: "matches best with typical machine data"}
 COLUMNS = ("model", "unseen", "rmse", "BIC", "determined", "verdict")
 NUMBERS = ("unseen", "rmse", "BIC", "determined")
 
@@ -48,7 +49,8 @@ def _table(console: Console, models: tuple[RankedModel, ...]) -> None:
     show_table(console, table)
     if unseen:
         paragraph(console, "unseen: rmse of the records that no fit saw", "dim")
-    paragraph(console, LEGEND, "dim")
+    typical = any(model.typical_machine for model in models)
+    paragraph(console, f"{LEGEND} {MEANING[typical]}", "dim")
 
 
 def _error(rmse: float | None) -> str:

@@ -6,22 +6,22 @@ from rich.console import Console
 
 from exfit.output.terminal.terminal import interval, notes, plain_table, show_table
 from exfit.results.saturation import MeasuredValue, SaturationResult
-from exfit.util.text import rounded
 
 
 def saturation(console: Console, result: SaturationResult) -> None:
     """Show the numbers of the curve that is used, those of each form, and what limits them."""
     table = plain_table("", "value", "95 %", "unit", numbers=("value", "95 %"))
+    no_interval = result.verdict.in_place_of_interval
     for name, value, unit in _quantities(result):
-        ends = interval(value.interval, value.std_error)
-        table.add_row(name, rounded(value.value, value.std_error), ends, unit)
+        ends = no_interval or interval(value.interval, value.rounded)
+        table.add_row(name, value.rounded(value.value), ends, unit)
     show_table(console, table)
     console.print()
     heads = (f"base ({result.unit})", "S(1.0)", "S(1.2)", "rms (pu)")
     forms = plain_table("form", *heads, "", numbers=heads)
     for curve in result.curves:
         values = (curve.ifd_base, curve.S10, curve.S12)
-        cells = (rounded(value.value, value.std_error) for value in values)
+        cells = (value.rounded(value.value) for value in values)
         remarks = ["used"] * (curve.form == result.form) + ["refuted"] * curve.refuted
         forms.add_row(curve.form, *cells, f"{curve.rms:.2g}", ", ".join(remarks))
     show_table(console, forms)

@@ -17,6 +17,9 @@ from exfit.results.verdict import MATCHES, MISSES
 HEADS = ("fit", "it", "f", "rmse", "s", "")
 FORMS = ("{:>4}", "{:>10}", "{:>10}", "{:>7}", "{:<13}")  # behind the name
 MOST_OF_NAME = 28  # characters: the line has then 80
+DESCENTS_ALONE = (
+    "each fit is the descent from the start of its case alone: --search global looks further"
+)
 BRIEF = {MATCHES: "matches", MISSES: "misses"}  # what a line has no room for
 
 
@@ -25,6 +28,7 @@ class SeriesProgress:
 
     def __init__(self, console: Console, plan: Sequence[PlannedFit]) -> None:
         self.console, self.count = console, len(plan)
+        self._alone = any(fit.search == "local" for fit in plan)
         self._width = min(max(len(fit.name) for fit in plan), MOST_OF_NAME)
         self._done, self._shown = 0, ""
         self._live: Live | None = None
@@ -32,6 +36,8 @@ class SeriesProgress:
     @contextmanager
     def running(self) -> Iterator["SeriesProgress"]:
         """Show the lines for as long as the fits run."""
+        if self._alone:
+            paragraph(self.console, DESCENTS_ALONE)
         self.console.print(self._line(HEADS), style="bold", soft_wrap=True, markup=False)
         if not self.console.is_terminal:
             yield self

@@ -8,14 +8,14 @@ from rich.console import Console
 from exfit.output.terminal.terminal import number, paragraph, plain_table, show_table
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import ParameterValue, parameters_beside
-from exfit.util.text import percentage, rounded
+from exfit.util.text import percentage
 
 COST = "f"  # label of its row
 BETWEEN_COLUMNS = 2  # characters
 ON_BOUND, UNRESOLVED, FIXED = "*", "?", "="  # behind a value
 MARKS = {
     ON_BOUND: "on a bound",
-    UNRESOLVED: "not determined by the record",
+    UNRESOLVED: "without a closed 95 % interval",
     FIXED: "fixed",
 }
 
@@ -122,9 +122,9 @@ def _cell(value: ParameterValue | None) -> str:
     if value is None:
         return ""
     if not value.fitted:
-        return number(value.value) + FIXED
+        return value.text + FIXED
     mark = ON_BOUND if value.at_bound else " " if value.resolved else UNRESOLVED
-    return rounded(value.value, value.rounding_error) + mark
+    return value.text + mark
 
 
 def _figures(fits: Sequence[FitResult]) -> Iterator[Row]:

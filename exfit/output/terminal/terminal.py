@@ -3,7 +3,7 @@
 import os
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -173,14 +173,14 @@ def number(value: float | None, digits: int = 5) -> str:
     return "-" if value is None else f"{value:.{digits}g}"
 
 
-def interval(limits: Interval | None, error: float | None = None) -> str:
-    """Return an interval in the digits that an error allows; an open side by the other limit."""
+def interval(limits: Interval | None, digits: Callable[[float], str] = rounded) -> str:
+    """Return an interval, its limits in some ``digits``; an open side by the other limit."""
     low, high = limits or (None, None)
     if low is not None and high is not None:
-        return f"{rounded(low, error)} ... {rounded(high, error)}"
+        return f"{digits(low)} ... {digits(high)}"
     if low is None:
-        return "-" if high is None else f"below {rounded(high, error)}"
-    return f"above {rounded(low, error)}"
+        return "-" if high is None else f"below {digits(high)}"
+    return f"above {digits(low)}"
 
 
 def waiting(console: Console, paths: Iterable[Path]) -> None:

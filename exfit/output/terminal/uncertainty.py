@@ -17,7 +17,6 @@ from exfit.output.terminal.terminal import (
     show_table,
     unresolved,
 )
-from exfit.util.text import rounded
 
 
 def profiles(console: Console, result: Profiles) -> None:
@@ -26,11 +25,11 @@ def profiles(console: Console, result: Profiles) -> None:
     table = plain_table("parameter", *numbers, "unit", numbers=numbers)
     for profile in result.profiles:
         linear = (None, None) if profile.linear is None else profile.linear
-        error = profile.rounding_error
-        values = (profile.value, profile.low, profile.high, *linear)
-        cells = (rounded(value, error) for value in values)
+        low = result.verdict.in_place_of_interval or profile.rounded(profile.low)
+        cells = map(profile.rounded, (profile.high, *linear))
         style = "yellow" if any(profile.ends) else ""
-        table.add_row(profile.name, *cells, profile.unit, style=style)
+        value = profile.rounded(profile.value)
+        table.add_row(profile.name, value, low, *cells, profile.unit, style=style)
     console.print()
     show_table(console, table)
     console.print()
@@ -41,7 +40,7 @@ def profiles(console: Console, result: Profiles) -> None:
             f"{profile.name} has {side}: {end}"
             for profile in result.profiles
             for side, end in zip(sides, profile.ends, strict=True)
-            if end
+            if end and not result.verdict.misfit
         ),
     )
     notes(console, result.notes)
@@ -74,6 +73,6 @@ def effects(console: Console, ranked: Sequence[ParameterEffect]) -> None:
     table = plain_table("parameter", *heads, numbers=heads)
     for effect in ranked:
         changes = (f"{change:.2e}" for change in effect.rms.values())
-        table.add_row(effect.parameter, *changes, number(effect.of_noise, 2))
+        table.add_row(effect.label, *changes, number(effect.of_noise, 2))
     paragraph(console, "change for 1 % of each parameter, rms over the test, the strongest first")
     show_table(console, table)

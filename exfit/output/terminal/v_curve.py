@@ -17,7 +17,6 @@ from exfit.output.terminal.terminal import (
 from exfit.results.model import FittedParameter
 from exfit.results.v_curve import VCurve
 from exfit.signals import TERMINALS
-from exfit.util.text import rounded
 
 
 def v_curve(console: Console, result: VCurve) -> None:
@@ -59,10 +58,10 @@ def parameters_table(result: VCurve) -> Table:
     marks = {name: ", ".join(_marks(each)) for name, each in result.parameters.items()}
     remark = ("",) if any(marks.values()) else ()
     table = plain_table("parameter", *numbers, "unit", *remark, numbers=numbers)
+    no_interval = result.verdict.in_place_of_interval
     for name, parameter in result.parameters.items():
-        digits = parameter.rounding_error
-        values = (number(parameter.start), rounded(parameter.value, digits))
-        limits = interval(parameter.interval, digits)
+        values = (number(parameter.start), parameter.rounded(parameter.value))
+        limits = no_interval or interval(parameter.interval, parameter.rounded)
         mark = (marks[name],) if remark else ()
         style = "" if parameter.determined and parameter.physical else "yellow"
         table.add_row(name, *values, limits, parameter.unit, *mark, style=style)

@@ -30,7 +30,7 @@ def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
     for beside in _beside_each_other(console, stepped, FEATURE_COLUMNS):
         console.print()
         show_table(console, _feature_table(beside))
-        remarks(console, "-", _hidden(beside), "dim")
+        remarks(console, "-", (*_removed(beside), *_hidden(beside)), "dim")
 
 
 def played(console: Console, all_of_them: Sequence[Comparison]) -> None:
@@ -140,6 +140,14 @@ def _feature_table(comparisons: Sequence[Comparison]) -> Table:
         ]
         table.add_row(label, unit, *cells)
     return table
+
+
+def _removed(comparisons: Iterable[Comparison]) -> Iterator[str]:
+    """Yield which lines the features of records are read without."""
+    for comparison in comparisons:
+        measured = comparison.features.measured
+        if measured is not None and measured.removed:
+            yield f"{comparison.name}: measured without {measured.removed}"
 
 
 def _hidden(comparisons: Iterable[Comparison]) -> Iterator[str]:

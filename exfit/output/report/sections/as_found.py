@@ -16,13 +16,16 @@ UNCHANGED = "unchanged"
 
 @dataclass(frozen=True)
 class ChangedParameter:
-    """A parameter before and after; None where the model does not have it."""
+    """A parameter before and after; None where the model does not have it.
+
+    ``fitted`` is the verified value as tables print it, "" where it was not fitted.
+    """
 
     name: str
     unit: str
     before: float | None
     verified: float | None
-    rounding_error: float | None
+    fitted: str
     change: str
     source: str
 
@@ -109,7 +112,7 @@ def _parameters(result: Reported, unit: AsFound) -> Iterator[ChangedParameter]:
             rows.get(name, ""),
             before,
             verified,
-            None if fitted is None else fitted.rounding_error,
+            "" if fitted is None else fitted.rounded(fitted.value),
             _change(before, verified),
             result.source_of(name) if verified is not None else "",
         )

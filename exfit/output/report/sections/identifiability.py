@@ -1,5 +1,6 @@
 """What the records determine: sensitivities and correlations."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,8 +35,10 @@ def identifiability(result: FitResult) -> IdentifiabilityView | None:
     uncertainty = result.knowledge
     if uncertainty is None:
         return None
+    labels = {effect.parameter: effect.label for effect in uncertainty.effects}
     charts = (
-        sensitivity(f"moved-{k}", channel) for k, channel in enumerate(uncertainty.sensitivity)
+        sensitivity(f"moved-{k}", channel, labels)
+        for k, channel in enumerate(uncertainty.sensitivity)
     )
     return IdentifiabilityView(
         bool(uncertainty.sentences),
@@ -46,9 +49,9 @@ def identifiability(result: FitResult) -> IdentifiabilityView | None:
     )
 
 
-def sensitivity(key: str, channel: Sensitivity) -> Chart:
+def sensitivity(key: str, channel: Sensitivity, labels: Mapping[str, str]) -> Chart:
     """Return by how much 1 % more of each parameter moves a signal over time."""
-    moved = {name: PERCENT * samples for name, samples in channel.moved.items()}
+    moved = {labels.get(name, name): PERCENT * each for name, each in channel.moved.items()}
     lines = tuple(
         Series(name, *envelope(channel.time, MILLI * samples, BINS // 2), line_style(k))
         for k, (name, samples) in enumerate(moved.items())

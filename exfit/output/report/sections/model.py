@@ -60,6 +60,8 @@ def saturation(result: Reported) -> str:
     if not {"E1", "SE1", "E2", "SE2"} <= values.keys():
         return ""
     e1, se1, e2, se2 = (values[name] for name in ("E1", "SE1", "E2", "SE2"))
+    if se1 == se2 == 0.0:
+        return "The exciter has no saturation: SE1 and SE2 are 0."
     points = f"SE({e1:g}) = {se1:.4g}, SE({e2:g}) = {se2:.4g}"
     if min(se1, se2) <= 0.0 or result.saturation not in EXPONENTIAL:
         return f"Saturation of the exciter: {points}, {result.saturation} between them."

@@ -24,11 +24,6 @@ class MeasuredRow:
     unit: str
     meaning: str
 
-    @property
-    def error(self) -> float | None:
-        """The standard error to which it is rounded."""
-        return self.value.std_error
-
 
 @dataclass(frozen=True)
 class SaturationView:
