@@ -171,7 +171,7 @@ CHANGING = {
 
 
 # what a module may remember, and why stands there
-REMEMBERED = {"exfit.engine.kernel": {"_alive"}, "exfit.engine.sampling": {"_scratch"}}
+REMEMBERED = {"exfit.engine.kernel": {"_loaded"}, "exfit.engine.sampling": {"_scratch"}}
 
 
 def changes(function, names):

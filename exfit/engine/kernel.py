@@ -27,8 +27,10 @@ DIGEST = hashlib.sha256().digest_size
 
 _lock = threading.Lock()
 # code must outlive the functions that point into it; and the engines share one description of the
-# processor, which the first of them to go would take along
-_alive: list[Any] = []
+# processor, which the first of them to go would take along. Each takes three of the 65,530 areas of
+# memory that Linux gives a process, beyond which new code is a segmentation fault: so code that is
+# loaded serves all whose trace is the same
+_loaded: dict[str, Any] = {}
 
 
 class Start(NamedTuple):
@@ -157,18 +159,20 @@ def _code(traced: str, write_ir: Callable[[], str], machine: Any, name: str) -> 
 
 
 def compiled(traced: str, write_ir: Callable[[], str]) -> Any:
-    """Return LLVM's engine holding the functions of an IR.
+    """Load the machine code of an IR, once in a process, and return LLVM's engine that holds it.
 
     ``traced`` is a text that the IR follows from, with these modules.
     """
     with _lock:
         machine, name = _machine(target())
-        code = _code(traced, write_ir, machine, name)
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-        engine.finalize_object()
-        _alive.append(engine)
-        return engine
+        key = _key(name, traced)
+        if key not in _loaded:
+            code = _code(traced, write_ir, machine, name)
+            engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+            engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+            engine.finalize_object()
+            _loaded[key] = engine
+        return _loaded[key]
 
 
 @cache
