@@ -680,6 +680,7 @@ def test_a_file_that_others_could_write_is_not_run(cache, builds):
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch, builds):
+    monkeypatch.setattr(engine, "_loaded", NothingLoaded())
     (tmp_path / "file").write_text("not a folder")
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
         monkeypatch.setenv("EXFIT_CACHE", str(place))
