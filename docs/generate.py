@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import exfit
-from exfit.output.drawings import block_diagram, diagram_and_remarks
+from exfit.features.drawings import block_diagram, diagram_and_remarks
 
 DOCS = Path(__file__).parent
 CASES = DOCS.parent / "configs" / "models"

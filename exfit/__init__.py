@@ -21,19 +21,19 @@ from exfit.errors import (
 from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
-    from exfit.analysis.planning.design import design_test
-    from exfit.analysis.steady.saturation import saturation_curve
-    from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
-    from exfit.exchange.table_cases import cases_of_table
-    from exfit.fleet.batch import batch
-    from exfit.fleet.fits import fit_all
-    from exfit.fleet.folder import read_fleet
-    from exfit.fleet.ranking import rank
-    from exfit.programme.run import run
+    from exfit.features.design.design import design_test
+    from exfit.features.fleet.batch import batch
+    from exfit.features.fleet.folder import read_fleet
+    from exfit.features.planner.table_cases import cases_of_table
+    from exfit.features.programme.run import run
+    from exfit.features.programme.steady.saturation import saturation_curve
+    from exfit.features.rank.ranked_cases import rank
+    from exfit.features.translate.translate import translate
     from exfit.records.record import Record
     from exfit.results.io import load_result
     from exfit.results.model import FitResult
+    from exfit.runs.fits import fit_all
     from exfit.workflows import (
         check,
         fit,
@@ -83,23 +83,23 @@ _MODULES = {
     "Case": "exfit.case.case",
     "FitResult": "exfit.results.model",
     "Record": "exfit.records.record",
-    "batch": "exfit.fleet.batch",
-    "cases_of_table": "exfit.exchange.table_cases",
+    "batch": "exfit.features.fleet.batch",
+    "cases_of_table": "exfit.features.planner.table_cases",
     "check": "exfit.workflows",
-    "design_test": "exfit.analysis.planning.design",
+    "design_test": "exfit.features.design.design",
     "fit": "exfit.workflows",
-    "fit_all": "exfit.fleet.fits",
+    "fit_all": "exfit.runs.fits",
     "identify": "exfit.workflows",
     "load_case": "exfit.workflows",
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",
-    "rank": "exfit.fleet.ranking",
-    "read_fleet": "exfit.fleet.folder",
+    "rank": "exfit.features.rank.ranked_cases",
+    "read_fleet": "exfit.features.fleet.folder",
     "read_record": "exfit.workflows",
-    "run": "exfit.programme.run",
-    "saturation_curve": "exfit.analysis.steady.saturation",
+    "run": "exfit.features.programme.run",
+    "saturation_curve": "exfit.features.programme.steady.saturation",
     "simulate": "exfit.workflows",
-    "translate": "exfit.analysis.translation.translate",
+    "translate": "exfit.features.translate.translate",
     "validate": "exfit.workflows",
 }
 

@@ -27,7 +27,7 @@ from exfit.errors import CaseError
 from exfit.fitting.recordings import measured, phasors_of
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.output import run_folder
+from exfit.show import run_folder
 from exfit.util.strategies import STRATEGIES
 
 DOCS = ROOT / "docs"

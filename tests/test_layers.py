@@ -40,7 +40,7 @@ MAY_IMPORT["output"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["__main__"] = {"cli"}
 # a result draws itself: inside the call, so that nothing is imported before
-EXCEPTIONS = {("exfit.results.model", "exfit.output.notebook")}
+EXCEPTIONS = {("exfit.results.model", "exfit.show.notebook")}
 
 ONLY_IN = {  # where a library may be imported, inside functions too
     "yaml": {"case"},
@@ -63,9 +63,9 @@ SLOW_TO_IMPORT = {
     "numpy.testing",
 }  # fmt: skip
 NOT_OF_A_FIT = {
-    "exfit.analysis.profiles", "exfit.analysis.comparison", "exfit.analysis.translation",
-    "exfit.analysis.planning.experiment_design", "exfit.exchange.records",
-    "exfit.fleet.fits", "exfit.output.plots", "exfit.output.terminal", "exfit.records.inspection",
+    "exfit.workflows.profiles", "exfit.features.compare.agreement", "exfit.features.translate",
+    "exfit.features.design.experiment_design", "exfit.features.planner.records",
+    "exfit.runs.fits", "exfit.show.figures", "exfit.show.terminal", "exfit.records.inspection",
 }  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import tomllib
 import pytest
 from places import ROOT
 
-from exfit.output.report.page import library
+from exfit.features.report.page import library
 
 PAGE = (ROOT / "docs" / "licences.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| ([a-z0-9.-]+) \| (.+?) \| (.+?) \|$", re.MULTILINE)

@@ -8,6 +8,7 @@ from sources import ROOT, nodes
 
 from exfit.case.schema import RecordFile
 from exfit.cli.completion import noises
+from exfit.features.events import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import (
@@ -17,7 +18,6 @@ from exfit.plants import (
     SPEED,
     UnitOnLoad,
     alone,
-    grid_playback,
     machine_on_load,
     machine_playback,
     open_circuit,

@@ -9,14 +9,13 @@ from cases import local_case
 from places import ROOT
 from tiers import few_of
 
-from exfit.analysis import solution
-from exfit.analysis.intervals import determination
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiment, build_experiments
 from exfit.fitting.system import values_of
 from exfit.plants import VT0
 from exfit.results.compare_with_record import compare_with_record
-from exfit.workflows import fit, simulate, validate
+from exfit.results.intervals import determination
+from exfit.workflows import fit, simulate, solution, validate
 
 REFERENCE = ROOT / "tests" / "reference"
 AC1A = ("ac1a_typical", "ac1a_good", "ac1a_low", "ac1a_high")

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from exfit.case.case import Case
+from exfit.case.draft.free_parameters import bounds_of, free_of
 from exfit.case.parts import exciter_part
 from exfit.case.schema import FreeSection, Parameters
-from exfit.case.starting.free_parameters import bounds_of, free_of
 from exfit.case.ties import Tie, Ties
 from exfit.errors import CaseError
 from exfit.models.sheet import Model, Parameter

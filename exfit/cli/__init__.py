@@ -10,22 +10,22 @@ from typing import Any
 
 import click
 
-from exfit.cli.batch import batch
 from exfit.cli.catalogue import models, schema
-from exfit.cli.comparing import compare
-from exfit.cli.exchange import export, import_
 from exfit.cli.fitting import check, fit
 from exfit.cli.options import Interruption, Refusal
-from exfit.cli.programme import run
-from exfit.cli.ranking import rank
 from exfit.cli.records import inspect_
-from exfit.cli.reporting import report
 from exfit.cli.responses import simulate, validate
-from exfit.cli.starting import new
 from exfit.cli.streams import unfailing_output
-from exfit.cli.translating import translate
 from exfit.cli.uncertainty import identify, profile
 from exfit.errors import ExfitError
+from exfit.features.compare.command import compare
+from exfit.features.fleet.command import batch
+from exfit.features.planner.commands import export, import_
+from exfit.features.programme.command import run
+from exfit.features.rank.command import rank
+from exfit.features.report.command import report
+from exfit.features.start.command import new
+from exfit.features.translate.command import translate
 from exfit.util.interrupts import SIGNALLED, endings_as_interruptions
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small

@@ -28,7 +28,7 @@ def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
     from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
-    from exfit.output import terminal
+    from exfit.show import terminal
 
     exciters, machines = MODELS.values(), MACHINES.values()
     added = {
@@ -38,8 +38,8 @@ def models(name: str | None, folder: Path | None) -> None:
     }
     every: Iterable[Model | Machine] = chain(exciters, machines, *added.values())
     if folder is not None:
-        from exfit.output import run_folder
-        from exfit.output.catalogue_page import write_overview
+        from exfit.show import run_folder
+        from exfit.show.catalogue_page import write_overview
 
         run_folder.refuse_unwritable(folder)
         write_overview(folder, [_model(name)] if name else every)

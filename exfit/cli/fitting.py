@@ -23,7 +23,7 @@ from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRAT
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.case.programme import Programme
+    from exfit.features.programme.case import Programme
     from exfit.results.model import FitResult
 
 
@@ -95,8 +95,8 @@ def fit(
         folder = output.folder(f"{case.stem}-fit")
         fit_again_and_again(case, given, folder, strategy, search, output)
         return
-    from exfit.analysis.causes.before_fit import case_warnings
-    from exfit.analysis.causes.events_before_fit import event_warnings
+    from exfit.features.events.before_fit import event_warnings
+    from exfit.verdict.causes.before_fit import case_warnings
 
     loaded = given.load(case)
     for warning in (*case_warnings(loaded), *event_warnings(loaded)):
@@ -115,7 +115,7 @@ def _fit(
 ) -> "FitResult":
     """Fit a case, write its files, and print JSON or nothing."""
     from exfit import workflows
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     result = workflows.fit(case, strategy, search=search)
     try:
@@ -139,8 +139,8 @@ def check(case: Path) -> None:
     they give.
     """
     from exfit import workflows
-    from exfit.case.programme import load_programme
-    from exfit.output import terminal
+    from exfit.features.programme.case import load_programme
+    from exfit.show import terminal
 
     programme = load_programme(case)
     if programme.single is None:
@@ -154,8 +154,8 @@ def check(case: Path) -> None:
 
 def _check_programme(programme: "Programme") -> None:
     """Check each test of a programme; raises SystemExit where something speaks against one."""
-    from exfit.output import terminal
-    from exfit.programme.checking import check_programme
+    from exfit.features.programme.checking import check_programme
+    from exfit.show import terminal
 
     sound = True
     for checked in check_programme(programme):

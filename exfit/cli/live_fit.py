@@ -26,7 +26,7 @@ def fit_live(
     The figures come last: the result is written and shown before they are drawn.
     """
     from exfit import workflows
-    from exfit.output import run_folder, terminal
+    from exfit.show import run_folder, terminal
 
     console = terminal.console()
     title, most = terminal.task(case, strategy), case.estimate.most_iterations
@@ -57,7 +57,7 @@ def fit_again_and_again(
     """
     from exfit.case.watch import changed, stamps_of
     from exfit.case.yaml import read_text
-    from exfit.output import run_folder, terminal
+    from exfit.show import run_folder, terminal
 
     read_text(case)
     run_folder.refuse_unwritable(folder)

@@ -17,7 +17,7 @@ from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.output.figure_files import FigureFiles
+    from exfit.show.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
 LONGEST_LINE = 1000  # characters of a message: a longer one quotes what is no name of a file
@@ -70,7 +70,7 @@ class Output:
 
         Raises ExfitError where it cannot be written: before a run is spent on it.
         """
-        from exfit.output import run_folder
+        from exfit.show import run_folder
 
         folder = self.given or Path("runs") / default
         run_folder.refuse_unwritable(folder)
@@ -87,7 +87,7 @@ class Output:
         if not self.figures:
             return
         if self.shown:
-            from exfit.output import terminal
+            from exfit.show import terminal
 
             warn(figures.draw(partial(terminal.figure, terminal.console())))
         else:
@@ -147,7 +147,7 @@ class Interruption(click.ClickException):
 
 def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
     """Raise ExfitError where a command's results would write over the files of its case."""
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     recordings = (*case.recordings, *case.validations)
     files = [
@@ -200,7 +200,7 @@ def load(case: Path, model_sha256: str = "", program_sha256: str = "") -> "Case"
     A user's own model, or a program, is run only if its file has the hash given, where one is.
     """
     from exfit.case.load import load_case
-    from exfit.case.program_files import refuse_changed_program
+    from exfit.features.external.program_files import refuse_changed_program
 
     loaded = load_case(case, model_sha256)
     refuse_changed_program(loaded, program_sha256)

@@ -59,9 +59,9 @@ def inspect_(
     Suggests the record, test and estimate sections of a case; guesses are marked. Writes
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
-    from exfit.case.starting.record_settings import RecordSettings
-    from exfit.case.starting.suggested_sections import suggested_sections
-    from exfit.output import run_folder
+    from exfit.case.draft.record_settings import RecordSettings
+    from exfit.case.draft.suggested_sections import suggested_sections
+    from exfit.show import run_folder
 
     # files of one record in several formats have one stem
     folder = output.folder(f"{file.name}-inspect")
@@ -70,7 +70,7 @@ def inspect_(
     if output.as_json:
         print_json(inspection.as_json())
     elif output.shown:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         console = terminal.console()
         terminal.inspection(console, inspection, suggested_sections(inspection, file.as_posix()))

@@ -49,7 +49,7 @@ def simulate(
     """
     from exfit import workflows
     from exfit.fitting.overrides import changed_values, fitted_code, read_parameters
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     loaded = load(case, *(fitted_code(parameters) if parameters else ()))
     folder = output.folder_of(loaded, "simulate")
@@ -58,7 +58,7 @@ def simulate(
     simulation = workflows.simulate(loaded, values)
     figures = run_folder.write_simulation(simulation, case.stem, folder)
     if output.shown:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         console = terminal.console()
         if simulation.comparison is not None:
@@ -122,7 +122,7 @@ def validate(
     """
     from exfit import workflows
     from exfit.fitting.overrides import read_parameters, sources_in
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     if as_found and parameters is not None:
         raise ExfitError("--as-found and --parameters: only one of them says whose values they are")
@@ -152,7 +152,7 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
     Raises CaseError where it was not fitted.
     """
     from exfit.fitting.overrides import fitted_code
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     source = parameters or run_folder.last_fit(path)
     case = load(path, *(() if source is None else fitted_code(source)))
@@ -186,7 +186,7 @@ def _show(result: "ValidationResult", folder: Path, output: Output) -> None:
     if output.as_json:
         print_json({"validation": [plain(match) for match in result.matches]})
     elif output.shown:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         console = terminal.console()
         console.print(result.origin, soft_wrap=True, markup=False)

@@ -16,8 +16,8 @@ from exfit.cli.options import (
 from exfit.errors import CaseError, ExfitError, FileError
 
 if TYPE_CHECKING:
-    from exfit.fleet.fits import FitRun, FitSeries, PlannedFit
-    from exfit.output.figure_files import FigureFiles
+    from exfit.runs.fits import FitRun, FitSeries, PlannedFit
+    from exfit.show.figure_files import FigureFiles
 
 SERIES = "fits"  # the folder of a series by default
 
@@ -36,8 +36,8 @@ def fit_several(
     Raises ExfitError with the faults of all cases before the first fit begins, and with those of
     fits that failed when all else is done; SystemExit where not all fits are done and well.
     """
-    from exfit.fleet.fits import planned
-    from exfit.output import run_folder
+    from exfit.runs.fits import planned
+    from exfit.show import run_folder
 
     folder = output.folder(SERIES)
     plan = planned(cases, strategies, given.load, search)
@@ -52,7 +52,7 @@ def fit_several(
         elif output.shown:
             _show(series)
     if output.shown:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         terminal.written(terminal.console(), folder)
     output.draw(of_all)
@@ -81,8 +81,8 @@ def _quiet(
     plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]"
 ) -> "FitSeries":
     """Run the fits, write their numbers and collect their figures, without a word."""
-    from exfit.fleet.fits import run_all
-    from exfit.output import run_folder
+    from exfit.runs.fits import run_all
+    from exfit.show import run_folder
 
     def finished(run: "FitRun") -> None:
         figures[run.name] = run_folder.write_fit(run.result, folder / run.name)
@@ -94,8 +94,8 @@ def _shown(
     plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]"
 ) -> "FitSeries":
     """Run the fits, write their numbers and collect their figures, and show how far they are."""
-    from exfit.fleet.fits import run_all
-    from exfit.output import run_folder, terminal
+    from exfit.runs.fits import run_all
+    from exfit.show import run_folder, terminal
 
     with terminal.SeriesProgress(terminal.console(), plan).running() as progress:
 
@@ -107,7 +107,7 @@ def _shown(
 
 
 def _show(series: "FitSeries") -> None:
-    from exfit.output import terminal
+    from exfit.show import terminal
 
     terminal.fit_series(terminal.console(), series)
 
@@ -120,7 +120,7 @@ def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
             warn(of_fit.draw())
             left.remove(name)
             if output.shown:
-                from exfit.output import terminal
+                from exfit.show import terminal
 
                 terminal.figures_of_fit(terminal.console(), name)
     except KeyboardInterrupt as interruption:
@@ -133,7 +133,7 @@ def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, command: s
 
     ``command`` names those that are written beside the folders of the fits.
     """
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     faults: dict[str, None] = {}
     for fit in plan:

@@ -43,14 +43,14 @@ def profile(
     to runs/CASE-profile, or to DIR. Ctrl-C keeps the profiles found so far.
     """
     from exfit import workflows
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     loaded = load(case)
     folder = output.folder_of(loaded, "profile")
     if not output.shown:
         profiles = workflows.profile(loaded, parameters)
     else:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         console = terminal.console()
         with terminal.ProgressBar(console).running() as progress:
@@ -139,14 +139,14 @@ def identify(
 def _identify(loaded: "Case", folder: Path, noise: Mapping[str, float], output: Output) -> None:
     """Show how well the test of a case, and others beside it, determine its parameters."""
     from exfit import workflows
-    from exfit.output import run_folder
+    from exfit.show import run_folder
 
     design = workflows.identify(loaded, noise)
     figures = run_folder.write_design(design, folder)
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         console = terminal.console()
         terminal.design(console, design)
@@ -166,8 +166,8 @@ def _design(
     criterion: str | None,
 ) -> None:
     """Show the best test within limits."""
-    from exfit.analysis.planning.design import design_test
-    from exfit.output import run_folder
+    from exfit.features.design.design import design_test
+    from exfit.show import run_folder
 
     design = design_test(
         loaded,
@@ -182,7 +182,7 @@ def _design(
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
-        from exfit.output import terminal
+        from exfit.show import terminal
 
         console = terminal.console()
         terminal.designed_test(console, design)

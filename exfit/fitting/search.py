@@ -13,11 +13,12 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
-from exfit.external.program import ExternalProgram
+from exfit.features.external.program import ExternalProgram
+from exfit.features.external.setups import has_twin, is_external, simulated_by, start_tried
+from exfit.features.external.simulator import QUOTIENT_STEP
+from exfit.features.external.twin_descent import descent_by_twin
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import NO_JUDGE, STAGES, Announce, Judge, no_doubt
-from exfit.fitting.forms.external import has_twin, is_external, simulated_by, start_tried
-from exfit.fitting.forms.twin_descent import descent_by_twin
 from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
@@ -33,7 +34,6 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference import confidence
-from exfit.simulation.external import QUOTIENT_STEP
 from exfit.util.strategies import (
     DEFAULT_STRATEGY,
     FROM_FURTHER_STARTS,

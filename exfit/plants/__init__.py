@@ -1,9 +1,9 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
+from exfit.features.events.grid_playback import RESTING, grid_playback
 from exfit.plants.alone import alone
 from exfit.plants.breaker import BREAKER, SPEED
 from exfit.plants.governing import rests_at
-from exfit.plants.grid_playback import RESTING, grid_playback
 from exfit.plants.infinite_bus import INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.limiting import PLACES, acts_without_load, inputs_at, inputs_for_limiters

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
+from exfit.features.events.grid_playback import GRID_PLAYBACK
 from exfit.plants.alone import ALONE
-from exfit.plants.grid_playback import GRID_PLAYBACK
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.plants.machine_playback import MACHINE_PLAYBACK

@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.features.programme.saturation_result import SaturationResult
+from exfit.features.programme.v_curve_result import VCurve
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.description import Behaviour
 from exfit.results.model import FitResult
 from exfit.results.played_records import PlayedRecord
-from exfit.results.saturation import SaturationResult
-from exfit.results.v_curve import VCurve
 from exfit.results.validation_result import Reported, ValidationResult
 
 Array = NDArray[np.float64]

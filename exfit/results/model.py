@@ -34,7 +34,7 @@ from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE, KEY, plain
 
 if TYPE_CHECKING:
-    from exfit.output.notebook import Figure
+    from exfit.show.notebook import Figure
 
 Array = NDArray[np.float64]
 
@@ -380,13 +380,13 @@ class FitResult:
 
         ``record`` is its name, by default the first. Raises ExfitError for a name of none.
         """
-        from exfit.output.notebook import fit_figure
+        from exfit.show.notebook import fit_figure
 
         return fit_figure(self, record)
 
     def _repr_html_(self) -> str:
         """Return the table that a notebook shows."""
-        from exfit.output.notebook import fit_html
+        from exfit.show.notebook import fit_html
 
         return fit_html(self)
 

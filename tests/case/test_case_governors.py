@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from places import REFERENCE
 
-from exfit.analysis.diagnostics import speed_notes, typical_notes
 from exfit.case.load import load_case
 from exfit.case.peek import free_of
 from exfit.errors import CaseError
 from exfit.fitting.overrides import changed_values
 from exfit.fitting.system import system_of
-from exfit.output.run_folder import write_fit
 from exfit.plants import BREAKER
 from exfit.results.io import load_result
+from exfit.show.run_folder import write_fit
 from exfit.simulation.inputs import Inputs, InputStep
+from exfit.verdict.diagnostics import speed_notes, typical_notes
 from exfit.workflows import fit, simulate
 
 TRUTH = {"governor.R": 0.05, "governor.T1": 0.5, "governor.T3": 8.0}

@@ -7,13 +7,13 @@ import pytest
 from places import ROOT
 from tiers import few_of
 
-from exfit.analysis.diagnostics import typical_notes
 from exfit.case.load import load_case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.input_steps import input_steps
 from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.fitting.system import inputs_of, system_of
-from exfit.output.run_folder import PARAMETERS, write_fit
+from exfit.show.run_folder import PARAMETERS, write_fit
+from exfit.verdict.diagnostics import typical_notes
 from exfit.workflows import fit, simulate
 
 ON_LOAD = """\

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from places import CONFIGS
 
+from exfit.case.draft.starting_case import ALONE, bounds_of, free_of
 from exfit.case.load import load_case, parse_case
 from exfit.case.other_model import with_exciter
-from exfit.case.starting.starting_case import ALONE, bounds_of, free_of
 from exfit.errors import CaseError
 from exfit.models import MODELS
 

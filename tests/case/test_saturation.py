@@ -13,12 +13,12 @@ from scipy.integrate import solve_ivp
 from exfit.case.case import Case
 from exfit.case.saturation import has_saturation
 from exfit.errors import CaseError
-from exfit.exchange.export import export
-from exfit.exchange.fields import Field
-from exfit.exchange.records import alternatives, read_values, record_fields
+from exfit.features.planner.export import export
+from exfit.features.planner.fields import Field
+from exfit.features.planner.records import alternatives, read_values, record_fields
+from exfit.features.report.sections.model import saturation
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.output.report.sections.model import saturation
 from exfit.workflows import check, fit, simulate
 
 A, B = 1.05e-3, 1.433  # of AC1A's sample data, about

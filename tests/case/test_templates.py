@@ -6,7 +6,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exfit.case.starting.suggestion import plain_text
+from exfit.case.draft.suggestion import plain_text
 from exfit.case.templates import commented, in_comment, quoted
 from exfit.case.yaml import read_yaml
 

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
-from exfit.output import terminal
+from exfit.show import terminal
 
 
 @pytest.fixture

@@ -25,9 +25,10 @@ from tiers import few_of
 from exfit import cli, workflows
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.output import plots, terminal
-from exfit.output.figure_files import FigureFiles
 from exfit.results.model import Iteration
+from exfit.show import figures as plots
+from exfit.show import terminal
+from exfit.show.figure_files import FigureFiles
 from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel
 from exfit.util import files
 
@@ -706,7 +707,7 @@ INTERRUPTED = """\
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
-from exfit.output import terminal
+from exfit.show import terminal
 show = terminal.LiveIterations.__call__
 def interrupted(self, line):
     show(self, line)
@@ -1046,7 +1047,7 @@ def test_every_case_of_configs_simulates_and_passes_its_check(run, path):
 
 
 def test_a_check_that_fails_ends_with_3(run, monkeypatch):
-    monkeypatch.setattr("exfit.analysis.model_check.AGREEMENT", 0.0)
+    monkeypatch.setattr("exfit.workflows.model_check.AGREEMENT", 0.0)
     ran = run("check", case_file())
     assert ran.code == 3
     assert "DISAGREE" in ran.out

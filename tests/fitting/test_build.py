@@ -10,7 +10,6 @@ from cases import FIRST_ORDER, TIME, TRUTH
 from places import ROOT
 from tiers import few_of
 
-from exfit.analysis.profiles import profile
 from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.build import build_experiments
@@ -20,6 +19,7 @@ from exfit.plants import SATURATION, VT0
 from exfit.results.compare_with_record import compare_with_record
 from exfit.simulation.simulator import Simulator
 from exfit.workflows import fit, simulate
+from exfit.workflows.profiles import profile
 
 CASE = {
     **FIRST_ORDER,

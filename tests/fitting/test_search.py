@@ -5,12 +5,12 @@ import pytest
 from records import case_of, config, several
 from records import recording as recorded
 
-from exfit.analysis.profiles import profile
 from exfit.estimate import STATUS, Stop
 from exfit.fitting.search import JACOBIANS, fitted, jacobian_error, search
 from exfit.results.model import AT_TOLERANCE
 from exfit.util.text import to_json
 from exfit.workflows import fit
+from exfit.workflows.profiles import profile
 
 ignore = lambda _: None  # noqa: E731
 

@@ -21,18 +21,18 @@ from tiers import few_of
 
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
-from exfit.exchange.export import export
+from exfit.features.planner.export import export
+from exfit.features.report import html
 from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.search import fitted
 from exfit.models import MODELS
 from exfit.models.families import without_doubles
-from exfit.output import terminal
-from exfit.output.report import html
 from exfit.records.record import Record
 from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
+from exfit.show import terminal
 from exfit.workflows import check, fit, profile, simulate
 
 NOISE = 1e-5  # pu: far below what KD = -0.3 does to vt

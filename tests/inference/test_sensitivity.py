@@ -14,9 +14,9 @@ from exfit.case.load import load_case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference import ResidualBlock, confidence, effects
-from exfit.output.terminal.fits import ranking
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
+from exfit.show.terminal.fits import ranking
 from exfit.workflows import fit, identify, simulate
 
 SMALL = 1e-4  # relative: a central difference over it is off by about its square

@@ -12,8 +12,8 @@ from typed_on_load import Typed
 
 from exfit.engine.kernel import Kernel, Span
 from exfit.engine.system import Rest, System
-from exfit.exchange.fields import Field
-from exfit.exchange.records import Definition, read_values, record_fields
+from exfit.features.planner.fields import Field
+from exfit.features.planner.records import Definition, read_values, record_fields
 from exfit.models import LIMITERS, MODELS
 from exfit.models.blocks import SHORTEST, Limited
 from exfit.models.limiter_blocks import counting

@@ -11,6 +11,7 @@ import pytest
 from places import REFERENCE
 from references import MACHINE_NAMES
 
+from exfit.features.events import grid_playback
 from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
@@ -24,7 +25,6 @@ from exfit.plants import (
     VT0,
     Stabilised,
     UnitOnLoad,
-    grid_playback,
     infinite_bus,
 )
 from exfit.simulation.inputs import Inputs, InputStep

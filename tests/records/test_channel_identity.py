@@ -6,7 +6,7 @@ import yaml
 from columns import Columns
 from step_records import step_record
 
-from exfit.case.starting.suggestion import record_section
+from exfit.case.draft.suggestion import record_section
 from exfit.records.inspection import inspect
 
 TABLE = step_record(1, length=6.0).table.content

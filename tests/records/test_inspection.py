@@ -15,14 +15,14 @@ from step_records import step_record
 from tables import read_columns
 from tiers import few_of
 
-from exfit.case.starting.suggestion import bump_section, record_section, weights_section
+from exfit.case.draft.suggestion import bump_section, record_section, weights_section
 from exfit.errors import RecordError
-from exfit.output import plots
 from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.steps import LevelChange, combined_steps
 from exfit.records.units import unit_in
+from exfit.show import figures as plots
 
 FIELD = "field_record"
 WITHIN = 0.02  # s

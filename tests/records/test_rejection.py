@@ -10,11 +10,11 @@ from step_records import step_record
 from tiers import few_of
 from typed_rejection import Load, recorded_rejection
 
-from exfit.case.starting.starting_tests import starting_tests
-from exfit.case.starting.suggestion import bump_section
-from exfit.case.starting.table_of_tests import TableRow
-from exfit.case.starting.table_of_tests import tests_of_table as named_tests
+from exfit.case.draft.starting_tests import starting_tests
+from exfit.case.draft.suggestion import bump_section
 from exfit.errors import ExfitError
+from exfit.features.start.table_of_tests import TableRow
+from exfit.features.start.table_of_tests import tests_of_table as named_tests
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 

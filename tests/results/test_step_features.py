@@ -12,7 +12,7 @@ from tiers import few_of
 import exfit
 from exfit.dsp.features import TIMES
 from exfit.dsp.recorded_features import EITHER, RecordedResponse, recorded_features
-from exfit.output.terminal.validations import comparisons
+from exfit.show.terminal.validations import comparisons
 
 WAYS = {
     "no ripple": {"rippled": False},

@@ -32,9 +32,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from coverage_cases import HARD_CASES, noisy, truth_of
 from dense_profiles import dense_intervals
 
-from exfit.analysis.case_search import SearchTask, search_outcome
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.util.files import write
+from exfit.workflows.case_search import SearchTask, search_outcome
 
 RECORDS, SEED = 500, 2026
 DENSE = 20

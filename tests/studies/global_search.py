@@ -18,7 +18,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 import numpy as np
 
-from exfit.analysis.given_values import with_values
 from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.estimate import Descent
@@ -28,6 +27,7 @@ from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.fitting.search import LIKELIHOOD_RATIO, fitted, search
 from exfit.simulation.simulator import Simulator
+from exfit.workflows.given_values import with_values
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 THESIS = (

@@ -27,7 +27,7 @@ from dyr_words import changed_words
 from planner_files import planner_file
 
 from exfit.cli import main as command
-from exfit.fleet.folder import read_fleet
+from exfit.features.fleet.folder import read_fleet
 
 
 def run(*arguments):

@@ -32,7 +32,7 @@ from records import write
 
 import exfit
 from exfit.case.case import Case
-from exfit.case.starting.suggestion import record_section, weights_section
+from exfit.case.draft.suggestion import record_section, weights_section
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 

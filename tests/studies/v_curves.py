@@ -16,9 +16,9 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from exfit.analysis.steady.field_on_load import field_on_load  # noqa: E402
-from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad  # noqa: E402
-from exfit.analysis.steady.v_curve import v_curve  # noqa: E402
+from exfit.features.programme.steady.field_on_load import field_on_load  # noqa: E402
+from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad  # noqa: E402
+from exfit.features.programme.steady.v_curve import v_curve  # noqa: E402
 from exfit.fitting.parameters import FreeParameter  # noqa: E402
 from exfit.models.machines import MACHINES  # noqa: E402
 from exfit.models.sheet import typical  # noqa: E402

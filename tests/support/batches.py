@@ -9,8 +9,8 @@ import yaml
 from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 
 from exfit.case.peek import files_of
-from exfit.fleet.folder import read_fleet
-from exfit.fleet.task import run_case
+from exfit.features.fleet.folder import read_fleet
+from exfit.features.fleet.task import run_case
 from exfit.util.typed import plain
 
 NOISE = 1e-3

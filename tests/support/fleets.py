@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from exfit.fleet.folder import Fleet
-from exfit.fleet.summary import (
+from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.summary import (
     CaseSummary,
     SummaryCurve,
     SummaryParameter,

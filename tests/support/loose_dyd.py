@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from exfit.exchange.records import SORTED
+from exfit.features.planner.records import SORTED
 
 PSLF_UNIT = """\
 # dynamics data of a test

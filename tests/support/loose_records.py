@@ -3,7 +3,7 @@
 import re
 from math import exp, log
 
-from exfit.exchange.records import contradictions, unused_of
+from exfit.features.planner.records import contradictions, unused_of
 from exfit.models.sheet import typical
 
 TRIES = 500

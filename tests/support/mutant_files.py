@@ -134,7 +134,7 @@ def _parameters(rng: Random, changes: Changes) -> Files:
 def _of_a_fit(name: str = "first_order") -> Mapping[str, bytes]:
     """Return the numbers that a fit of a case leaves."""
     from exfit import fit
-    from exfit.output.run_folder import write_fit
+    from exfit.show.run_folder import write_fit
 
     with tempfile.TemporaryDirectory() as folder:
         write_fit(fit(CONFIGS / f"{name}.yaml", search="local"), Path(folder))
@@ -146,9 +146,9 @@ def _of_a_fit(name: str = "first_order") -> Mapping[str, bytes]:
 @cache
 def _of_a_programme() -> Mapping[str, bytes]:
     """Return what a programme of two tests at rest leaves, by paths in its folder."""
-    from exfit.case.programme import load_programme
-    from exfit.output.programme_folder import write_programme, write_test
-    from exfit.programme.run import run
+    from exfit.features.programme.case import load_programme
+    from exfit.features.programme.folder import write_programme, write_test
+    from exfit.features.programme.run import run
 
     content = yaml.safe_load((CONFIGS / "programmes" / "ac8b_unit1.yaml").read_bytes())
     content["tests"] = content["tests"][:2]
@@ -169,7 +169,7 @@ def _of_a_programme() -> Mapping[str, bytes]:
 @cache
 def _of_a_batch() -> Mapping[str, bytes]:
     """Return what a batch of a case that is done, one that failed and one refused leaves."""
-    from exfit.fleet.folder import (
+    from exfit.features.fleet.folder import (
         CaseOutcome,
         Failure,
         IndexEntry,
@@ -177,7 +177,7 @@ def _of_a_batch() -> Mapping[str, bytes]:
         write_entry,
         write_outcome,
     )
-    from exfit.fleet.summary import summary_of
+    from exfit.features.fleet.summary import summary_of
     from exfit.results.io import load_result
 
     done, failed = "0" * 31 + "1", "0" * 31 + "2"

@@ -9,9 +9,9 @@ from loose_records import loose, sound
 from programme_files import FREE
 
 from exfit.case.load import parse_case
-from exfit.exchange.import_case import case_text
-from exfit.exchange.records import alternatives, contradictions, definition_of, definitions
-from exfit.exchange.unit import read_unit
+from exfit.features.planner.import_case import case_text
+from exfit.features.planner.records import alternatives, contradictions, definition_of, definitions
+from exfit.features.planner.unit import read_unit
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical

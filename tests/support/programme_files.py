@@ -8,8 +8,8 @@ import yaml
 from channel_records import response_of
 from places import CONFIGS
 
-from exfit.exchange.psse.files import record_text
-from exfit.exchange.records import alternatives
+from exfit.features.planner.psse.files import record_text
+from exfit.features.planner.records import alternatives
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical

@@ -6,8 +6,8 @@ from pathlib import Path
 import yaml
 from recorder_files import SIGNALS, Column, RecorderFile
 
+from exfit.case.draft.suggestion import bump_section, record_section
 from exfit.case.open_values import FILL_IN
-from exfit.case.starting.suggestion import bump_section, record_section
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 

@@ -6,7 +6,6 @@ from typing import Any
 from exfit.case.checks.as_found import as_found_faults
 from exfit.case.checks.breaker import breaker_faults, driving_signals
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
-from exfit.case.checks.external import external_faults
 from exfit.case.checks.model import parameter_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
@@ -34,6 +33,7 @@ from exfit.case.checks.sources import source_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import LONGEST_WHOLE, Fault
+from exfit.features.external.checks import external_faults
 from exfit.plants import PlantKind
 from exfit.util.strategies import DEFAULT_SEARCH
 

@@ -23,7 +23,6 @@ from exfit.case.schema.plants import (
     SaturationName,
     Stabiliser,
 )
-from exfit.case.schema.programme import RecordedBump, RecordedRejection, TestOfProgramme
 from exfit.case.schema.records import (
     SINGLE,
     ChannelSection,
@@ -33,8 +32,6 @@ from exfit.case.schema.records import (
     SineSection,
 )
 from exfit.case.schema.report import AsFoundSection, CriteriaSection, ReportRequest
-from exfit.case.schema.saturation_tests import CurveColumn, SaturationTest
-from exfit.case.schema.steady_tests import PointColumn, SteadyTest
 from exfit.case.schema.tests import (
     MOST_ROWS,
     AngleStep,
@@ -48,6 +45,9 @@ from exfit.case.schema.tests import (
     Switch,
 )
 from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
+from exfit.features.programme.schema import RecordedBump, RecordedRejection, TestOfProgramme
+from exfit.features.programme.schema_saturation import CurveColumn, SaturationTest
+from exfit.features.programme.schema_steady import PointColumn, SteadyTest
 
 __all__ = [
     "MOST_ROWS",

@@ -6,11 +6,11 @@ from pydantic import Field
 
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
 from exfit.case.schema.plants import Governor, Limiter, Plant, SaturationName, Stabiliser
-from exfit.case.schema.programme import TestOfProgramme
 from exfit.case.schema.records import RecordFile, Recording
 from exfit.case.schema.report import AsFoundSection, ReportRequest
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Fact, Frozen, Section, Text, nothing
+from exfit.features.programme.schema import TestOfProgramme
 
 ABOUT = Field(
     default_factory=nothing,

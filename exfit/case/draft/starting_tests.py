@@ -1,0 +1,276 @@
+"""The tests of a new case: what was done, as far as it is given, and how each one counts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import copysign
+from typing import NamedTuple, NoReturn
+
+from exfit.case.draft.bases import Base
+from exfit.errors import ExfitError, FileError
+from exfit.records.contradictions import LARGEST_STEP, sign_disputed_by, size_in_words
+from exfit.records.inspection import Inspection
+from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
+from exfit.records.rejection import REMEDY, BreakerOpening
+from exfit.records.steps import RecordedStep
+
+AT_REST = (0.9, 1.1)  # pu: a voltage at rest is within the limits of a machine
+LIKE = (0.9, 1.25)  # of what vt changes by: the step of a reference, as the regulator's gain is
+
+
+@dataclass(frozen=True)
+class StartingTest:
+    """A test of a recorder's file, with the sizes (pu) of its steps, None where they are unknown.
+
+    ``window`` (s) is None where the whole record is used. ``bases`` are given by signal.
+    """
+
+    name: str
+    inspection: Inspection
+    steps: tuple[RecordedStep, ...]
+    window: tuple[float, float] | None = None
+    sizes: tuple[float | None, ...] = ()
+    bases: Mapping[str, Base] = field(default_factory=dict)
+    validates: bool = False
+
+
+def starting_tests(
+    inspections: Sequence[Inspection],
+    sizes: Sequence[str] = (),
+    bases: Mapping[str, Base] | None = None,
+) -> tuple[StartingTest, ...]:
+    """Return the tests of records: every other one, from the second on, validates.
+
+    ``sizes`` (pu) are texts as 0.05 for all tests or up=0.05 for those whose names have that word;
+    they are amounts, or have the sign of the step. Of a single record without steps it is one test.
+
+    Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
+    for a record in which the breaker opens, for one of several that shows no step, and for a
+    play-in file.
+    """
+    _refuse_play_in(inspections)
+    if any(inspection.is_event for inspection in inspections):
+        return _events(inspections, sizes, bases or {})
+    _refuse_rejections(inspections)
+    recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
+    given = bases or {}
+    if not recorded and len(inspections) == 1:
+        _refuse_unused(sizes, [])
+        return (StartingTest("fit", inspections[0], (), bases=given),)
+    _refuse_without_steps(inspections)
+    made = [
+        started(inspection, test, amount, given, k % 2 == 1)
+        for k, ((inspection, test), amount) in enumerate(
+            zip(recorded, _amounts(recorded, sizes), strict=True)
+        )
+    ]
+    return renamed(made, [test for _, test in recorded])
+
+
+def _refuse_play_in(inspections: Sequence[Inspection]) -> None:
+    """Raise ExfitError for a play-in file: it has nothing that a fit could be compared with."""
+    for inspection in inspections:
+        if inspection.plays_in:
+            raise ExfitError(
+                f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
+                "sections of a case that exfit simulate takes"
+            )
+
+
+def _events(
+    inspections: Sequence[Inspection], sizes: Sequence[str], bases: Mapping[str, Base]
+) -> tuple[StartingTest, ...]:
+    """Return the grid events that phasor measurement units recorded, one a record.
+
+    Raises ExfitError for sizes of steps, and for a record of another kind beside them.
+    """
+    _refuse_unused(sizes, [])
+    for inspection in inspections:
+        if not inspection.is_event:
+            raise ExfitError(
+                f"{inspection.path}: no angle of a grid event, which the other records have: give "
+                "bump tests a case of their own"
+            )
+    single = len(inspections) == 1
+    return tuple(
+        StartingTest(
+            "fit" if single else f"event{k}", inspection, (), bases=bases, validates=k % 2 == 0
+        )
+        for k, inspection in enumerate(inspections, 1)
+    )
+
+
+def _amounts(
+    recorded: Sequence[tuple[Inspection, DetectedTest]], sizes: Sequence[str]
+) -> list[float | None]:
+    """Return the size (pu) of each test, None where it is not given; raises ExfitError."""
+    tests = [test for _, test in recorded]
+    names = unique_names([test.name() for test in tests], tests)
+    by_name = _sizes_by_name(sizes, names)
+    for (inspection, test), name in zip(recorded, names, strict=True):
+        if len(recorded) > 1 and name in by_name and by_name[name].of_all:
+            refuse_other_size(inspection, test, by_name[name].amount)
+    return [by_name[name].amount if name in by_name else None for name in names]
+
+
+def sizes_in_use(texts: Sequence[str], inspections: Sequence[Inspection]) -> list[str]:
+    """Return the sizes, texts as 0.05 or up=0.05, that are of a test of some records."""
+    tests = [test for inspection in inspections for test in tests_of(inspection)]
+    names = unique_names([test.name() for test in tests], tests)
+    return [text for text in texts if _named(text, names)]
+
+
+def doubtful_bases(tests: Sequence[StartingTest]) -> list[str]:
+    """Return what is doubtful in the bases of tests: a voltage that rests far from them."""
+    low, high = AT_REST
+    doubts = []
+    for test in tests:
+        channel, base = test.inspection.channel_of("vt"), test.bases.get("vt")
+        if channel is None or base is None:
+            continue
+        level = channel.level / base.in_unit(channel.unit, channel.name)
+        if not low <= level <= high:
+            doubts.append(
+                f"{test.inspection.path}: {channel.name} rests at {level:.3g} times its base: is "
+                f"{base.value:g} the rated voltage of this unit?"
+            )
+    return list(dict.fromkeys(doubts))
+
+
+def renamed(
+    tests: Sequence[StartingTest], recorded: Sequence[DetectedTest]
+) -> tuple[StartingTest, ...]:
+    """Return tests under names by their sizes as given, of which no two are the same."""
+    names = [
+        own.name(test.sizes[0] if test.sizes else None)
+        for test, own in zip(tests, recorded, strict=True)
+    ]
+    return tuple(
+        replace(test, name=name)
+        for test, name in zip(tests, unique_names(names, recorded), strict=True)
+    )
+
+
+def started(
+    inspection: Inspection,
+    test: DetectedTest,
+    amount: float | None,
+    bases: Mapping[str, Base],
+    validates: bool,
+) -> StartingTest:
+    """Return a recorded test whose steps all have an amount (pu) with the signs that vt shows.
+
+    Raises ExfitError where the record shows another one, or that the breaker opens.
+    """
+    if inspection.opening and any(inspection.opening.causes(step.at) for step in test.steps):
+        _refuse_rejection(inspection, inspection.opening)
+    return StartingTest(
+        test.name(),
+        inspection,
+        test.steps,
+        None if is_whole_record(test, inspection) else test.window,
+        tuple(_sized(inspection, test, k, amount) for k in range(len(test.steps))),
+        bases,
+        validates,
+    )
+
+
+def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
+    for inspection in inspections:
+        if inspection.opening is not None:
+            _refuse_rejection(inspection, inspection.opening)
+
+
+def _refuse_rejection(inspection: Inspection, opening: BreakerOpening) -> NoReturn:
+    raise ExfitError(
+        f"{inspection.path}: {opening.in_words}; new makes cases of bump tests: {REMEDY}; if the "
+        "file has bump tests as well, --tests gives a table of them"
+    )
+
+
+def _sized(
+    inspection: Inspection, test: DetectedTest, index: int, amount: float | None
+) -> float | None:
+    """Return the size (pu) of a step, None where it, or the way it went, is open.
+
+    Raises ExfitError where the record contradicts it.
+    """
+    if amount is None:
+        return None
+    change = test.changes[index]
+    place = f"{inspection.path}: step {amount:g} at {test.steps[index].at:.4g} s"
+    _refuse_impossible(place, amount)
+    if change is None:
+        disputed = sign_disputed_by(inspection.channels, inspection.steps, test.steps[index])
+        return amount if index == 0 and (amount < 0.0 or not disputed) else None
+    if index == 0 and amount < 0.0 < change:
+        raise ExfitError(f"{place}: vt rises there, by {100.0 * change:.2g} %")
+    return copysign(amount, change)
+
+
+def _refuse_impossible(place: str, amount: float) -> None:
+    """Raise ExfitError for a size (pu) that no test has."""
+    if amount == 0.0 or abs(amount) > LARGEST_STEP:
+        text = "0 is no step" if amount == 0.0 else size_in_words(amount)
+        raise ExfitError(f"{place}: {text}")
+
+
+def refuse_other_size(inspection: Inspection, test: DetectedTest, amount: float) -> None:
+    """Raise ExfitError where a size (pu) that all tests share is not that of this one."""
+    _refuse_impossible(f"{inspection.path}: --step", amount)
+    change = test.changes[0]
+    if change is None or len(test.steps) > 1:
+        return
+    low, high = (share * abs(change) for share in LIKE)
+    if not low <= abs(amount) <= high:
+        raise ExfitError(
+            f"{inspection.path}: --step {amount:g}: vt changes by {100.0 * change:+.2g} % at "
+            f"{test.at:.4g} s; give the size of that test, as --step at-{test.at:.0f}s=..."
+        )
+
+
+class StepAmount(NamedTuple):
+    """The size (pu) of the steps of a test, and whether it is that of all tests."""
+
+    amount: float
+    of_all: bool
+
+
+def _sizes_by_name(texts: Sequence[str], names: Sequence[str]) -> dict[str, StepAmount]:
+    """Return the sizes of tests by name; one for all counts less than one of some."""
+    sizes: dict[str, StepAmount] = {}
+    unused = []
+    for text in sorted(texts, key=lambda text: "=" in text):
+        words, _, number = text.rpartition("=")
+        try:
+            amount = float(number)
+        except ValueError:
+            raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
+        named = _named(text, names)
+        sizes |= dict.fromkeys(named, StepAmount(amount, not words))
+        unused += [] if named else [text]
+    _refuse_unused(unused, names)
+    return sizes
+
+
+def _named(text: str, names: Sequence[str]) -> list[str]:
+    """Return the names of the tests that a size is of."""
+    words = text.rpartition("=")[0]
+    return [name for name in names if f"-{words}-" in f"-{name}-" or not words]
+
+
+def _refuse_without_steps(inspections: Sequence[Inspection]) -> None:
+    """Raise ExfitError for records, of several, that show no step."""
+    faults = [
+        f"{inspection.path}: shows no step; a table of tests can say where it is"
+        for inspection in inspections
+        if not tests_of(inspection)
+    ]
+    if faults:
+        raise FileError(faults)
+
+
+def _refuse_unused(texts: Sequence[str], names: Sequence[str]) -> None:
+    """Raise ExfitError for sizes that belong to no test."""
+    if texts:
+        tests = ", ".join(names) or "none: it shows no step"
+        raise ExfitError(f"--step {texts[0]}: no test of that name; the record's tests: {tests}")

@@ -1,1 +1,0 @@
-"""A case to start from: its tests, its unit, what is free, and its text."""

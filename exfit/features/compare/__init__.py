@@ -1,0 +1,1 @@
+"""Two responses beside each other, whichever program each is from: exfit compare."""

@@ -1,0 +1,126 @@
+"""The command compare."""
+
+from math import isfinite, nan
+from pathlib import Path
+
+import click
+
+from exfit.cli.given_files import GivenFile, Kind
+from exfit.cli.options import Output, output_options, print_json
+from exfit.errors import ExfitError
+
+FEWEST_CURVES = 2  # without a record
+
+
+@click.command(short_help="Compare responses, from any program.")
+@click.argument(
+    "curves",
+    type=GivenFile(Kind.RECORD, Kind.RESULT),
+    nargs=-1,
+    required=True,
+    metavar="CURVE [CURVE]...",
+)
+@click.option(
+    "--record",
+    type=GivenFile(Kind.RECORD, Kind.RESULT),
+    metavar="FILE",
+    help="Measured curve: the reference in place of the first CURVE.",
+)
+@click.option(
+    "--columns",
+    multiple=True,
+    metavar="vt=VOLT",
+    help="Column of a signal, in the files that have it; may be repeated.",
+)
+@click.option(
+    "--time",
+    multiple=True,
+    metavar="COLUMN",
+    help="Column of the time, s, in the files that have it; may be repeated.",
+)
+@click.option(
+    "--align",
+    is_flag=True,
+    help="Move the clocks so that the detected steps are together, at that of the reference.",
+)
+@click.option(
+    "--shift",
+    "shifts",
+    multiple=True,
+    metavar="B=S",
+    help="Seconds added to the time of a curve; without a name, to that of B. May be repeated.",
+)
+@click.option("--step", "step_at", type=float, metavar="S", help="Instant of the step, s.")
+@output_options
+def compare(
+    curves: tuple[Path, ...],
+    record: Path | None,
+    columns: tuple[str, ...],
+    time: tuple[str, ...],
+    align: bool,
+    shifts: tuple[str, ...],
+    step_at: float | None,
+    output: Output,
+) -> None:
+    """Compare any number of responses, and all with a record.
+
+    Each CURVE is the folder or the result.json of a fit or a simulation, or a CSV file of any
+    program; they are named A, B, C and so on. The signals of A are compared over the time that all
+    cover, on the finest of their clocks: with A, and with the record at its instants. f is half the
+    sum of the squared differences. Clocks that differ are reported, and moved with --align or
+    --shift. Parameters of fits are shown side by side.
+
+    Writes compare.json, compare.csv and compare.png to runs/compare, or to DIR; with a record
+    compare-record.csv too.
+    """
+    if len(curves) < FEWEST_CURVES and record is None:
+        raise click.UsageError("One CURVE alone can be compared only with a --record.")
+    if align and shifts:
+        raise click.UsageError("--align moves all clocks: not together with --shift.")
+    from exfit.features.compare.agreement import compare as compared
+    from exfit.features.compare.curves import ColumnChoice
+    from exfit.show import run_folder
+
+    folder = output.folder("compare")
+    run_folder.refuse_inputs("compare", [*curves, *([record] if record else ())], folder)
+    choice = ColumnChoice(_columns(columns), time)
+    agreement = compared(curves, record, choice, _shifts(shifts), align, step_at)
+    figures = run_folder.write_agreement(agreement, folder)
+    if output.as_json:
+        print_json(agreement.as_json())
+    elif output.shown:
+        from exfit.show import terminal
+
+        console = terminal.console()
+        terminal.agreement(console, agreement)
+        terminal.written(console, folder)
+    output.draw(figures)
+
+
+def _shifts(texts: tuple[str, ...]) -> dict[str, float]:
+    """Return the seconds of --shift B=0.5 by curve; raises ExfitError for other text."""
+    shifts: dict[str, float] = {}
+    for text in texts:
+        name, given, seconds = text.rpartition("=")
+        curve = name.strip() if given else "B"
+        try:
+            shift = float(seconds)
+        except ValueError:
+            shift = nan
+        if not isfinite(shift):
+            raise ExfitError(f"--shift {text}: not of the form B=0.5, in seconds")
+        if curve in shifts:
+            raise ExfitError(f"--shift {text}: the time of {curve} is shifted twice")
+        shifts[curve] = shift
+    return shifts
+
+
+def _columns(texts: tuple[str, ...]) -> dict[str, list[str]]:
+    """Return the columns of --columns vt=VOLT by signal; raises ExfitError for other text."""
+    columns: dict[str, list[str]] = {}
+    for text in texts:
+        signal, given, column = (part.strip() for part in text.partition("="))
+        if not (signal and given and column):
+            raise ExfitError(f"--columns {text}: not of the form vt=VOLT")
+        columns.setdefault(signal, []).append(column)
+    return columns

@@ -1,0 +1,299 @@
+"""The design of an experiment: how well a planned test would determine the parameters.
+
+It needs no record.
+
+Source: Walter & Pronzato 1997, Identification of Parametric Models from Experimental Data,
+chapter 6.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.dsp.noise import noise as noise_of
+from exfit.errors import CaseError
+from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.problem import free_parameters, problem_of
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.setup import with_enough_substeps
+from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncertainty_of
+from exfit.inference import Confidence
+from exfit.plants import REFERENCES
+from exfit.signals import NOISE
+from exfit.simulation.inputs import grid_segments
+from exfit.simulation.simulator import Simulator
+from exfit.util.text import near
+from exfit.util.typed import plain
+from exfit.verdict.diagnostics import search_range_notes
+
+Array = NDArray[np.float64]
+
+STEPS = (0.02, 0.05, 0.10)  # pu, of the reference
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A test that could be made, and how well it would determine the parameters."""
+
+    label: str
+    confidence: Confidence
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """How well the test of a case would determine its parameters, and others beside it.
+
+    ``noise`` is the standard deviation that was assumed for each signal, per unit; of each record,
+    where they differ.
+    """
+
+    name: str
+    own: UncertaintyAnalysis
+    plans: tuple[Plan, ...]
+    noise: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What the test of the case would leave open, in words."""
+        return self.own.open
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures."""
+        return {
+            "noise": dict(self.noise),
+            **plain(self.own),
+            "notes": list(self.notes),
+            "plans": {plan.label: plain(plan.confidence) for plan in self.plans},
+        }
+
+
+def identify(case: Case, noise: Mapping[str, float]) -> Design:
+    """Return how well tests would determine the free parameters of a case, at their start values.
+
+    The case's own test comes first, on the clock of its record if it has one; beside it steps of
+    2, 5 and 10 %, a test twice as long, and further signals. ``noise`` is that of signals, per
+    unit; else it is the case's, else the record's, else `NOISE`. Raises ExfitError for input that
+    cannot be used.
+    """
+    setups = build_experiments(case) if case.recordings else ()
+    free = free_parameters(case, setups)
+    if not free:
+        raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
+    own = [setup.experiment for setup in setups] or [planned(case)]
+    refuse_noise(noise)
+    levels = [noise_levels(experiment, noise) for experiment in own]
+    records = tuple(parameter.name for setup in setups for parameter in setup.free)
+    uncertainty_after = partial(
+        _uncertainty_after, case=case, free=free, levels=levels, records=records
+    )
+    plans = [
+        Plan(label, uncertainty_after(experiments).confidence)
+        for label, experiments in _variants(case, own)
+    ]
+    return Design(
+        case.path.stem,
+        uncertainty_after(own),
+        tuple(plans),
+        _noise_by_signal(case, own, levels),
+        (*_twin_notes(case), *search_range_notes(case)),
+    )
+
+
+def _twin_notes(case: Case) -> Iterator[str]:
+    if case.external is not None:
+        yield (
+            f"these are the standard errors of the twin {case.external.twin}: "
+            f"{case.external.simulator} is not run"
+        )
+
+
+def _uncertainty_after(
+    experiments: Sequence[Experiment],
+    case: Case,
+    free: Sequence[FreeParameter],
+    levels: Sequence[Mapping[str, float]],
+    records: tuple[str, ...],
+) -> UncertaintyAnalysis:
+    """Return how well experiments with these levels of noise would determine what is free.
+
+    ``records`` names what is found about the records themselves.
+    """
+    starts = {parameter.name: parameter.start for parameter in free}
+    fixed = {name: value for name, value in case.values().items() if name not in starts}
+    at = {**fixed, **starts, **_steps(experiments)}
+    pairs = [*zip(experiments, levels, strict=True)]
+    finest = min(of_signal[name] for experiment, of_signal in pairs for name in experiment.signals)
+    expected = [
+        with_enough_substeps(_with_noise(experiment, of_signal, finest), at, case.path)
+        for experiment, of_signal in pairs
+    ]
+    problem = problem_of(Residuals(expected, _with_steps(free, experiments), fixed, case.ties))
+    residuals = problem.residuals
+    linear = linearisation(problem, residuals.start, records, np.zeros(residuals.count))
+    # a start on its bound is no result
+    linear = replace(linear, held=(None,) * len(linear.names))
+    return uncertainty_of(problem, residuals.start, linear)
+
+
+def refuse_noise(noise: Mapping[str, float]) -> None:
+    """Raise CaseError for a signal that does not exist, or a level that is none."""
+    unknown = [name for name in noise if name not in NOISE]
+    if unknown:
+        raise CaseError(f"noise: {name}: not a signal; {near(name, NOISE)}" for name in unknown)
+    wrong = {name: level for name, level in noise.items() if not 0.0 < level < inf}
+    if wrong:
+        raise CaseError(
+            f"noise: {name}: {level:g}: must be finite and above 0" for name, level in wrong.items()
+        )
+
+
+def _steps(experiments: Sequence[Experiment]) -> dict[str, float]:
+    """Return the sizes that the tests have of steps which a fit would find."""
+    return {
+        nuisance.name: experiment.simulator.inputs.steps[nuisance.step].step
+        for experiment in experiments
+        for nuisance in experiment.nuisances
+        if nuisance.kind == "step"
+    }
+
+
+def _with_steps(
+    free: Sequence[FreeParameter], experiments: Sequence[Experiment]
+) -> list[FreeParameter]:
+    """Return what is free, with the sizes of the tests' steps to start from."""
+    sizes = _steps(experiments)
+    return [
+        replace(parameter, start=sizes.get(parameter.name, parameter.start)) for parameter in free
+    ]
+
+
+def noise_levels(experiment: Experiment, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the noise of each signal in a test."""
+    levels = dict(NOISE)
+    for channel in experiment.channels:
+        recorded = noise_of(channel.measured[channel.kept]) if np.ptp(channel.measured) else 0.0
+        level = channel.noise or recorded
+        if level > 0.0:
+            levels[channel.signal] = level
+    return {**levels, **given}
+
+
+def _noise_by_signal(
+    case: Case, own: Sequence[Experiment], levels: Sequence[Mapping[str, float]]
+) -> dict[str, float]:
+    """Return the noise of each signal, under the name of its record too where they differ."""
+    by_signal = {}
+    for signal in _signals(case, own):
+        if len({of_signal[signal] for of_signal in levels}) == 1:
+            by_signal[signal] = levels[0][signal]
+        else:
+            by_signal |= {
+                f"{experiment.name} {signal}": of_signal[signal]
+                for experiment, of_signal in zip(own, levels, strict=True)
+            }
+    return by_signal
+
+
+def _with_noise(experiment: Experiment, levels: Mapping[str, float], finest: float) -> Experiment:
+    """Return an experiment whose channels have the noise that is expected of them."""
+    channels = tuple(
+        replace(channel, noise=levels[channel.signal], weight=finest / levels[channel.signal])
+        for channel in experiment.channels
+    )
+    return replace(experiment, channels=channels)
+
+
+def _variants(
+    case: Case, own: Sequence[Experiment]
+) -> Iterator[tuple[str, tuple[Experiment, ...]]]:
+    """Yield tests beside the case's own; those of several records are varied together."""
+    for label, vary in _variations(case, own):
+        yield label, tuple(vary(experiment) for experiment in own)
+
+
+def _variations(
+    case: Case, own: Sequence[Experiment]
+) -> Iterator[tuple[str, Callable[[Experiment], Experiment]]]:
+    """Yield by name how a test can be varied in the plant of a case."""
+    if not case.kind.closed_loop:
+        return
+    for size in STEPS:
+        yield f"{100 * size:g} %", partial(_scaled, size=size)
+    yield "longer", _longer
+    present = {channel.signal for experiment in own for channel in experiment.channels}
+    extra = [signal for signal in _signals(case, own) if signal not in present]
+    for signal in extra:
+        yield f"+ {signal}", partial(_with_signals, signals=(signal,))
+    if len(extra) > 1:
+        yield "+ all", partial(_with_signals, signals=extra)
+
+
+def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
+    """Return the signals that are recorded, then those that could be."""
+    present = [channel.signal for experiment in own for channel in experiment.channels]
+    possible = case.kind.compared if case.kind.closed_loop else ()
+    return tuple(dict.fromkeys([*present, *possible]))
+
+
+def _scaled(experiment: Experiment, size: float) -> Experiment:
+    """Return a test whose first move of the reference has a given size, others in proportion.
+
+    Of a recorded reference it is the largest move.
+    """
+    old = experiment.simulator
+    largest = _largest_move(old)
+    if largest is None:
+        return experiment
+    share = size / largest
+    steps = tuple(
+        step._replace(step=share * step.step) if step.signal in REFERENCES else step
+        for step in old.inputs.steps
+    )
+    recorded = {
+        signal: replace(given, samples=share * given.samples) if signal in REFERENCES else given
+        for signal, given in old.inputs.recorded.items()
+    }
+    if not recorded:
+        return replace(experiment, simulator=old.with_inputs(steps, old.delay))
+    inputs = replace(old.inputs, steps=steps, recorded=recorded)
+    simulator = Simulator(old.system, inputs, old.times, old.step, old.least, old.delay)
+    return replace(experiment, simulator=simulator)
+
+
+def _largest_move(simulator: Simulator) -> float | None:
+    """Return by how much a test moves the reference, pu; None where it does not."""
+    inputs = simulator.inputs
+    if "vref" in inputs.recorded:
+        grid = grid_segments(inputs, simulator.step)
+        return max(float(np.max(np.abs(inputs.input("vref", part)))) for part in grid)
+    moves = inputs.moves("vref")
+    return moves[0].largest if moves else None
+
+
+def _longer(experiment: Experiment) -> Experiment:
+    """Return a test that goes on as long as it is."""
+    old = experiment.simulator
+    times = np.concatenate([old.times, old.times[1:] + (old.times[-1] - old.times[0])])
+    inputs = replace(old.inputs, end=float(times[-1]) + max(0.0, -old.delay))
+    simulator = Simulator(old.system, inputs, times, old.step, old.least, old.delay)
+    zeros = np.zeros(len(times))
+    channels = tuple(
+        replace(channel, measured=zeros, filtering=None) for channel in experiment.channels
+    )
+    return replace(experiment, simulator=simulator, channels=channels)
+
+
+def _with_signals(experiment: Experiment, signals: Sequence[str]) -> Experiment:
+    """Return a test at which further signals are recorded."""
+    zeros = np.zeros(len(experiment.simulator.times))
+    further = tuple(Channel(signal, zeros) for signal in signals)
+    return replace(experiment, channels=(*experiment.channels, *further))

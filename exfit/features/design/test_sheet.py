@@ -1,0 +1,73 @@
+"""The sheet of a designed test for the plant: as text, as a table, and as a section of a case."""
+
+from collections.abc import Iterator
+
+from exfit.features.design.designed_test import DesignedTest
+
+NAMES = {"vt": "terminal voltage vt", "efd": "field voltage efd"}
+
+
+def sheet_text(design: DesignedTest) -> str:
+    """Return what the people at the plant must do, record and watch."""
+    return "\n".join([f"Test sheet: {design.name}", "", *sheet_lines(design), ""])
+
+
+def sheet_lines(design: DesignedTest) -> Iterator[str]:
+    """Yield the lines of the sheet, none wider than 80 characters."""
+    best = design.best
+    yield f"{'at (s)':>8}  {'step (pu)':>10}  {'reference from its start (pu)':>30}"
+    level = 0.0
+    for step in best.steps:
+        level += step.step
+        yield f"{step.at:8.4g}  {step.step:+10.5f}  {level:+30.5f}"
+    yield ""
+    yield f"start       at rest, vt = {design.vt0:.4g} pu, all limiters out of reach"
+    yield f"record      {', '.join(best.channels)} and the reference, to {best.duration:g} s,"
+    yield f"            {design.rate:.6g} samples a second, in one file, with the instants of steps"
+    yield f"allowed     reference within {design.limits.of_vref:g} pu of its start"
+    for signal, (low, high) in design.extremes.items():
+        yield f"{'planned' if signal == 'vt' else '':<12}{_extreme(design, signal, low, high)}"
+    for number, (signal, (low, high)) in enumerate(design.other_values.extremes.items()):
+        if number == 0:
+            spread = 100.0 * design.other_values.spread
+            yield f"if others   with a parameter {spread:g} % off, in turn:"
+        yield f"            {NAMES[signal]} {low:.4f} ... {high:.4f} pu"
+    back = -level
+    if abs(back) > 0.0:
+        yield f"after it    return the reference to its start: {back:+.5f} pu"
+
+
+def _extreme(design: DesignedTest, signal: str, low: float, high: float) -> str:
+    """Return between which values a signal stays, and its limits."""
+    limits = design.limits
+    if signal == "vt":
+        ends = (design.vt0 - limits.vt, design.vt0 + limits.vt)
+        return f"{NAMES[signal]} {low:.4f} ... {high:.4f} pu; limits {ends[0]:.4f}, {ends[1]:.4f}"
+    given = [
+        f"{word} {limits.given[name]:g}"
+        for word, name in (("at least", "efd_min"), ("at most", "efd"))
+        if name in limits.given
+    ]
+    limit = f"limits {', '.join(given)}" if given else "no limit but the model's"
+    return f"{NAMES[signal]} {low:.4f} ... {high:.4f} pu; {limit}"
+
+
+def sheet_table(design: DesignedTest) -> str:
+    """Return the steps as CSV: instants in s, sizes and levels of the reference per unit."""
+    rows, level = ["at_s,step_pu,reference_from_start_pu\n"], 0.0
+    for step in design.best.steps:
+        level += step.step
+        rows.append(f"{step.at:.9g},{step.step:.9g},{level:.9g}\n")
+    return "".join(rows)
+
+
+def case_section(design: DesignedTest) -> str:
+    """Return the section ``test`` of a case file that makes this test."""
+    steps = "".join(
+        f"    - {{at: {step.at:.9g}, step: {step.step:.9g}}}\n" for step in design.best.steps
+    )
+    channels = ", ".join(design.best.channels)
+    return (
+        f"# the test that makes {', '.join(design.of)} best known; to be recorded: {channels}\n"
+        f"test:\n  vt0: {design.vt0:.9g}\n  duration: {design.best.duration:.9g}\n  vref:\n{steps}"
+    )

@@ -1,0 +1,243 @@
+"""The noise of recorded signals that drive a simulation: errors in variables.
+
+A simulation that recorded signals drive carries their noise into its response, so that it is in the
+errors of all channels at once, coloured by the unit. To first order these errors are
+
+    e = J n_u - n_y
+
+with n_y the noise of the channels, n_u that of the driving signals, and J the response to each of
+their samples. Weighing errors by this covariance is what greatest likelihood asks for where the
+true course of the driving signals is unknown at every sample, and eliminated. To second order the
+derivatives by the parameters hold the same noise as the errors, which moves the parameters: by how
+much is found by adding as much noise again (simulation-extrapolation), and taken away.
+
+Source: Seber & Wild 1989, sections 2.1.4 and 10.2 (generalised least squares; errors in variables);
+Carroll, Ruppert, Stefanski & Crainiceanu 2006, chapter 5 (simulation-extrapolation).
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.sampling import sampling_of
+from exfit.estimate import LocalMinimum, Progress
+from exfit.features.events.driving_noise.responses import carried_noise, noise_of_inputs, with_added
+from exfit.fitting.descents import descent_near, minimum_near
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.global_search import SearchResult
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.setup import ExperimentSetup
+from exfit.inference.whitening import whitening
+from exfit.inference.wording import digits, listed
+from exfit.simulation.simulator import Simulator
+from exfit.simulation.splines import SplinedInput
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Values = Mapping[str, float]
+
+SEED = 0
+PAIRS = 6  # of realisations of noise, with either sign: what is of first order cancels
+MOST_ERRORS = 5000  # of a record: the covariance of more takes too much memory and time
+MOST_PASSES = 5
+FAR = 0.1  # of a scaled parameter: the response to noise is not the same
+SMALL_BIAS = 0.1  # standard errors: a smaller change of it matters to no interval
+UNSEEN = 1e-9  # of the largest singular value: rounding
+REFUTED = 4.0  # times the least cost: such a minimum stays refuted whatever the weights
+NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
+BIAS_KNOWN_TO = 0.12  # of itself, as the variance of noise by fourth differences of 720 samples
+TURN = 2.0 * np.pi  # rad
+NOT_WEIGHED = (
+    "the noise of the signals that drive the simulation biases the parameters, and the intervals "
+    "do not hold all of it: it cannot be weighed"
+)
+
+
+def why_not_weighed(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
+    """Return why errors cannot be weighed by the noise of the driving signals, None if they can."""
+    if residuals.robust is not None:
+        return "with a robust loss"
+    for setup in setups:
+        if setup.test.steady is None:
+            return "without a rest before the event"
+        if not all(channel.plain for channel in setup.channels):
+            return "with a filter, or a recorder that averages"
+        sampling = sampling_of(setup.record.time)
+        if sampling.gaps or not sampling.even:
+            return "where samples are missing or uneven"
+        if sum(setup.experiment.sizes) > MOST_ERRORS:
+            return f"in a record with more than {MOST_ERRORS} samples of all signals compared"
+    return None
+
+
+def weighed_by_noise(
+    problem: FitProblem,
+    setups: Sequence[ExperimentSetup],
+    theta: Array,
+    watch: Callable[[Progress], object] = lambda _: None,
+) -> tuple[FitProblem, Array, tuple[str, ...]]:
+    """Return the problem weighed by the noise of what drives it, its minimum (N,), and notes.
+
+    ``theta`` (N,) is the minimum without weights. The noise moves the minimum no longer: where it
+    moved it by much, weights and bias are found anew from the better point. ``watch`` gets how far
+    that is. Raises SimulationError where there is no response, KeyboardInterrupt at an
+    interruption.
+    """
+    bias, cost = np.zeros_like(theta), float(problem.residuals.costs([theta])[0])
+    for further in range(MOST_PASSES):
+        watch(Progress("weighing", further, MOST_PASSES, cost))
+        at, before = theta, bias
+        white = whitened(problem.residuals, setups, at)
+        if not further:
+            theta = minimum_near(white, at)
+        unbiased, bias = without_bias(white, theta)
+        theta = minimum_near(unbiased, theta)
+        if np.max(np.abs(theta - at)) < FAR and np.max(np.abs(bias - before)) < SMALL_BIAS:
+            break
+    watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))
+    return FitProblem(unbiased, unbiased), theta, tuple(noise_notes(unbiased, theta, bias))
+
+
+def whitened(residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Array) -> Residuals:
+    """Return residuals that are white near theta (N,), but for what no noise explains.
+
+    They are as large as before, so that costs are of the same size.
+    """
+    values = residuals.values(theta)
+    noises = [carried_noise(setup, values) for setup in setups]
+    scale = float(np.sqrt(np.mean(np.concatenate([noise.variance for noise in noises]))))
+    experiments = [
+        replace(setup.experiment, whitening=whitening(noise, in_time(setup.experiment), scale))
+        for setup, noise in zip(setups, noises, strict=True)
+    ]
+    return replace(residuals, experiments=experiments)
+
+
+def in_time(experiment: Experiment) -> Rows:
+    """Return the places of the errors (M,) of all channels in the order of time."""
+    times = [np.flatnonzero(channel.kept) for channel in experiment.channels]
+    return np.asarray(np.argsort(np.concatenate(times), kind="stable"))
+
+
+def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
+    """Return white residuals whose minimum near theta (N,) the driving noise does not move.
+
+    With the bias (N,) that is gone, in standard errors of each parameter.
+    """
+    gradient, jacobian = added_gradient(residuals, theta), residuals.errors(theta)[1]
+    _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
+    seen = singular > UNSEEN * np.max(singular, initial=0.0)
+    roots = directions[seen].T / singular[seen]
+    bias = -roots @ (roots.T @ gradient)
+    shifts = np.split(-jacobian @ bias, np.cumsum([sum(e.sizes) for e in residuals.experiments]))
+    experiments = [
+        replace(experiment, whitening=experiment.whitening.shifted(shift))
+        for experiment, shift in zip(residuals.experiments, shifts, strict=False)
+        if experiment.whitening is not None
+    ]
+    scale = next(e.whitening.scale for e in experiments if e.whitening is not None)
+    deviations = scale * np.sqrt(np.sum(roots**2, axis=1))
+    some = deviations > 0.0
+    relative = np.where(some, bias, 0.0) / np.where(some, deviations, 1.0)
+    return replace(residuals, experiments=experiments), relative
+
+
+def bias_of(residuals: Residuals, theta: Array) -> Array | None:
+    """Return the bias (N,) of scaled parameters that `without_bias` took out; None without one."""
+    if all(experiment.whitening is None for experiment in residuals.experiments):
+        return None
+    jacobian = residuals.errors(theta)[1]
+    return np.asarray(np.linalg.lstsq(jacobian, -shift_of(residuals), rcond=UNSEEN)[0])
+
+
+def shift_of(residuals: Residuals) -> Array:
+    """Return what was taken from the errors (M,) of the records for the bias."""
+    return np.concatenate(
+        [
+            np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.shift
+            for each in residuals.experiments
+        ]
+    )
+
+
+def added_gradient(residuals: Residuals, theta: Array) -> Array:
+    """Return what as much noise of the driving signals again adds to the gradient (N,), on average.
+
+    Half of that of either sign: only what is of second order is left.
+    """
+    generator = np.random.default_rng(SEED)
+    values, moves = residuals.values(theta), residuals.moves(theta)
+    added = np.zeros(len(theta))
+    for experiment in residuals.experiments:
+        simulator = experiment.with_inputs(values)
+        errors, jacobian = experiment.tangents(values, moves)
+        for noisy in _noisier(simulator, generator):
+            noisy_errors, slopes = replace(experiment, simulator=noisy).tangents(values, moves)
+            added += (slopes.T @ noisy_errors - jacobian.T @ errors) / (2 * PAIRS)
+    return added
+
+
+def _noisier(simulator: Simulator, generator: "np.random.Generator") -> Iterator[Simulator]:
+    """Yield simulators whose recorded inputs have as much noise again, of either sign."""
+    recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
+    for _ in range(PAIRS):
+        noise = {
+            signal: deviation * generator.standard_normal(len(recorded[signal].samples))
+            for signal, deviation in deviations.items()
+        }
+        yield with_added(simulator, noise)
+        yield with_added(simulator, {signal: -own for signal, own in noise.items()})
+
+
+def with_minima_of(problem: FitProblem, found: SearchResult) -> SearchResult:
+    """Return a search whose minima are those of another problem.
+
+    Minima far above the best one stay as they are. Raises KeyboardInterrupt at an interruption.
+    """
+    if found.minima is None:
+        return found
+
+    def weighed(minimum: LocalMinimum) -> LocalMinimum:
+        if minimum.cost > REFUTED * found.best.cost:
+            return minimum
+        end = descent_near(problem.residuals, minimum.x)
+        return LocalMinimum(end.x, end.cost, minimum.starts, end)
+
+    minima = map(weighed, found.minima.minima)
+    return found._replace(minima=replace(found.minima, minima=tuple(minima)))
+
+
+def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str]:
+    """Yield what was done about the noise of the driving signals, and how large it is.
+
+    ``bias`` (N,) is what it did to the parameters, in standard errors.
+    """
+    values = residuals.values(theta)
+    worst = int(np.argmax(np.abs(bias)))
+    share = f"{digits(abs(float(bias[worst])))} standard errors ({residuals.free[worst].name})"
+    large = (
+        "; the intervals allow for an error of 12 % of it" if abs(bias[worst]) > NOT_SMALL else ""
+    )
+    for experiment in residuals.experiments:
+        name = f" of {experiment.name}" if len(residuals.experiments) > 1 else ""
+        levels = listed([*_levels(experiment.with_inputs(values))])
+        yield (
+            f"the noise of what drives the simulation{name}, {levels}, is in the errors of all "
+            "signals: they are weighed by its covariance, and the intervals hold it"
+        )
+    yield f"the bias by that noise is taken out: it was at most {share}{large}"
+
+
+def _levels(simulator: Simulator) -> Iterator[str]:
+    """Yield the noise of each recorded input, in words."""
+    for signal, deviation in noise_of_inputs(simulator).items():
+        recorded = simulator.inputs.recorded[signal]
+        if signal != "angle":
+            yield f"{signal} {digits(deviation)} pu"
+        elif isinstance(recorded, SplinedInput) and recorded.integrated:
+            yield f"frequency {digits(deviation / TURN)} Hz"
+        else:
+            yield f"angle {digits(deviation)} rad"

@@ -1,0 +1,367 @@
+"""What is wrong with the record of a grid event: bases, signs, angle and clock, before any fit.
+
+The unit's response to its recorded voltage depends, in swings, on its machine far more than on its
+exciter: where the recorded power swings otherwise by far, the record is not that of the unit.
+"""
+
+from collections.abc import Iterator, Mapping
+from math import hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.quality import noise_of, spikes
+from exfit.dsp.sampling import sampling_of
+from exfit.records.record import Record
+from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.verdict import Cause
+from exfit.signals import SIGNALS
+from exfit.verdict.causes.evidence import Evidence
+from exfit.verdict.causes.suspicion import CERTAIN, Suspicion
+
+Array = NDArray[np.float64]
+
+RATED_VOLTAGES = (0.85, 1.15)  # pu: a unit on load rests between these
+ROOT = sqrt(3.0)
+NEAR_ROOT = 0.12  # of a level: so near to the root of three it is that
+MOST_POWER = 1.2  # pu, apparent: the rating, with what a machine may be overloaded by
+LEAST_POWER = 0.02  # pu, apparent
+MOST_REACTIVE = 0.75  # pu: beyond the capability of machines that feed active power
+MOTORING = -0.02  # pu
+SLOWEST = 0.1  # s between samples: a swing of 1 Hz has ten
+HELD = 0.3  # s: so long a measurement does not stay the same while the unit swings
+SAME = 1e-12  # of the largest sample: what is computed of equal samples differs by less
+ANGLE_JUMP = 0.1  # rad from one sample to the next
+ALONE, MOST_CHANGES = 5.0, 95.0  # times what so many per cent of the changes stay below
+BESIDE_JUMP = 5  # samples on both sides, in which the power follows
+LEAST_STIFFNESS = 0.5  # pu of power a rad of angle: machines have more than one
+JUMP_AFTER_HOLD = 4.0  # times the usual change between samples
+LOST_VOLTAGE, LONGEST_LOSS = 0.05, 3  # pu, samples
+BESIDE_SPIKE, BEND = 2, 3.0  # samples; times what most bends stay below
+SPIKE = 8.0  # times the noise
+LEAST_SWING = 1e-3  # pu, rms: with less in record or response nothing can be compared
+LEAST_OVER_NOISE = 4.0  # times the noise of the record: the same
+SMOOTHED_OVER = 2.0  # s: what is slower is the work of regulators and turbine
+LIKE_RESPONSE = (0.4, 2.5)  # times the swings of the response: what other data may explain
+AGAINST = -0.5  # correlation of swings that go against each other
+UNLIKE = 0.3  # correlation of swings that have little in common
+LATEST = 0.25  # s: near its resonance a unit with other data is as late
+AS_ALIKE = 0.05  # of the correlation: of delays that are as good the shortest one
+LEAST_ALIKE = 0.85  # correlation of swings that are the same but for a delay
+SIGN_BEFORE_DELAY = 0.05  # of the correlation: with as little to choose it is the sign
+GAINED_BY_DELAY = 0.15  # of the correlation
+DRIVING = ("vt", "angle", "frequency")
+
+
+def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield what the records of grid events themselves show to be wrong."""
+    if not evidence.case.kind.finds_rest:
+        return
+    for record in evidence.records:
+        steady = record.steady_until
+        if steady is not None:
+            measured = record.setup.record
+            for cause in (*clock_causes(measured), *record_causes(measured, steady)):
+                yield Suspicion(cause, CERTAIN)
+
+
+def record_causes(record: Record, steady: float) -> tuple[Cause, ...]:
+    """Return what is wrong with the record of an event that begins after ``steady`` (s).
+
+    It is seen without a response: levels at which no unit runs, held and single samples, angles
+    that jump while the power does not.
+    """
+    return (
+        *rest_causes(record, steady),
+        *_held(record, steady),
+        *_spiky(record),
+        *_jumping_angle(record),
+    )
+
+
+def clock_causes(record: Record) -> Iterator[Cause]:
+    """Yield gaps of the clock, over which the unit would be driven blindly, and slow sampling."""
+    sampling = sampling_of(record.time)
+    for gap in sampling.gaps[:1]:
+        more = f" ({len(sampling.gaps)} such gaps)" if len(sampling.gaps) > 1 else ""
+        yield Cause(
+            f"the clock jumps from {gap.start:g} to {gap.end:g} s, about {gap.lost} samples are "
+            f"missing{more}",
+            "the voltage and the angle that drive the unit are not known there: give a record "
+            "without the gap, or a window beside it",
+        )
+    if sampling.step > SLOWEST:
+        yield Cause(
+            f"samples are {sampling.step:g} s apart; swings of a unit need {SLOWEST:g} s at most",
+            "check the unit of the time, or export the record at 30 samples per second or more",
+        )
+
+
+def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
+    """Yield levels before the event at which no generator runs."""
+    level = {name: _level(record, samples, steady) for name, samples in record.signals.items()}
+    if "vt" in level and not RATED_VOLTAGES[0] <= level["vt"] <= RATED_VOLTAGES[1]:
+        yield _voltage_cause(level["vt"])
+    p, q = level.get("p"), level.get("q", 0.0)
+    if p is None:
+        return
+    if p < MOTORING:
+        yield Cause(
+            f"p rests at {p:.3g} pu: a generator feeds power, p is above {MOTORING:g} pu",
+            "if the channel counts what the unit takes, scale: -1 on p, and on q if that is of the "
+            "same meter, turns it",
+        )
+    apparent = hypot(p, q)
+    if apparent > MOST_POWER:
+        yield Cause(
+            f"p and q rest at {p:.3g} and {q:.3g} pu, {apparent:.3g} pu of apparent power, above "
+            f"{MOST_POWER:g}",
+            "check the base of p and q, which is the rated MVA of the machine, and their units",
+        )
+    elif apparent < LEAST_POWER:
+        yield Cause(
+            f"p and q rest at {p:.2g} and {q:.2g} pu, below {LEAST_POWER:g} pu of apparent power",
+            "check the base of p and q, which is the rated MVA of the machine, and their units",
+        )
+    elif abs(q) > MOST_REACTIVE and abs(q) > abs(p):
+        yield Cause(
+            f"q rests at {q:.3g} pu, above {MOST_REACTIVE:g}, and p at {p:.3g} pu",
+            "are p and q exchanged? Check their columns",
+        )
+
+
+def _voltage_cause(level: float) -> Cause:
+    low, high = RATED_VOLTAGES
+    text = f"vt rests at {level:.4g} pu, not between {low:g} and {high:g}"
+    for ratio, what in ((1.0 / ROOT, "1 / sqrt(3)"), (ROOT, "sqrt(3)")):
+        if abs(level / ratio - 1.0) < NEAR_ROOT:
+            return Cause(
+                f"{text}; it is about {what}",
+                "a voltage from phase to ground is taken for one from phase to phase, or the other "
+                "way round: check the base, or record.phasors.voltage.connection",
+            )
+    return Cause(text, "check its unit, and its base: the rated voltage, line to line")
+
+
+def _level(record: Record, samples: Array, steady: float) -> float:
+    """Return the mean of a signal (M,) before the event."""
+    before = samples[(record.time < steady) & np.isfinite(samples)]
+    return float(np.mean(before)) if len(before) else float("nan")
+
+
+def _held(record: Record, steady: float) -> Iterator[Cause]:
+    """Yield signals that stay the same for a while in the event, and then jump."""
+    for name, samples in record.signals.items():
+        present = np.isfinite(samples) & (record.time >= steady)
+        t, y = record.time[present], samples[present]
+        hold = _longest_hold(t, y)
+        if hold is not None:
+            start, end = hold
+            yield Cause(
+                f"{name} does not change from {start:.4g} to {end:.4g} s, in the event, and then "
+                "jumps",
+                "the recorder held its last sample: mask that part, or give a record of the PMU "
+                "itself, not of a historian that stores changes",
+            )
+
+
+def _longest_hold(time: Array, samples: Array) -> tuple[float, float] | None:
+    """Return from when to when (s) a signal (M,) is held before a jump, None where it is not."""
+    if len(samples) < 3:
+        return None
+    changes = np.abs(np.diff(samples))
+    changes[changes < SAME * np.max(np.abs(samples))] = 0.0
+    moving = changes[changes > 0.0]
+    if not len(moving):
+        return None
+    usual = float(np.median(moving))
+    starts = np.concatenate([[0], np.flatnonzero(changes) + 1])
+    ends = np.concatenate([starts[1:] - 1, [len(samples) - 1]])
+    coarse = len(moving) < 0.5 * len(changes)  # a hold is usual there
+    for k in np.argsort(time[starts] - time[ends], kind="stable"):
+        first, last = int(starts[k]), int(ends[k])
+        if time[last] - time[first] < HELD:
+            return None
+        jumps = last + 1 < len(samples) and (
+            changes[last] > JUMP_AFTER_HOLD * usual or _is_staircase(time, starts, coarse)
+        )
+        if jumps:
+            return float(time[first]), float(time[last])
+    return None
+
+
+def _is_staircase(time: Array, starts: NDArray[np.intp], coarse: bool) -> bool:
+    """Return whether a signal changes in even steps that are far apart, as a slow meter has it."""
+    apart = np.diff(time[starts])
+    return coarse and len(apart) > 2 and float(np.ptp(apart)) < 0.5 * float(np.median(apart))
+
+
+def _spiky(record: Record) -> Iterator[Cause]:
+    """Yield driving and compared signals with single samples that are none."""
+    voltage = record.signals.get("vt", np.ones(0))
+    lost = np.flatnonzero(voltage < LOST_VOLTAGE)
+    if 0 < len(lost) <= LONGEST_LOSS:
+        yield Cause(
+            f"vt is {voltage[lost[0]]:.2g} pu at {record.time[lost[0]]:.4g} s, in {len(lost)} "
+            f"of {len(voltage)} samples: below {LOST_VOLTAGE:g} pu",
+            "the measurement was lost there: correct these samples, or give a window beside them",
+        )
+    for name, samples in record.signals.items():
+        present = np.isfinite(samples)
+        t, y = record.time[present], samples[present]
+        scatter = noise_of(y)
+        outlying = [
+            row
+            for row in (spikes(t, y, scatter, SPIKE) if scatter > 0.0 else ())
+            if not _others_bend(record, name, float(t[row]))
+        ]
+        if outlying:
+            at = ", ".join(f"{t[row]:.4g}" for row in outlying[:3])
+            remedy = (
+                "it drives the unit: give a median filter on the channel, or correct these samples"
+                if name in DRIVING
+                else "outliers: 6 on the channel leaves them out"
+            )
+            count = "a single sample" if len(outlying) == 1 else f"{len(outlying)} single samples"
+            yield Cause(f"{name} has {count} far off its course, at {at} s", remedy)
+
+
+def _others_bend(record: Record, name: str, at: float) -> bool:
+    """Return whether another signal bends beside an instant (s) as no noise does: a switching."""
+    row = int(np.searchsorted(record.time, at))
+    near = slice(max(row - BESIDE_SPIKE, 1), row + BESIDE_SPIKE + 1)
+    for other, samples in record.signals.items():
+        bends = np.abs(np.diff(samples, 2, prepend=samples[:1], append=samples[-1:]))
+        least = BEND * float(np.nanpercentile(bends, MOST_CHANGES))
+        if other != name and np.nanmax(bends[near], initial=0.0) > least:
+            return True
+    return False
+
+
+def _jumping_angle(record: Record) -> Iterator[Cause]:
+    """Yield an angle that jumps while the power does not, as when a PMU's clock is set."""
+    angle, p = record.signals.get("angle"), record.signals.get("p")
+    if angle is None or p is None:
+        return
+    jumps = np.diff(angle)
+    jumps = jumps - np.nanmedian(jumps)
+    alone = ALONE * float(np.nanpercentile(np.abs(jumps), MOST_CHANGES))
+    for k in np.flatnonzero(np.abs(jumps) > max(ANGLE_JUMP, alone)):
+        near = p[max(k - BESIDE_JUMP, 0) : k + BESIDE_JUMP + 2]
+        size = float(jumps[k])
+        if float(np.nanmax(near) - np.nanmin(near)) < LEAST_STIFFNESS * abs(size):
+            yield Cause(
+                f"angle jumps by {size:+.2g} rad at {record.time[k + 1]:.4g} s, and p moves by "
+                f"less than {LEAST_STIFFNESS:g} pu a rad beside it",
+                "the clock of the PMU was set there, or the sample is none: give a window beside "
+                "it, or correct the angle",
+            )
+            return
+
+
+def swing_causes(comparison: Comparison, steady: float) -> Iterator[Cause]:
+    """Yield powers that swing otherwise than any unit with such a machine would."""
+    overlays: Mapping[str, Overlay] = comparison.overlays
+    for name in ("p", "q"):
+        overlay = overlays.get(name)
+        if overlay is not None:
+            yield from _swing_cause(name, comparison.time, overlay, steady)
+
+
+def mismatch(comparison: Comparison, steady: float) -> float:
+    """Return how far the swings of p are off the response's, of the sizes of both; 1 at most."""
+    overlay = comparison.overlays["p"]
+    known = np.isfinite(overlay.error)
+    t = comparison.time[known]
+    measured, simulated = (
+        swings(t, y[known])[t >= steady] for y in (overlay.measured, overlay.simulated)
+    )
+    size = float(np.sum(measured**2) + np.sum(simulated**2))
+    return float(np.sum((measured - simulated) ** 2)) / size if size > 0.0 else 0.0
+
+
+def _swing_cause(name: str, time: Array, overlay: Overlay, steady: float) -> Iterator[Cause]:
+    known = np.isfinite(overlay.error)
+    t = time[known]
+    measured, simulated = (
+        swings(t, y[known])[t >= steady] for y in (overlay.measured, overlay.simulated)
+    )
+    noise = noise_of(overlay.measured[known])
+    sizes = [float(np.sqrt(np.mean(y * y))) for y in (measured, simulated)]
+    least = max(LEAST_SWING, LEAST_OVER_NOISE * noise)
+    if max(sizes) < least:
+        return
+    place = f"{name} swings by {sizes[0]:.2g} pu rms in the event, the response by {sizes[1]:.2g}"
+    alike = _correlation(measured, simulated)
+    ratio = sizes[0] / max(sizes[1], 1e-12)
+    low, high = LIKE_RESPONSE
+    if not low <= ratio <= high:
+        yield Cause(f"{place}: {ratio:.2g} times as far, not {low:g} ... {high:g}", _remedy(ratio))
+        return
+    late, better = _delay(t[t >= steady], measured, simulated)
+    if alike < AGAINST and -alike > better - SIGN_BEFORE_DELAY:
+        yield Cause(
+            f"{place}, against each other (correlation {alike:.2f})",
+            f"check the signs of {name} and of the angle: scale: -1 turns a channel",
+        )
+    elif abs(late) > LATEST and better > max(alike + GAINED_BY_DELAY, LEAST_ALIKE):
+        order = "later" if late > 0.0 else "earlier"
+        yield Cause(
+            f"{name} moves {abs(late):.2g} s {order} than the response, beyond {LATEST:g} s",
+            "check the clocks of its source and of the voltage, and the sign of the angle",
+        )
+    elif alike < UNLIKE and name == "p":
+        yield Cause(
+            f"{place}, with little in common (correlation {alike:.2f}, above {UNLIKE:g} expected)",
+            "is the angle that of the voltage of this unit, and are H and the reactances its own? "
+            "Check the columns and the data of the machine",
+        )
+
+
+def _remedy(ratio: float) -> str:
+    """Return what to check where swings are so many times as far as the response's."""
+    if ratio < 0.1 or ratio > 10.0:
+        return (
+            "check the unit of the angle, which is by 57.3 too large where degrees are taken for "
+            "radians, the unit of the frequency, and the bases of p, q and vt"
+        )
+    return (
+        f"check the base of {SIGNALS['p'].name} and reactive power, the rated MVA of the machine, "
+        "the unit of the angle, and H and the reactances"
+    )
+
+
+def swings(time: Array, samples: Array) -> Array:
+    """Return a signal (M,) less its mean over two seconds about each instant."""
+    step = float(np.median(np.diff(time)))
+    half = min(max(round(0.5 * SMOOTHED_OVER / step), 1), len(samples) // 2)
+    padded = np.pad(samples, half, mode="edge")
+    sums = np.cumsum(np.concatenate([[0.0], padded]))
+    width = 2 * half + 1
+    return np.asarray(samples - (sums[width:] - sums[:-width]) / width)
+
+
+def _correlation(a: Array, b: Array) -> float:
+    size = sqrt(float(a @ a) * float(b @ b))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def _delay(time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
+    """Return by how much (s) a signal is later than another where they are most alike, and how."""
+    step = float(np.median(np.diff(time)))
+    most = min(round(1.0 / step), len(time) // 4)
+    correlations = []
+    for lag in range(-most, most + 1):
+        a = measured[max(lag, 0) : len(measured) + min(lag, 0)]
+        b = simulated[max(-lag, 0) : len(simulated) - max(lag, 0)]
+        correlations.append((lag, _correlation(a, b)))
+    best = max(alike for _, alike in correlations)
+    peaks = [
+        (lag, alike)
+        for (_, before), (lag, alike), (_, after) in zip(
+            correlations, correlations[1:], correlations[2:], strict=False
+        )
+        if before <= alike >= after and alike >= best - AS_ALIKE
+    ]
+    lag, alike = min(peaks, key=lambda peak: abs(peak[0]), default=(0, best))
+    return lag * step, alike

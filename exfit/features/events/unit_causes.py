@@ -1,0 +1,235 @@
+"""What the case of a grid event says of the unit beside its exciter: swing, controls, transformer.
+
+Each is tried by one more fit of the record, of a unit that is otherwise in this.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+
+from exfit.case.case import Case
+from exfit.case.other_equipment import (
+    with_governor,
+    with_plant_keys,
+    with_stabiliser,
+    without_governor,
+    without_stabiliser,
+)
+from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.system import system_of
+from exfit.models.sheet import Model
+from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
+from exfit.results.verdict import Cause
+from exfit.verdict.causes.evidence import Evidence
+from exfit.verdict.causes.suspicion import Suspicion, likelihood, suspected
+from exfit.verdict.causes.trials import Trial, always, freed_within, refitted, tried, with_freed
+from exfit.verdict.causes.unit import STRUCTURE
+
+LARGEST_FACTOR = 4.0  # of the inertia
+MOST_DAMPING = 20.0  # pu
+LARGEST_TRANSFORMER, USUAL_TRANSFORMER = 0.5, 0.1  # pu, reactance
+NO_LIMIT = 9.0  # pu
+STAND_INS = {  # simple governors: of steam, and of water, whose power at first goes the other way
+    "TGOV1": {"VMAX": NO_LIMIT, "VMIN": -NO_LIMIT},
+    "HYGOV": {"GMAX": NO_LIMIT, "GMIN": -NO_LIMIT},
+}
+STARTS = {
+    "TGOV1": {"R": 0.05, "T1": 0.5, "T3": 10.0},
+    "HYGOV": {"R": 0.05, "Tr": 5.0, "TW": 1.5},
+}
+NUMBERS_OF_STAND_IN = 3
+WIDE = 20.0  # times: from the start to the bounds
+MOST_LEFT = 0.5  # of the error beyond the noise, by a stand-in that is like the unit's own
+LIKELIER_THAN_MODEL = 1.0  # log-likelihood
+INERTIA, DAMPING, REACTANCE = f"{MACHINE}H", f"{MACHINE}D", f"{NETWORK}X"
+FORMS = {
+    "power": "the mechanical power is constant, (Pm - D dw) / (1 + dw)",
+    "torque": "the mechanical torque is constant, Pm - D dw",
+}
+
+
+def of_case(evidence: Evidence, other: Case) -> Residuals:
+    """Return the residuals of the same records by a unit as another case has it.
+
+    Parameters that this has not are not free; those that it adds have the values of that case.
+    """
+    own, values = evidence.residuals, other.values()
+    experiments = [
+        replace(experiment, simulator=experiment.simulator.of_system(system_of(other, recording)))
+        for experiment, recording in zip(own.experiments, other.recordings, strict=True)
+    ]
+    lost = evidence.case.values().keys() - values.keys()
+    free = [parameter for parameter in own.free if parameter.name not in lost]
+    names = {parameter.name for parameter in free}
+    fixed = {name: value for name, value in {**values, **own.fixed}.items() if name not in names}
+    return replace(own, experiments=experiments, free=free, fixed=fixed, counter=None)
+
+
+def other_swing(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the other form of the equation of the speed would match."""
+    own = getattr(evidence.case.plant, "swing", "power")
+    form = "torque" if own == "power" else "power"
+    cause = Cause(
+        f"the equation of the speed: swing: {form} would match (the case has {own})",
+        f"where the record is that of a simulator in which {FORMS[form]}, write swing: {form}",
+    )
+    residuals = of_case(evidence, with_plant_keys(evidence.case, swing=form))
+    yield from tried(evidence, residuals, 0, always(cause))
+
+
+def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the unit has a governor, by the one of two simple ones that matches better."""
+    if evidence.case.parts.governor is not None:
+        return
+    trials = {
+        name: refitted(evidence, _governed(evidence, name, data, STARTS[name]))
+        for name, data in STAND_INS.items()
+    }
+    costs = {name: trial.cost for name, trial in trials.items() if trial is not None}
+    if not costs:
+        return
+    name = min(costs, key=lambda name: costs[name])
+    yield from suspected(
+        evidence,
+        costs[name],
+        len(STARTS[name]),
+        Cause(
+            f"a governor that the case lacks: P follows the speed; a {name} would match",
+            "if it was in service, give the unit's own: governor: {model: ..., parameters: {...}}",
+        ),
+        of_stand_in(evidence, costs[name]),
+    )
+
+
+def _governed(
+    evidence: Evidence, name: str, data: Mapping[str, float], starts: Mapping[str, float]
+) -> Residuals:
+    """Return the residuals of the unit with a governor, some of whose data are free."""
+    freed = [
+        FreeParameter(f"{GOVERNOR}{symbol}", start, start / WIDE, start * WIDE, logarithmic=True)
+        for symbol, start in starts.items()
+    ]
+    return with_freed(of_case(evidence, with_governor(evidence.case, name, data)), freed)
+
+
+def of_stand_in(evidence: Evidence, cost: float) -> float:
+    """Return how much likelier a control is than its simple stand-in, at the cost with that.
+
+    Where the stand-in explains most, what it leaves may be that the unit's own is of another kind.
+    """
+    noise = evidence.noise_cost
+    if cost - noise > MOST_LEFT * (evidence.cost - noise):
+        return 0.0
+    own = likelihood(evidence, noise + STRUCTURE * (evidence.cost - noise))
+    return max(0.0, own + LIKELIER_THAN_MODEL - likelihood(evidence, cost, NUMBERS_OF_STAND_IN))
+
+
+def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the unit has a stabiliser, by a simple one of speed or power that would match."""
+    case = evidence.case
+    recorded = any("vs" in recording.record.channels for recording in case.recordings)
+    if case.parts.stabiliser is not None or recorded:
+        return
+    gain, washout, lead = (f"{STABILISER}{name}" for name in ("K_T", "T", "T1_T3"))
+    for heard, start, low, high in (("speed", 5.0, 0.0, 200.0), ("p", -0.1, -20.0, 0.0)):
+        data = {"HLIM": NO_LIMIT, "T2_T4": 1.0, "T1_T3": 2.0}
+        other = with_stabiliser(case, "STAB1", (heard,), data)
+        freed = [
+            FreeParameter(gain, start, low, high, logarithmic=False),
+            FreeParameter(washout, 3.0, 0.3, 30.0, logarithmic=True),
+            FreeParameter(lead, 2.0, 0.1, 50.0, logarithmic=True),
+        ]
+
+        def cause(trial: Trial, heard: str = heard) -> Cause:
+            amplification = trial.values[gain] * trial.values[washout]
+            return Cause(
+                f"a stabiliser that the case lacks: one that hears {heard}, with a gain of "
+                f"{amplification:.2g}, would match",
+                "if it was in service, give the unit's own: stabiliser: {model: ..., "
+                f"inputs: [{heard}], parameters: {{...}}}}, or its output as channel vs",
+            )
+
+        def prior(trial: Trial) -> float:
+            return of_stand_in(evidence, trial.cost)
+
+        residuals = with_freed(of_case(evidence, other), freed)
+        yield from tried(evidence, residuals, len(freed), cause, prior)
+
+
+def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the governor or the stabiliser of the case was out of service."""
+    parts = evidence.case.parts
+    if parts.governor is not None:
+        yield from _idle(evidence, parts.governor, GOVERNOR, without_governor)
+    if parts.stabiliser is not None:
+        yield from _idle(evidence, parts.stabiliser, STABILISER, without_stabiliser)
+
+
+def _idle(
+    evidence: Evidence, model: Model, prefix: str, without: Callable[[Case], Case]
+) -> Iterator[Suspicion]:
+    ties, kind = evidence.case.ties.by_name.values(), prefix.rstrip(".")
+    if any(name.startswith(prefix) for tie in ties for name in tie.names):
+        return
+    cause = Cause(
+        f"the {kind} {model.name}: the record would match without it",
+        f"was it in service? If it was not, leave out the section {kind}",
+    )
+    yield from tried(evidence, of_case(evidence, without(evidence.case)), 0, always(cause))
+
+
+def other_motion(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that another inertia or damping of the machine would match."""
+    fixed = evidence.residuals.fixed
+    inertia, damping = fixed.get(INERTIA), fixed.get(DAMPING)
+    freed = []
+    if inertia:
+        freed.append(freed_within(INERTIA, inertia, LARGEST_FACTOR))
+    if damping is not None:
+        high = MOST_DAMPING + damping
+        freed.append(FreeParameter(DAMPING, damping, min(0.0, damping), high, logarithmic=False))
+    for parameter in freed:
+        yield from _other_number(evidence, parameter, "check the data of the machine and turbine")
+
+
+def other_transformer(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that another transformer would match, or powers recorded on its other side."""
+    case, reactance = evidence.case, evidence.residuals.fixed.get(REACTANCE)
+    if reactance is None:
+        return
+    own = getattr(case.plant, "power_at", "recorded-voltage")
+    place = "terminals" if own == "recorded-voltage" else "recorded-voltage"
+    other = of_case(evidence, with_plant_keys(case, power_at=place))
+    largest = LARGEST_TRANSFORMER + reactance
+    start = reactance or USUAL_TRANSFORMER
+    freed = FreeParameter(REACTANCE, start, 0.0, largest, logarithmic=False)
+    check = "check on which side of the step-up transformer vt is recorded, and its X on this base"
+    yield from _other_number(evidence, freed, check)
+    if reactance:
+        cause = Cause(
+            f"the place of p and q: power_at: {place} would match (the case has {own})",
+            "check on which side of the step-up transformer they are recorded",
+        )
+        yield from tried(evidence, other, 0, always(cause))
+        return
+
+    def cause_of(trial: Trial) -> Cause:
+        return Cause(
+            f"vt is recorded behind a transformer, p and q at the {place}: network.X "
+            f"{trial.values[REACTANCE]:.3g} with power_at: {place} would match",
+            check,
+        )
+
+    yield from tried(evidence, with_freed(other, [freed]), 2, cause_of)
+
+
+def _other_number(evidence: Evidence, freed: FreeParameter, check: str) -> Iterator[Suspicion]:
+    """Yield that another number in place of a fixed one would match."""
+    given = evidence.residuals.fixed[freed.name]
+
+    def cause(trial: Trial) -> Cause:
+        return Cause(
+            f"{freed.name} {trial.values[freed.name]:.3g} would match (given {given:g})", check
+        )
+
+    yield from tried(evidence, with_freed(evidence.residuals, [freed]), 1, cause)

@@ -1,0 +1,257 @@
+"""Many cases fitted by many workers: what is done is kept in a folder, and not done again."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from math import inf
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+
+from exfit.errors import ExfitError
+from exfit.features.fleet.folder import (
+    CaseOutcome,
+    Fleet,
+    IndexEntry,
+    case_name,
+    failure_of,
+    has_entry,
+    is_done,
+    prepare_folder,
+    read_fleet,
+    row_of,
+    state_of,
+    write_entry,
+    write_outcome,
+)
+from exfit.features.fleet.local import Compute, local_workers
+from exfit.features.fleet.observer import BatchObserver, Unobserved
+from exfit.features.fleet.plan import (
+    BatchSettings,
+    PlannedCase,
+    Share,
+    case_files,
+    planned_case,
+    refused_case,
+    share_of,
+)
+from exfit.features.fleet.task import FitSettings, FurtherFiles
+from exfit.util.interrupts import endings_as_interruptions
+from exfit.util.strategies import SEARCHES, STRATEGIES
+from exfit.util.text import near
+from exfit.util.threads import processors
+
+TIME_LIMIT = 3600.0  # s: of a case
+MOST_TABLES = 5  # until those are left to another run that goes on in the folder
+
+
+CaseMaking = Callable[[], str]  # writes a case and returns "", or why it cannot be made
+
+
+def _no_tables(_: Fleet) -> None:
+    """Write no table: the folder has all that is in one."""
+
+
+def batch(
+    cases: Iterable[str | PathLike[str]] | str | PathLike[str],
+    folder: str | PathLike[str] = "fleet",
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    part: tuple[int, int] = (1, 1),
+    retry_failed: bool = False,
+    trust: bool = False,
+    time_limit: float = TIME_LIMIT,
+    strategy: str | None = None,
+    search: str | None = None,
+    observer: BatchObserver | None = None,
+    further: Sequence[FurtherFiles] = (),
+    compute: Compute | None = None,
+    write_tables: Callable[[Fleet], None] = _no_tables,
+    made: Mapping[Path, CaseMaking] = MappingProxyType({}),
+) -> Fleet:
+    """Fit many cases in several processes; what the folder has already is not fitted again.
+
+    A case is fitted as ``exfit.fit`` does it, in a worker process with one thread. Its result lies
+    in the folder under a hash of all that goes into it: the case, its records, the code that it
+    names, these settings and the version of exfit. A case that fails, crashes or does not end is a
+    row with its reason, and the others go on.
+
+    Args:
+        cases: case files, and folders with such files in them or below.
+        folder: keeps the results; that of an earlier batch is gone on with.
+        workers: processes at work; None: as many as there are processors.
+        scheduler: the address of that of a Dask cluster, whose workers fit the cases in place of
+            processes of this computer; the contents of all files travel to them.
+        part: (number, of): only every such share of the cases, so that several computers that see
+            the folder have all of them, each once.
+        retry_failed: fits again what failed, crashed, or took too long.
+        trust: runs the code of cases whose model is a file of Python or whose plant is a command.
+        time_limit: of a case, s; inf: none.
+        strategy: of the descent from the start of each case; None: the case's own.
+        search: "global" or "local"; None: the case's own.
+        observer: is told how the batch goes on.
+        further: make files of each result, to lie beside those of every fit; as they travel to
+            workers they are functions of a module.
+        compute: has the cases fitted in another way than in processes of this computer.
+        write_tables: called with the fleet at the end, and again if the folder has changed since.
+        made: further cases, by their files, each with the function that makes it when its turn
+            comes: it returns why it cannot, or "".
+
+    A KeyboardInterrupt ends all workers at once: what is done is kept, and the fleet is
+    ``interrupted``. Raises ExfitError where there are no cases, the folder cannot be written, or
+    the cluster cannot be used or is lost: what is done is kept then, too.
+
+    Example:
+        >>> fleet = exfit.batch(["cases"], "fleet", workers=4)
+        >>> {case.name: case.verdict for case in fleet.cases}
+    """
+    given = [cases] if isinstance(cases, str | PathLike) else [*cases]
+    place, share = Path(folder), Share(*part)
+    _refuse(share, workers, time_limit, strategy, search)
+    existing = case_files(map(Path, given), place) if given or not made else ()
+    files = share_of(_each_once([*existing, *made], place), share, place)
+    settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
+    count = min(workers or processors(), max(1, len(files)))
+    run = BatchRun(files, place, settings, observer or Unobserved(), made)
+    if scheduler is not None:
+        from exfit.features.fleet.dispatch import cluster_workers
+
+        compute, count = cluster_workers(scheduler, time_limit), 0
+    try:
+        interrupted = run.fit_all(compute or local_workers(count, time_limit), count)
+    except ExfitError:
+        with suppress(ExfitError):  # the first fault is reported
+            tables_of(place, write_tables)
+        raise
+    fleet = tables_of(place, write_tables)
+    names = frozenset(case_name(place, file) for file in files)
+    return replace(fleet, run=names, interrupted=interrupted)
+
+
+def _each_once(files: Iterable[Path], folder: Path) -> list[Path]:
+    """Return files without those that are given in another way, too."""
+    return [*{case_name(folder, file): file for file in files}.values()]
+
+
+def _refuse(
+    share: Share, workers: int | None, time_limit: float, strategy: str | None, search: str | None
+) -> None:
+    """Raise ExfitError with all that is wrong with the arguments of a batch."""
+    faults = []
+    if not 1 <= share.number <= share.of:
+        faults.append(f"part {share.number}/{share.of}: must be 1/N ... N/N")
+    if workers is not None and workers < 1:
+        faults.append(f"workers: {workers} must be 1 or more")
+    if not 0.0 < time_limit <= inf:
+        faults.append(f"time limit: {time_limit:g} s must be above 0")
+    for word, given, known in (("strategy", strategy, STRATEGIES), ("search", search, SEARCHES)):
+        if given is not None and given not in known:
+            faults.append(f"{word}: {given} is none; {near(given, known)}")
+    if faults:
+        raise ExfitError("\n".join(faults))
+
+
+class BatchRun:
+    """A run over some cases: it writes what they come to into the folder, and announces it."""
+
+    def __init__(
+        self,
+        files: Sequence[Path],
+        folder: Path,
+        settings: BatchSettings,
+        observer: BatchObserver,
+        made: Mapping[Path, CaseMaking] = MappingProxyType({}),
+    ) -> None:
+        self.made = {case_name(folder, file): make for file, make in made.items()}
+        self.files, self.folder, self.settings = files, folder, settings
+        self.observer = observer
+
+    def fit_all(self, compute: Compute, workers: int) -> bool:
+        """Fit the cases that are not done; return whether an interruption ended it."""
+        prepare_folder(self.folder)
+        self.observer.begun(len(self.files), workers)
+        with endings_as_interruptions():
+            try:
+                compute(self._to_fit(), self._begin, self._end)
+            except KeyboardInterrupt:
+                self._note_the_others()
+                return True
+            except ExfitError:  # without workers nothing goes on
+                with suppress(ExfitError):
+                    self._note_the_others()
+                raise
+        return False
+
+    def _to_fit(self) -> Iterator[PlannedCase]:
+        """Yield the cases that are to be fitted; the others are entered and announced."""
+        keys = set[str]()
+        for file in self.files:
+            case = self._planned(file)
+            write_entry(self.folder, case.entry)
+            key = case.entry.key
+            if case.task is None:
+                self.observer.finished(row_of(case.entry))
+            elif key in keys or self._is_kept(key):
+                self.observer.kept(case.entry.case)
+            else:
+                keys.add(key)
+                yield case
+
+    def _planned(self, file: Path) -> PlannedCase:
+        """Return a case with its task, made first where it is one of a table."""
+        make = self.made.get(case_name(self.folder, file))
+        reason = "" if make is None else make()
+        if reason:
+            return refused_case(file, self.folder, reason)
+        return planned_case(file, self.folder, self.settings)
+
+    def _is_kept(self, key: str) -> bool:
+        if is_done(self.folder, key):
+            return True
+        return not self.settings.retry_failed and failure_of(self.folder, key) is not None
+
+    def _begin(self, case: PlannedCase) -> bool:
+        """Announce that a case begins; return false where another run has done it meanwhile."""
+        if is_done(self.folder, case.entry.key):
+            self.observer.kept(case.entry.case)
+            return False
+        self.observer.started(case.entry.case)
+        return True
+
+    def _end(self, case: PlannedCase, outcome: CaseOutcome) -> None:
+        """Keep what a case came to, and announce it."""
+        entry = case.entry
+        if outcome.changed:
+            entry = IndexEntry(entry.case, reason=outcome.changed, facts=entry.facts)
+            write_entry(self.folder, entry)
+        else:
+            write_outcome(self.folder, entry.key, outcome)
+        row = row_of(entry, outcome.failure)
+        if outcome.summary is not None:
+            row = outcome.summary.named(row.name, entry.case)
+        self.observer.finished(row)
+
+    def _note_the_others(self) -> None:
+        """Enter the cases that were not even planned when the run came to an early end."""
+        for file in self.files:
+            name = case_name(self.folder, file)
+            if not has_entry(self.folder, name):
+                write_entry(self.folder, IndexEntry(name))
+
+
+def tables_of(folder: Path, write_tables: Callable[[Fleet], None]) -> Fleet:
+    """Return the fleet of a folder, once its tables are written with all that is done.
+
+    Where several runs end at a time, the last table is whole: each run writes it again if something
+    was added since it had looked. One that is outrun again and again leaves it to the others.
+    """
+    for attempt in range(MOST_TABLES):
+        before = state_of(folder)
+        fleet = read_fleet(folder)
+        if attempt == MOST_TABLES - 1 and state_of(folder) != before:
+            break
+        write_tables(fleet)
+        if state_of(folder) == before:
+            break
+    return fleet

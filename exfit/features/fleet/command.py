@@ -1,0 +1,232 @@
+"""The command batch."""
+
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli.options import NOT_CONVERGED, Interruption, print_json
+from exfit.errors import ExfitError
+from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from exfit.features.fleet.batch import CaseMaking
+    from exfit.features.fleet.folder import Fleet
+    from exfit.features.fleet.observer import BatchObserver
+    from exfit.features.fleet.task import FurtherFiles
+
+FAILED = 1  # the exit code where cases are without a fit
+WITHOUT_FIT = ("failed", "timed out", "crashed", "refused", "not run")
+
+
+def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
+    """Return the number of a part and how many there are, of a text such as 3/40."""
+    number, _slash, parts = value.partition("/")
+    if not (number.isdecimal() and parts.isdecimal()):
+        raise click.BadParameter(f"{value}: not of the form 3/40")
+    if not 1 <= int(number) <= int(parts):
+        raise click.BadParameter(f"{value}: must be 1/{parts} ... {parts}/{parts}")
+    return int(number), int(parts)
+
+
+@click.command(short_help="Fit many cases, and make a table of all.")
+@click.argument("cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASES")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("fleet"),
+    metavar="DIR",
+    help="Folder for the results (default: fleet).",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes at work, with one thread each (default: as many as there are processors).",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Fit on the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786, instead.",
+)
+@click.option(
+    "--part",
+    callback=_part,
+    default="1/1",
+    metavar="3/40",
+    help="Fit this share of the cases only: 1/40 to 40/40, on any computers that see DIR, fit all.",
+)
+@click.option(
+    "--retry",
+    type=click.Choice(["failed"]),
+    help="Fit again what failed, crashed or exceeded the time limit in an earlier run.",
+)
+@click.option(
+    "--trust", is_flag=True, help="Run the code that cases name: models in Python, commands."
+)
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=3600.0,
+    metavar="S",
+    help="Time that a case may take, s (default: 3600).",
+)
+@click.option("--reports", is_flag=True, help="Write the report of each fit, too.")
+@click.option(
+    "--strategy",
+    type=click.Choice([*STRATEGIES]),
+    help=f"Strategy in place of that of the cases. {EXPLAINED}.",
+)
+@click.option(
+    "--search",
+    type=click.Choice([*SEARCHES]),
+    help=f"How far to search, in place of what the cases say. {SEARCHES_EXPLAINED}.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON and nothing else.")
+def batch(
+    cases: tuple[Path, ...],
+    output: Path,
+    workers: int | None,
+    scheduler: str | None,
+    part: tuple[int, int],
+    retry: str | None,
+    trust: bool,
+    time_limit: float,
+    reports: bool,
+    strategy: str | None,
+    search: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Fit all CASES: case files, folders with case files (*.yaml) in them or below, and tables.
+
+    A table, CSV or a workbook, lists records with what is known of each; the rows of a unit become
+    a case in DIR/cases, as `exfit new` makes it.
+
+    Each case is fitted as `exfit fit` does it, in worker processes. Its files lie in a folder of
+    DIR that is named after a hash of all that goes into the fit: the case, its records, its model
+    file, the options, the version of exfit. What is there is not fitted again, so that the same
+    command goes on after an interruption, whatever it was, and with what has changed. Ctrl-C stops
+    all at once and keeps what is done.
+
+    A case that cannot be read, fails, crashes or does not end is a row with its reason, and the
+    others go on; it is tried again with --retry failed. A case whose model is a file of Python,
+    or whose plant is a command, is run with --trust only.
+
+    With --scheduler the workers of a Dask cluster fit the cases: they need exfit in the versions of
+    this computer, but none of its files. The package distributed comes with exfit[cluster].
+
+    fleet.csv and fleet.html in DIR are the table of all cases that have been given for DIR. Exit
+    code 0: every case that has a record matches it; 1: some have no fit; 3: some do not match, or
+    Ctrl-C ended the command with some done.
+    """
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("--workers and --scheduler exclude each other.")
+    from exfit.features.fleet.batch import batch as fit_all
+    from exfit.features.fleet.table_files import write_tables
+
+    tables, others = _tables_among(cases)
+    with _observer(shown=not (quiet or as_json)) as observer:
+        fleet = fit_all(
+            others,
+            output,
+            workers=workers,
+            scheduler=scheduler,
+            part=part,
+            retry_failed=retry is not None,
+            trust=trust,
+            time_limit=time_limit,
+            strategy=strategy,
+            search=search,
+            observer=observer,
+            further=_reports() if reports else (),
+            write_tables=write_tables,
+            made=_cases_of(tables, output),
+        )
+    if reports and _write_missing_reports(fleet):
+        write_tables(fleet)
+    if as_json:
+        print_json(fleet.to_dict())
+    elif not quiet:
+        _show(fleet)
+    _exit(fleet)
+
+
+def _tables_among(given: "Sequence[Path]") -> tuple[list[Path], list[Path]]:
+    """Return the tables of records among what is given, and the rest."""
+    from exfit.features.start.cells import is_table
+
+    tables = [path for path in given if is_table(path) and not path.is_dir()]
+    return tables, [path for path in given if path not in tables]
+
+
+def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]":
+    """Return what makes the cases of tables; raises ExfitError with the faults of all of them."""
+    from exfit.features.planner.table_cases import cases_of_table
+
+    made: dict[Path, CaseMaking] = {}
+    faults = []
+    for table in tables:
+        try:
+            cases = cases_of_table(table, folder)
+        except ExfitError as fault:
+            faults.append(str(fault))
+            continue
+        faults += [f"{table}: {file.stem}: also in another table" for file in made.keys() & cases]
+        made |= cases
+    if faults:
+        raise ExfitError("\n".join(faults))
+    return made
+
+
+def _observer(shown: bool) -> "AbstractContextManager[BatchObserver | None]":
+    """Return what shows a batch while it runs, None where nothing is to be shown."""
+    if not shown:
+        return nullcontext()
+    from exfit.show import terminal
+
+    return terminal.BatchProgress(terminal.console()).running()
+
+
+def _reports() -> "Sequence[FurtherFiles]":
+    from exfit.features.fleet.table_files import report_file
+
+    return (report_file,)
+
+
+def _write_missing_reports(fleet: "Fleet") -> bool:
+    """Write the reports of fits that an earlier run has made without; return whether any was."""
+    from exfit.features.fleet.page import REPORT
+
+    folders = [fleet.folder_of(case) for case in fleet.of_run]
+    missing = [folder for folder in folders if folder and not (folder / REPORT).is_file()]
+    for folder in dict.fromkeys(missing):
+        from exfit.features.report import write_report
+
+        write_report(folder)
+    return bool(missing)
+
+
+def _show(fleet: "Fleet") -> None:
+    from exfit.show import terminal
+
+    terminal.batch(terminal.console(), fleet)
+
+
+def _exit(fleet: "Fleet") -> None:
+    """Raise SystemExit or Interruption where not all cases of the run are done and well."""
+    rows = fleet.of_run
+    if fleet.interrupted:
+        if not any(row.status == "done" for row in rows):
+            raise Interruption("no case is done")
+        raise SystemExit(NOT_CONVERGED)
+    if any(row.status in WITHOUT_FIT for row in rows):
+        raise SystemExit(FAILED)
+    if not all(row.holds for row in rows if row.status == "done"):
+        raise SystemExit(NOT_CONVERGED)

@@ -1,0 +1,311 @@
+"""The cases of a batch, sent to the workers of a cluster as these come to need them.
+
+Each case is bound to a worker, so that a worker stays with a model, and a worker that is lost gives
+back what it had. The scheduler holds no more cases than are under way.
+"""
+
+import pickle
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import inf
+from queue import Empty, SimpleQueue
+from time import monotonic, sleep
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+from exfit.errors import ExfitError
+from exfit.features.fleet.bundle import BundledTask
+from exfit.features.fleet.cluster import (
+    ANSWERED_WITHIN,
+    ClusterError,
+    answered,
+    asked,
+    connected,
+    lost,
+    stop,
+    threads_of,
+)
+from exfit.features.fleet.folder import CaseOutcome, Failure
+from exfit.features.fleet.local import Begin, Compute, End, Waiting, group_of
+from exfit.features.fleet.plan import PlannedCase
+from exfit.features.fleet.remote import RemoteCase, Reply, unpacked
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    from distributed import Client
+    from distributed import Future as DaskFuture
+
+MOST_DEATHS = 3  # of the process of a case, after which the case is to blame
+MOST_LOSSES = (
+    10  # of the worker of a case: mostly it is ended from outside, so there are more tries
+)
+AHEAD = 2  # cases for each thread of a worker: one that it fits, one that it need not wait for
+MOST_BYTES = 256_000_000  # of the cases that are under way; one alone may have more
+LOOK = 1.0  # s between two looks at which workers there are
+AT_FIRST = 0.1  # s, before the first case
+FIRST_WORKER = 10.0  # s: so long may the first worker take to appear
+WITHOUT_WORKERS = 300.0  # s: so long may a cluster be without any
+FETCHED_WITHIN = 5.0  # s, an outcome that is there
+
+
+def cluster_workers(address: str, time_limit: float) -> Compute:
+    """Return what fits cases on the cluster of a scheduler, each in no more than ``time_limit`` s.
+
+    It raises ClusterError where the cluster cannot be used: before the first case where a worker
+    has other versions than this computer.
+    """
+
+    def compute(cases: Iterator[PlannedCase], begin: Begin, end: End) -> None:
+        with connected(address) as client:
+            dispatch = Dispatch(client, Waiting(cases), begin, end, time_limit)
+            try:
+                dispatch.wait_for_workers()
+                dispatch.run()
+            finally:
+                dispatch.stop()
+
+    return compute
+
+
+@dataclass(frozen=True, eq=False)
+class Sent:
+    """A case that is under way: to which worker, and in how many bytes."""
+
+    case: PlannedCase
+    worker: str
+    size: int
+    future: "DaskFuture"
+
+
+@dataclass(eq=False)
+class Dispatch:
+    """The cases that wait and those that are under way, and the workers; all in one thread.
+
+    ``threads`` are those of the workers in use, ``groups`` what they had last; ``checks`` are the
+    answers of new workers, ``refused`` the reasons why others may not be used; ``begun`` are the
+    cases that were announced. ``deaths`` and ``losses`` count how often the process and the worker
+    of a case ended in its middle, by its key.
+    """
+
+    client: "Client"
+    waiting: Waiting
+    begin: Begin
+    end: End
+    time_limit: float
+    batch: str = field(default_factory=lambda: uuid4().hex)
+    begun: set[str] = field(default_factory=set)
+    sent: dict[str, Sent] = field(default_factory=dict)
+    threads: dict[str, int] = field(default_factory=dict)
+    groups: dict[str, str] = field(default_factory=dict)
+    checks: "dict[str, Future[Mapping[str, Any]]]" = field(default_factory=dict)
+    refused: dict[str, str] = field(default_factory=dict)
+    deaths: Counter[str] = field(default_factory=Counter)
+    losses: Counter[str] = field(default_factory=Counter)
+    arrived: "SimpleQueue[str]" = field(default_factory=SimpleQueue)
+    looked: float = -inf
+    had_workers: float = field(default_factory=monotonic)
+
+    def wait_for_workers(self) -> None:
+        """Wait for the first workers; raises ClusterError for none, and for any that is refused."""
+        began = monotonic()
+        while self.checks or not self.threads:
+            if monotonic() - began > (ANSWERED_WITHIN if self.checks else FIRST_WORKER):
+                break
+            sleep(AT_FIRST)
+            self._look()
+            if self.refused:
+                raise ClusterError(self._refusals())
+        if not self.threads:
+            address = self.client.scheduler.address
+            text = f"no worker is connected; start some: dask worker {address} --nthreads 1"
+            raise ClusterError(f"{address}: {text}")
+
+    def run(self) -> None:
+        """Fit all cases; while no outcome arrives, the next case is planned.
+
+        Raises ClusterError where the scheduler is lost, or where no worker is left.
+        """
+        while not self.waiting.exhausted or self.waiting or self.sent:
+            if not self.waiting.exhausted and self.arrived.empty():
+                self.waiting.plan_one()
+            else:
+                self._fetch()
+            if monotonic() - self.looked >= LOOK:
+                self._look()
+            self._send()
+
+    def stop(self) -> None:
+        """End what is under way, at once; what the scheduler has of it goes, too."""
+        with suppress(Exception):  # of a connection that is lost already
+            self.client.cancel([sent.future for sent in self.sent.values()], force=True)
+            stop(self.client, [*self.threads], self.batch)
+
+    def _look(self) -> None:
+        """Look which workers there are; what those that are gone had waits again."""
+        present = threads_of(self.client)
+        for worker in [worker for worker in self.threads if worker not in present]:
+            self._lose(worker)
+        self._check(present)
+        self.looked = monotonic()
+        if self.threads:
+            self.had_workers = self.looked
+        elif self._is_useless(present):
+            address = self.client.scheduler.address
+            raise ClusterError(self._refusals() or f"{address}: no worker is left")
+
+    def _is_useless(self, present: Mapping[str, int]) -> bool:
+        """Return whether no worker will be found: all are refused, or there was none for long."""
+        refused = bool(present) and present.keys() <= self.refused.keys()
+        return refused or self.looked - self.had_workers > WITHOUT_WORKERS
+
+    def _check(self, present: Mapping[str, int]) -> None:
+        """Use those workers that have shown that they may be, and ask those that are new."""
+        for worker in [worker for worker, answer in self.checks.items() if answer.done()]:
+            reason = answered(worker, self.checks.pop(worker))
+            if reason:
+                self.refused[worker] = reason
+            elif reason == "" and worker in present:
+                self.threads[worker] = present[worker]
+        for worker in present.keys() - {*self.threads, *self.refused, *self.checks}:
+            self.checks[worker] = asked(self.client, worker)
+
+    def _refusals(self) -> str:
+        """Return which workers may not be used, and why."""
+        return "\n".join(f"worker {worker}: {reason}" for worker, reason in self.refused.items())
+
+    def _lose(self, worker: str) -> None:
+        """Take back what a worker had; its first cases, one for each thread, had begun."""
+        threads = self.threads.pop(worker)
+        had = [key for key, sent in self.sent.items() if sent.worker == worker]
+        for place, key in enumerate(had):
+            self._take_back(key, begun=place < threads)
+
+    def _take_back(self, key: str, begun: bool = True) -> None:
+        """Let a case wait again, unless it was lost too often."""
+        sent = self.sent.pop(key)
+        with suppress(Exception):  # the scheduler may have forgotten it
+            self.client.cancel(sent.future, force=True)
+        name = _key(sent.case)
+        self.losses[name] += begun
+        if self.losses[name] < MOST_LOSSES:
+            self.waiting.add(sent.case)
+        else:
+            self._crash(sent.case, f"its worker was lost {MOST_LOSSES} times in the middle of it")
+
+    def _send(self) -> None:
+        """Send cases to the workers that need some: one to each before any has a second."""
+        if not self.waiting:
+            self._relieve()
+        for places in range(1, AHEAD + 1):
+            for worker, threads in self.threads.items():
+                while self.waiting and self._has_room(worker, places * threads):
+                    at_work = Counter(group_of(sent.case) for sent in self.sent.values())
+                    case = self.waiting.next_for(self.groups.get(worker, ""), at_work)
+                    self.groups[worker] = group_of(case)
+                    if case.entry.case in self.begun or self.begin(case):
+                        self.begun.add(case.entry.case)
+                        self._submit(case, worker)
+
+    def _relieve(self) -> None:
+        """Take back what waits behind long cases where other workers have nothing to do."""
+        had = Counter(sent.worker for sent in self.sent.values())
+        idle = sum(max(0, threads - had[worker]) for worker, threads in self.threads.items())
+        for key, sent in reversed([*self.sent.items()]):
+            if idle > 0 and had[sent.worker] > self.threads[sent.worker]:
+                had[sent.worker] -= 1
+                idle -= 1
+                self._take_back(key, begun=False)
+
+    def _has_room(self, worker: str, places: int) -> bool:
+        under_way = sum(sent.size for sent in self.sent.values())
+        cases = sum(sent.worker == worker for sent in self.sent.values())
+        return cases < places and (under_way < MOST_BYTES or not self.sent)
+
+    def _submit(self, case: PlannedCase, worker: str) -> None:
+        if case.task is None:
+            return
+        try:
+            bundled = case._replace(task=BundledTask.of(case.task))
+        except ExfitError as fault:
+            self.end(case, CaseOutcome(failure=Failure("failed", str(fault))))
+            return
+        payload = pickle.dumps(RemoteCase(bundled, self.batch, self.time_limit))
+        key = f"exfit-{uuid4().hex}"
+        try:
+            future = self.client.submit(
+                _in_worker(), payload, key=key, workers=[worker], pure=False
+            )
+        except Exception as fault:  # of many kinds, by where it has noticed
+            raise lost(self.client, fault) from None
+        self.sent[future.key] = Sent(case, worker, len(payload), future)
+        future.add_done_callback(lambda done: self.arrived.put(done.key))
+
+    def _fetch(self) -> None:
+        """Wait for a case to end, but no longer than until the next look at the workers."""
+        try:
+            key = self.arrived.get(timeout=LOOK)
+        except Empty:
+            return
+        sent = self.sent.get(key)
+        if sent is None:
+            return  # taken back before
+        try:
+            reply = sent.future.result(timeout=FETCHED_WITHIN)
+        except TimeoutError:
+            self.arrived.put(key)  # or its worker is gone with it, as the next look shows
+        except Exception as fault:
+            self._fail(key, sent, fault)
+        else:
+            del self.sent[key]
+            sent.future.release()
+            self._finish(sent.case, reply)
+
+    def _finish(self, case: PlannedCase, reply: Reply) -> None:
+        """Take the outcome of a case; one whose process died is tried again, elsewhere perhaps."""
+        if not reply.death:
+            try:
+                self._send()  # before the outcome is written
+            finally:
+                self.end(case, unpacked(reply.packed))
+            return
+        self.deaths[_key(case)] += 1
+        if self.deaths[_key(case)] < MOST_DEATHS:
+            self.waiting.add(case)
+        else:
+            self._crash(case, f"{reply.death}; so it was {MOST_DEATHS} times")
+
+    def _fail(self, key: str, sent: Sent, fault: Exception) -> None:
+        """Give a case to another worker: its own was lost, or can fit none."""
+        from distributed.client import FutureCancelledError
+        from distributed.scheduler import KilledWorker
+
+        if isinstance(fault, FutureCancelledError | KilledWorker | OSError):
+            self._take_back(key)
+        else:
+            self.refused[sent.worker] = f"can fit no case: {type(fault).__name__}: {fault}"
+            self._lose(sent.worker)
+
+    def _crash(self, case: PlannedCase, reason: str) -> None:
+        self.end(case, CaseOutcome(failure=Failure("crashed", reason)))
+
+
+def _key(case: PlannedCase) -> str:
+    return "" if case.task is None else case.task.key
+
+
+def _in_worker() -> Callable[[bytes], Any]:
+    """Return the function that a worker runs.
+
+    The scheduler unpacks it, which need not have exfit: it is defined inside, so that it is pickled
+    with its code and not by its name.
+    """
+
+    def run(payload: bytes) -> Any:
+        from exfit.features.fleet.remote import run_packed
+
+        return run_packed(payload)
+
+    return run

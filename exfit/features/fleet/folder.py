@@ -1,0 +1,278 @@
+"""The folder of a batch: a folder for each fit, an index of the cases, and both read as a fleet.
+
+    <key>/result.json   a fit with its tables: there, and whole, once it is done
+    <key>/summary.json  its row of the table, made again from result.json where it is missing
+    <key>/failed.json   in place of both: why there is no fit
+    index/<hash>.json   for each case its path, and its key or the reason why it has none
+
+Parts of a batch, and batches one after the other, need no coordination but this.
+"""
+
+import hashlib
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from exfit.errors import ExfitError
+from exfit.features.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
+from exfit.runs.names import distinct_names
+from exfit.util.files import prepare, write, write_quickly, write_together
+from exfit.util.json_files import read_json
+from exfit.util.text import to_json
+from exfit.util.typed import Reader, plain
+
+INDEX, CASES = "index", "cases"
+RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
+VERSION = 1  # of a summary; one of another version is made again
+KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
+KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
+
+Content = TypeVar("Content")
+
+
+@dataclass(frozen=True)
+class IndexEntry:
+    """A case of a batch: its path, and its key or, in ``status`` and ``reason``, why it has none.
+
+    The path is relative to the folder of the batch where there is a way.
+    """
+
+    case: str
+    key: str = ""
+    status: CaseStatus = "not run"
+    reason: str = ""
+    facts: CaseFacts = field(default_factory=CaseFacts)
+
+    @property
+    def file(self) -> str:
+        """The name of its file in the index."""
+        return f"{hashlib.sha256(self.case.encode()).hexdigest()[:KEY_DIGITS]}.json"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no fit of a case, and the processor time that was spent, s."""
+
+    kind: FailureKind
+    reason: str
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CaseOutcome:
+    """What a worker makes of a case: the files of its fit by name with their summary, or a failure.
+
+    Neither: the case, or a file of it, was changed meanwhile, in the way that ``changed`` says.
+    """
+
+    files: Mapping[str, str] = field(default_factory=dict)
+    summary: CaseSummary | None = None
+    failure: Failure | None = None
+    changed: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """All cases of a batch's folder, in the order of their names.
+
+    After a run ``run`` holds the paths of its cases, as the rows have them; it was ``interrupted``
+    by Ctrl-C, which may have left some of them out.
+    """
+
+    folder: Path
+    cases: tuple[CaseSummary, ...]
+    run: frozenset[str] = frozenset()
+    interrupted: bool = False
+
+    @property
+    def of_run(self) -> tuple[CaseSummary, ...]:
+        """The cases of the run; all of them where it is not known."""
+        return tuple(case for case in self.cases if not self.run or case.case in self.run)
+
+    @property
+    def counts(self) -> dict[CaseStatus, int]:
+        """How many cases there are of each status."""
+        return dict(Counter(case.status for case in self.cases))
+
+    def path_of(self, case: CaseSummary) -> Path:
+        """Return the path of the file of a case."""
+        return case_path(self.folder, case.case)
+
+    def folder_of(self, case: CaseSummary) -> Path | None:
+        """Return the folder of the fit of a case; None where there is none."""
+        return self.folder / case.key if case.status == "done" else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all but the curves as plain data, as ``exfit batch --json`` prints it."""
+        return {
+            "folder": str(self.folder),
+            "counts": dict(self.counts),
+            "cases": [plain(case) for case in self.cases],
+            "interrupted": self.interrupted,
+        }
+
+
+def case_name(folder: Path, case: Path) -> str:
+    """Return the path of a case as the index has it."""
+    path = case.parent.resolve() / case.name
+    try:
+        return Path(os.path.relpath(path, folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return path.as_posix()
+
+
+def case_path(folder: Path, case: str) -> Path:
+    """Return the path of a case that the index has."""
+    return Path(os.path.normpath(folder.absolute() / case))
+
+
+def is_done(folder: Path, key: str) -> bool:
+    """Return whether the fit of a key is done."""
+    return (folder / key / RESULT).is_file()
+
+
+def failure_of(folder: Path, key: str) -> Failure | None:
+    """Return why the fit of a key failed; None where it did not, or was not run."""
+    return _read(folder / key / FAILED, Failure)
+
+
+def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
+    """Write what a case came to under its key; raises ExfitError where that is not possible."""
+    if outcome.summary is not None:
+        summary = _summary_text(outcome.summary)
+        files = {name: text for name, text in outcome.files.items() if name != RESULT}
+        contents = {**files, SUMMARY: summary, RESULT: outcome.files[RESULT]}
+        write_together(folder / key, contents, [FAILED])
+    elif outcome.failure is not None:
+        write(folder / key / FAILED, to_json(plain(outcome.failure)))
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make the folder of a batch; raises ExfitError where it cannot be written."""
+    prepare(folder / INDEX)
+
+
+def write_entry(folder: Path, entry: IndexEntry) -> None:
+    """Write an entry of the index; raises ExfitError where that is not possible."""
+    text = to_json(plain(entry))
+    with suppress(OSError):
+        if (folder / INDEX / entry.file).read_bytes() == text.encode():
+            return
+    write_quickly(folder / INDEX / entry.file, text)
+
+
+def has_entry(folder: Path, case: str) -> bool:
+    """Return whether the index has an entry of a case."""
+    return (folder / INDEX / IndexEntry(case).file).is_file()
+
+
+def entries_of(folder: Path) -> dict[str, IndexEntry]:
+    """Return the index by the paths of the cases; a damaged entry is missing until its next run."""
+    entries = (_read(file, IndexEntry) for file in sorted((folder / INDEX).glob("*.json")))
+    return {entry.case: entry for entry in entries if entry is not None and _is_of_batch(entry)}
+
+
+def _is_of_batch(entry: IndexEntry) -> bool:
+    """Return whether the key of an entry is one: the name of a folder here, no way out of it."""
+    return not entry.key or KEY.fullmatch(entry.key) is not None
+
+
+def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
+    """Return all cases of a folder that ``exfit batch`` writes, as they are now.
+
+    Raises ExfitError where it is no such folder.
+
+    Example:
+        >>> fleet = exfit.read_fleet("fleet")
+        >>> [case.name for case in fleet.cases if not case.holds]
+    """
+    place = Path(folder)
+    if not (place / INDEX).is_dir():
+        raise ExfitError(f"{place}: not the folder of a batch: {INDEX} is missing")
+    entries = [*entries_of(place).values()]
+    names = distinct_names([case_path(place, entry.case) for entry in entries])
+    rows = [
+        _row(place, entry).named(name, entry.case)
+        for name, entry in zip(names, entries, strict=True)
+    ]
+    return Fleet(place, tuple(sorted(rows, key=lambda row: (row.name.casefold(), row.name))))
+
+
+def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
+    """Return what changes in a folder when a case is added or comes to an end."""
+    return frozenset(_stamps(folder))
+
+
+def _stamps(folder: Path) -> Iterator[tuple[str, int, int]]:
+    for entry in (folder / INDEX).glob("*.json"):
+        yield from _stamp(entry)
+    for outcome in (RESULT, FAILED):
+        for file in folder.glob(f"*/{outcome}"):
+            yield from _stamp(file)
+
+
+def _stamp(file: Path) -> Iterator[tuple[str, int, int]]:
+    try:
+        status = file.stat()
+    except OSError:  # replaced or removed meanwhile
+        return
+    yield str(file), status.st_mtime_ns, status.st_size
+
+
+def row_of(entry: IndexEntry, failure: Failure | None = None) -> CaseSummary:
+    """Return the row of a case without a fit: for the reason of its failure, or of its entry."""
+    row = CaseSummary(
+        name=Path(entry.case).stem,
+        case=entry.case,
+        key=entry.key,
+        status=entry.status,
+        reason=entry.reason,
+        **entry.facts._asdict(),
+    )
+    if failure is None:
+        return row
+    return replace(row, status=failure.kind, reason=failure.reason, seconds=failure.seconds)
+
+
+def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
+    row = row_of(entry)
+    if not entry.key:
+        return row
+    if is_done(folder, entry.key):
+        try:
+            return _summary(folder, entry.key)
+        except ExfitError as fault:
+            return replace(row, status="failed", reason=str(fault))
+    return row_of(entry, failure_of(folder, entry.key))
+
+
+def _summary(folder: Path, key: str) -> CaseSummary:
+    """Return the summary of a fit that is done; raises ExfitError where it cannot be read."""
+    summary = _read(folder / key / SUMMARY, CaseSummary, VERSION)
+    if summary is not None:
+        return summary
+    from exfit.results.io import load_result
+
+    result = load_result(folder / key)
+    return summary_of(result, key, result.seconds)
+
+
+def _summary_text(summary: CaseSummary) -> str:
+    return to_json({"version": VERSION, **plain(summary, whole=True)})
+
+
+def _read(file: Path, kind: type[Content], version: int | None = None) -> Content | None:
+    """Return the content of a file, None where there is none of this form and version."""
+    try:
+        data = read_json(file)
+        if version is not None and data.get("version") != version:
+            return None
+        content: Content = Reader().read(kind, data)
+    except (ExfitError, RecursionError):
+        return None
+    return content

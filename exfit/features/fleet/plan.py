@@ -1,0 +1,182 @@
+"""The cases of a batch before they are fitted: which of them are to be, under which keys."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from exfit.case.open_values import open_places
+from exfit.case.peek import command_of, content_of, files_in, fmu_of
+from exfit.case.yaml import decoded
+from exfit.errors import CaseError, ExfitError, FileError
+from exfit.features.fleet.folder import IndexEntry, case_name
+from exfit.features.fleet.summary import CaseStatus, facts_of
+from exfit.features.fleet.task import CODE, CaseTask, FitSettings, FurtherFiles, key_of
+from exfit.util.files import read_regular, refuse_bytes
+from exfit.util.text import dotted
+
+SUFFIXES = (".yaml", ".yml")
+# what a case has at its top, or a programme; a file of a folder without any of these is neither
+KEYS_OF_CASES = frozenset({"plant", "test", "record", "records", "tests"})
+WITH_RECORD = frozenset({"record", "records", "tests"})
+NO_RECORD = "nothing to fit: the case has no record"
+
+
+class Share(NamedTuple):
+    """A share of the cases: the ``number`` th, from 1, of so many."""
+
+    number: int = 1
+    of: int = 1
+
+
+@dataclass(frozen=True)
+class BatchSettings:
+    """What a batch does: how it fits, what it runs, and what it tries again.
+
+    ``trust``: code that a case names is run. ``retry_failed``: cases that failed are fitted again.
+    ``further`` are functions that make files beside those of every fit.
+    """
+
+    fit: FitSettings = field(default_factory=FitSettings)
+    trust: bool = False
+    retry_failed: bool = False
+    further: tuple[FurtherFiles, ...] = ()
+
+
+class PlannedCase(NamedTuple):
+    """A case with its entry of the index, and its task where it has a key."""
+
+    entry: IndexEntry
+    task: CaseTask | None = None
+
+
+def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
+    """Return the case files that are given, and those below the folders that are given.
+
+    Of a folder they are the files *.yaml and *.yml that are cases, faulty or not. Folders whose
+    name begins with a dot are left out, and ``folder``, where the batch writes, unless what is
+    given lies in it. Raises ExfitError for what does not exist or has a name that is no text, and
+    where there is no case at all.
+    """
+    paths: dict[str, Path] = {}
+    missing = []
+    for path in given:
+        if not path.exists():
+            missing.append(f"{path}: cannot be read: No such file or folder")
+        for file in _cases_below(path, folder) if path.is_dir() else [path]:
+            refuse_bytes(file)
+            paths.setdefault(case_name(folder, file), file)
+    if missing:
+        raise FileError(missing)
+    if not paths:
+        raise ExfitError(f"{', '.join(map(str, given))}: no case (*.yaml) in there")
+    return tuple(paths.values())
+
+
+def _cases_below(top: Path, written: Path) -> Iterator[Path]:
+    """Yield the cases below a folder, in the order of their paths."""
+    for place, folders, files in os.walk(top):
+        here = Path(place)
+        visible = (name for name in folders if not name.startswith("."))
+        folders[:] = sorted(name for name in visible if not _same(here / name, written))
+        for name in sorted(files):
+            if Path(name).suffix.lower() in SUFFIXES and _may_be_case(here / name):
+                yield here / name
+
+
+def _same(path: Path, other: Path) -> bool:
+    return other.exists() and path.samefile(other)
+
+
+def _may_be_case(file: Path) -> bool:
+    """Return whether a file of YAML is a case, a programme, or nothing that can be read."""
+    try:
+        content = content_of(decoded(read_regular(file), file), file)
+    except (OSError, CaseError):
+        return True
+    return not content or bool(KEYS_OF_CASES & content.keys())
+
+
+def share_of(cases: Sequence[Path], part: Share, folder: Path) -> tuple[Path, ...]:
+    """Return the share of a part: all parts together have every case once.
+
+    The cases are counted in the order of a hash of their paths, so that no part has more of some
+    models than chance gives it, whatever they are called.
+    """
+
+    def place(case: Path) -> tuple[bytes, str]:
+        name = case_name(folder, case)
+        return hashlib.sha256(name.encode()).digest(), name
+
+    own = {*sorted(cases, key=place)[part.number - 1 :: part.of]}
+    return tuple(case for case in cases if case in own)
+
+
+def planned_case(case: Path, folder: Path, settings: BatchSettings) -> PlannedCase:
+    """Return a case with its key, and the task that its fit is; or why it has none."""
+    entry = IndexEntry(case_name(folder, case))
+    try:
+        data = read_regular(case)
+    except OSError as fault:
+        return _without_task(entry, "refused", f"{case}: cannot be read: {fault.strerror}")
+    try:
+        content = content_of(decoded(data, case), case)
+    except CaseError:  # which its fit will report
+        content = {}
+    entry = replace(entry, facts=facts_of(content))
+    files = (case, *(file for file in files_in(content, case.parent) if file != case))
+    reason = _why_refused(content, files, settings.trust)
+    if reason:
+        return _without_task(entry, "refused", reason)
+    if content and not WITH_RECORD & content.keys():
+        return _without_task(entry, "no record", NO_RECORD)
+    key = key_of(files, settings.fit, data)
+    task = CaseTask(files, key, folder / key, settings.fit, _group(content), settings.further)
+    return PlannedCase(replace(entry, key=key), task)
+
+
+def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool) -> str:
+    """Return why a case is not even tried, "" where it is: open values, code without trust."""
+    missing = [dotted(place) for place in open_places(content)]
+    if missing:
+        return f"{files[0]}: to be filled in: {', '.join(missing)}"
+    code = [file.name for file in files if file.suffix == CODE]
+    code += [f"command {word}" for word in command_of(content)[:1]]
+    code += [f"FMU {file}" for file in fmu_of(content)]
+    if code and not trust:
+        return f"{', '.join(code)}: code that the case names; it is run with --trust only"
+    return ""
+
+
+def refused_case(case: Path, folder: Path, reason: str) -> PlannedCase:
+    """Return a case that cannot be made, with the reason."""
+    return _without_task(IndexEntry(case_name(folder, case)), "refused", reason)
+
+
+def _without_task(entry: IndexEntry, status: CaseStatus, reason: str) -> PlannedCase:
+    return PlannedCase(replace(entry, status=status, reason=reason))
+
+
+def _group(content: Mapping[str, Any]) -> str:
+    """Return what cases have in common that share their machine code."""
+    parameters = content.get("parameters")
+    free = parameters.get("free") if isinstance(parameters, Mapping) else None
+    plant, *added = (
+        {key: value for key, value in section.items() if key in ("type", "machine", "model")}
+        if isinstance(section, Mapping)
+        else None
+        for section in map(content.get, ("plant", "stabiliser", "governor"))
+    )
+    keys = ("model", "saturation", "efd_times_speed")
+    limiters = content.get("limiters")
+    attached = [
+        {key: entry.get(key) for key in ("model", "place")}
+        for entry in (limiters if isinstance(limiters, list) else ())
+        if isinstance(entry, Mapping)
+    ]
+    models = [*map(content.get, keys), plant, *added, *attached]
+    names = sorted(map(str, free)) if isinstance(free, Mapping) else []
+    return json.dumps([*models, names], default=str, sort_keys=True)

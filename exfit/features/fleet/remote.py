@@ -1,0 +1,227 @@
+"""What runs in the workers of a cluster: the cases of bundles, each in a process beside the worker.
+
+A process of its own can be ended where a case hangs, takes no more than itself along where a case
+crashes, and computes with one thread, however many the worker has: the worker's other cases and
+its connection to the scheduler go on.
+"""
+
+import pickle
+import platform
+import shutil
+import sys
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Lock, Timer
+from typing import TYPE_CHECKING, NamedTuple
+
+from exfit import __version__
+from exfit.features.fleet.bundle import QUICKLY, BundledTask
+from exfit.features.fleet.folder import CaseOutcome, Failure
+from exfit.features.fleet.plan import PlannedCase
+from exfit.features.fleet.processes import Answer, WorkerProcess
+from exfit.features.fleet.worker import BEGUN, READY
+
+if TYPE_CHECKING:
+    from distributed import Worker
+
+LIBRARIES = ("numpy", "scipy", "llvmlite", "pydantic")  # that the last bits of a result depend on
+STARTED_WITHIN = 120.0  # s: a process may import exfit from a slow disk
+LISTENING = 1.0  # s between two looks at the clock
+IDLE = 300.0  # s without a case, as after the sudden end of a client: then processes end
+
+
+class RemoteCase(NamedTuple):
+    """A case as it travels: with its files, of which batch, and how long it may take (s)."""
+
+    case: PlannedCase
+    batch: str
+    limit: float
+
+
+class Reply(NamedTuple):
+    """What a worker replies: the packed outcome of a case, or how the process that had it died."""
+
+    packed: bytes = b""
+    death: str = ""
+
+
+class NoProcess(Exception):
+    """A worker that can start no process for cases, and why."""
+
+
+def versions() -> dict[str, str]:
+    """Return what results of this computer depend on: versions, system and kind of processor."""
+    return {
+        "exfit": __version__,
+        "Python": platform.python_version(),
+        **{library: version(library) for library in LIBRARIES},
+        "system": sys.platform,
+        "processor": platform.machine(),
+    }
+
+
+@dataclass(eq=False)
+class Seat:
+    """A process beside a worker, with the queue of what it says; ``ended`` once it has."""
+
+    process: WorkerProcess
+    said: "SimpleQueue[Answer]"
+    ended: bool = False
+
+    @classmethod
+    def taken(cls) -> "Seat":
+        """Return a process that is ready; raises NoProcess where none can be started."""
+        said: SimpleQueue[Answer] = SimpleQueue()
+        seat = cls(WorkerProcess(said), said)
+        try:
+            ready = said.get(timeout=STARTED_WITHIN).content == READY
+        except Empty:
+            ready = False
+            seat.process.dismiss()
+        if not ready:
+            raise NoProcess(seat.gone())
+        return seat
+
+    def reply(
+        self, case: PlannedCase, group: str, limit: float, is_wanted: Callable[[], bool]
+    ) -> Reply:
+        """Return what becomes of a case; the process has ended where it takes longer or crashes.
+
+        It is ended, too, once the case is not wanted any more.
+        """
+        self.process.give(case, group)
+        until = time.monotonic() + limit
+        while time.monotonic() < until:
+            try:
+                content = self.said.get(timeout=min(LISTENING, limit)).content
+            except Empty:
+                if is_wanted():
+                    continue
+                self.process.dismiss()
+                return Reply(death=self.gone())
+            if content is None:
+                return Reply(death=self.gone())
+            if content != BEGUN:
+                return Reply(_packed(content))
+        self.process.dismiss()
+        self.gone()
+        failure = Failure("timed out", f"no end after {limit:g} s", limit)
+        return Reply(_packed(CaseOutcome(failure=failure)))
+
+    def gone(self) -> str:
+        """Wait for the end of the process; return how it ended."""
+        self.ended = True
+        return self.process.gone()
+
+
+@dataclass(eq=False)
+class Seats:
+    """The processes of a batch beside a worker: one for each of its threads that has a case.
+
+    The threads of the worker share it; ``stopped`` once the batch has ended.
+    """
+
+    folder: Path
+    lock: Lock = field(default_factory=Lock)
+    idle: list[Seat] = field(default_factory=list)
+    busy: set[Seat] = field(default_factory=set)
+    stopped: bool = False
+    leaving: Timer | None = None
+
+    def reply(self, remote: RemoteCase, is_wanted: Callable[[], bool]) -> Reply:
+        """Return what becomes of a case; raises NoProcess where none can be started for it."""
+        case = remote.case
+        if not isinstance(case.task, BundledTask):
+            raise TypeError("a case without its files")
+        task = replace(case.task, temporary=self.folder)
+        with self._seat() as seat:
+            return seat.reply(case._replace(task=task), task.group, remote.limit, is_wanted)
+
+    @contextmanager
+    def _seat(self) -> Iterator[Seat]:
+        """Give a process, idle or new; one that has ended is not used again."""
+        with self.lock:
+            seat = self.idle.pop() if self.idle else None
+            if self.leaving is not None:
+                self.leaving.cancel()
+        seat = seat or Seat.taken()
+        with self.lock:
+            self.busy.add(seat)
+        try:
+            if self.stopped:
+                raise NoProcess("the batch has ended")
+            yield seat
+        finally:
+            self._give_back(seat)
+
+    def _give_back(self, seat: Seat) -> None:
+        with self.lock:
+            self.busy.discard(seat)
+            if seat.ended:
+                return
+            self.idle.append(seat)
+            self.leaving = Timer(0.0 if self.stopped else IDLE, self._leave)
+            self.leaving.daemon = True
+            self.leaving.start()
+
+    def _leave(self) -> None:
+        """End the processes that have had nothing to do for long."""
+        with self.lock:
+            idle, self.idle = self.idle, []
+        for seat in idle:
+            seat.process.dismiss()
+        for seat in idle:
+            seat.gone()
+
+    def stop(self) -> None:
+        """End all processes at once, in the middle of a fit too."""
+        with self.lock:
+            self.stopped = True
+            for seat in self.busy:  # whose thread sees that it ends
+                seat.process.dismiss()
+        self._leave()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def run_packed(payload: bytes) -> Reply:
+    """Return what becomes of a packed case, in a worker of the cluster."""
+    from distributed import get_worker
+
+    remote: RemoteCase = pickle.loads(payload)
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:  # not after a sudden end of the client, who could not say so
+        state = worker.state.tasks.get(key)
+        return state is not None and state.state != "cancelled"
+
+    return _seats(worker, remote.batch).reply(remote, is_wanted)
+
+
+def stop_batch(batch: str, dask_worker: "Worker | None" = None) -> None:
+    """End the processes of a batch beside a worker, which distributed names."""
+    if dask_worker is not None:
+        _seats(dask_worker, batch).stop()
+
+
+def _seats(worker: "Worker", batch: str) -> Seats:
+    """Return the processes of a batch beside a worker, which has them as long as it runs."""
+    batches: dict[str, Seats] = vars(worker).setdefault("exfit_batches", {})
+    folder = Path(worker.local_directory) / f"exfit-{batch}"
+    return batches.setdefault(batch, Seats(folder))  # in one step: its threads share them
+
+
+def _packed(outcome: CaseOutcome) -> bytes:
+    return zlib.compress(pickle.dumps(outcome, pickle.HIGHEST_PROTOCOL), QUICKLY)
+
+
+def unpacked(packed: bytes) -> CaseOutcome:
+    """Return the outcome that has travelled."""
+    outcome: CaseOutcome = pickle.loads(zlib.decompress(packed))
+    return outcome

@@ -1,0 +1,219 @@
+"""Sister units, those of the same model, make and rating, beside each other; what stands out.
+
+Sisters have the same settings, or nearly: one that differs from the others by more than their
+spread and its own interval allow was set, built or recorded otherwise, and is to be looked at.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+
+from exfit.features.fleet.summary import CaseSummary
+from exfit.inference.outliers import FEWEST, Estimates, deviations
+from exfit.results.facts import MAKER, MODEL, PLANT, RATED, TYPE, UNIT, stated
+from exfit.results.verdict import WITHOUT_INTERVALS
+
+ERRORS_IN_HALF = NormalDist().inv_cdf(0.975)  # standard errors in half of a 95 % interval
+ALIKE = (MAKER, MODEL, TYPE, RATED)  # facts that sisters share where they are stated
+OUTLIER = "outlier"
+UNDETERMINED = "not determined"
+WITHOUT_INTERVAL = "no interval"  # that was looked for, as without a global search
+
+
+def missing_interval(case: CaseSummary, name: str) -> str:
+    """Return why a fitted parameter of a case has no closed interval, "" where it has one."""
+    parameter = case.fitted[name]
+    if case.verdict in WITHOUT_INTERVALS:
+        return f"{WITHOUT_INTERVAL}: {case.verdict}"
+    if parameter.low is not None and parameter.high is not None and isfinite(parameter.value):
+        return ""
+    return UNDETERMINED if name in case.unresolved else WITHOUT_INTERVAL
+
+
+class SisterValue(NamedTuple):
+    """A parameter of one of several sisters, with its 95 % interval.
+
+    ``deviation`` from the others is in standard deviations of such a difference, ``probability``
+    that of chance alone to let any of them deviate as much; None where that is not known.
+    ``remark`` is "outlier", what it lies beyond, or `missing_interval`.
+    """
+
+    case: str
+    value: float
+    low: float | None
+    high: float | None
+    remark: str = ""
+    deviation: float | None = None
+    probability: float | None = None
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it is an outlier, or lies beyond the interval of another."""
+        return self.remark not in ("", UNDETERMINED, WITHOUT_INTERVAL)
+
+    @property
+    def is_outlier(self) -> bool:
+        """Whether it differs from those of its sisters."""
+        return self.remark == OUTLIER
+
+
+@dataclass(frozen=True)
+class SisterParameter:
+    """A parameter of sisters: their values, in the order of their names.
+
+    ``centre`` and ``spread`` are the mean and the standard deviation of the units without outliers,
+    None where fewer than four are determined.
+    """
+
+    name: str
+    unit: str
+    values: tuple[SisterValue, ...]
+    centre: float | None = None
+    spread: float | None = None
+
+    @property
+    def remarkable(self) -> tuple[SisterValue, ...]:
+        """Those that stand out."""
+        return tuple(value for value in self.values if value.stands_out)
+
+
+@dataclass(frozen=True)
+class SisterGroup:
+    """Units of one exciter on one machine model, and of one make and rating where stated.
+
+    ``left_out`` says of cases of the group why they are not compared.
+    """
+
+    model: str
+    machine_model: str
+    facts: tuple[str, ...]
+    cases: tuple[CaseSummary, ...]
+    parameters: tuple[SisterParameter, ...]
+    left_out: dict[str, str]
+
+    @property
+    def title(self) -> str:
+        """What the units share, in words."""
+        models = self.model + (f" on {self.machine_model}" if self.machine_model else "")
+        return ", ".join((models, *self.facts))
+
+    @property
+    def outliers(self) -> int:
+        """How many values differ from those of the sisters."""
+        return sum(v.is_outlier for parameter in self.parameters for v in parameter.values)
+
+
+def sisters(cases: Iterable[CaseSummary]) -> tuple[SisterGroup, ...]:
+    """Return the units that have sisters, by what they share, with their parameters.
+
+    Of a unit with several cases the first that matches its records counts. With four sisters or
+    more outliers are found by `exfit.inference.outliers`; of fewer only those are named whose 95 %
+    intervals do not meet.
+    """
+    groups: dict[tuple[str, ...], list[CaseSummary]] = defaultdict(list)
+    for case in cases:
+        if case.status == "done":
+            groups[_shared(case)].append(case)
+    built = (_group(members) for _, members in sorted(groups.items()))
+    return tuple(group for group in built if len(group.cases) > 1)
+
+
+def _shared(case: CaseSummary) -> tuple[str, ...]:
+    facts = (" ".join((stated(case.about, fact) or "").split()).casefold() for fact in ALIKE)
+    return (case.model, case.machine_model, *facts)
+
+
+def _group(members: Sequence[CaseSummary]) -> SisterGroup:
+    compared: dict[tuple[str, ...], CaseSummary] = {}
+    left_out: dict[str, str] = {}
+    for case in members:
+        identity = _unit(case)
+        if not case.holds:
+            left_out[case.name] = case.verdict
+        elif identity in compared:
+            left_out[case.name] = f"the unit of {compared[identity].name}"
+        else:
+            compared[identity] = case
+    cases, first = tuple(compared.values()), members[0]
+    facts = tuple(filter(None, (stated(first.about, fact) for fact in ALIKE)))
+    names = dict.fromkeys(name for case in cases for name in case.fitted)
+    parameters = (
+        _parameter(name, [case for case in cases if name in case.fitted]) for name in names
+    )
+    return SisterGroup(
+        first.model,
+        first.machine_model,
+        facts,
+        cases,
+        tuple(parameter for parameter in parameters if len(parameter.values) > 1),
+        left_out,
+    )
+
+
+def _unit(case: CaseSummary) -> tuple[str, ...]:
+    """Return what two cases of one unit share: its place, else its name, else all content."""
+    if case.bus is not None and case.machine_id is not None:
+        return ("bus", str(case.bus), case.machine_id)
+    plant, unit = (stated(case.about, fact) for fact in (PLANT, UNIT))
+    return (plant, unit) if plant and unit else (case.key,)
+
+
+def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
+    """Return a parameter of all sisters that were fitted with it."""
+    values = [_value(case, name) for case in cases]
+    unit = next(iter(cases)).fitted[name].unit
+    closed = [v for v in values if v.low is not None and v.high is not None]
+    if len(closed) < FEWEST:
+        return SisterParameter(name, unit, tuple(_beyond_intervals(values)))
+    estimates = _estimates(closed)
+    judged = deviations(estimates)
+    columns = (judged.deviation, judged.probability, judged.outlier)
+    by_case = {
+        v.case: v._replace(
+            deviation=float(deviation),
+            probability=float(probability),
+            remark=OUTLIER if outlier else "",
+        )
+        for v, deviation, probability, outlier in zip(closed, *columns, strict=True)
+    }
+    every = tuple(by_case.get(v.case, v) for v in values)
+    return SisterParameter(name, unit, every, judged.centre, judged.spread)
+
+
+def _value(case: CaseSummary, name: str) -> SisterValue:
+    parameter = case.fitted[name]
+    remark = missing_interval(case, name)
+    return SisterValue(case.name, parameter.value, parameter.low, parameter.high, remark)
+
+
+def _estimates(values: Sequence[SisterValue]) -> Estimates:
+    low, value, high = (
+        np.array([getattr(v, side) for v in values], dtype=float)
+        for side in ("low", "value", "high")
+    )
+    below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
+    return Estimates(value, below / ERRORS_IN_HALF, above / ERRORS_IN_HALF)
+
+
+def _beyond_intervals(values: Sequence[SisterValue]) -> Iterator[SisterValue]:
+    """Yield values, those with a remark whose intervals do not meet that of another."""
+    for value in values:
+        others = [other.case for other in values if _apart(value, other)]
+        yield (
+            value._replace(remark=f"beyond the interval of {', '.join(others)}")
+            if others
+            else value
+        )
+
+
+def _apart(one: SisterValue, other: SisterValue) -> bool:
+    """Return whether one interval ends before the other begins; an open side has no end."""
+    return any(
+        a.high is not None and b.low is not None and a.high < b.low
+        for a, b in ((one, other), (other, one))
+    )

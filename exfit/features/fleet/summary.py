@@ -1,0 +1,276 @@
+"""A row of the table of a batch: what a case came to, in figures and small curves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, nan
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.results.facts import UNIT, Facts, stated
+from exfit.results.verdict import GOOD, MATCHES
+from exfit.util.text import error_of_interval, rounded_value
+from exfit.util.typed import IN_FILE
+
+if TYPE_CHECKING:
+    from exfit.results.comparisons import Comparison
+    from exfit.results.model import FitResult
+
+Array = NDArray[np.float64]
+CaseStatus = Literal[
+    "done", "failed", "timed out", "crashed", "refused", "no record", "not run"
+]  # fmt: skip
+FailureKind = Literal["failed", "timed out", "crashed"]
+
+MOST_POINTS = 120  # of a curve in a summary
+CURVE_DIGITS = 6  # significant, of a point of a curve
+
+
+class CaseFacts(NamedTuple):
+    """What a case says of its unit: its name, its place in a planner's file, its models.
+
+    ``unit`` is what ``about`` has under Unit, else the bus and the machine; "" where neither is
+    given. ``bus`` and ``machine_id`` are those of ``as_found``.
+    """
+
+    unit: str = ""
+    bus: int | None = None
+    machine_id: str | None = None
+    model: str = ""
+    machine_model: str = ""
+
+
+class SummaryParameter(NamedTuple):
+    """A value of the unit, with its 95 % interval where it was fitted.
+
+    A side of the interval without a limit is None; ``source`` says where the value comes from,
+    which is an earlier fit where it is "fitted" and the parameter is not ``fitted`` here. ``min``
+    and ``max`` are infinite where there is no bound.
+    """
+
+    value: Annotated[float, nan]
+    low: float | None
+    high: float | None
+    source: str
+    unit: str
+    fitted: bool
+    min: Annotated[float, -inf] = -inf
+    max: Annotated[float, inf] = inf
+
+    def rounded(self, number: float) -> str:
+        """Return the value, or an end of its interval, as tables print it: within the bounds."""
+        return rounded_value(number, error_of_interval(self.low, self.high), self.min, self.max)
+
+
+class SummaryValidation(NamedTuple):
+    """What the records that were not fitted say, "" without any; ``rmse`` is the largest, pu."""
+
+    outcome: Literal["accepted", "not accepted", ""] = ""
+    rmse: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SummaryCurve:
+    """A signal of a fitted record beside its simulation: at most 120 points (M,) each, per unit.
+
+    ``time`` is in s; what is left out of the comparison is nan.
+    """
+
+    record: str
+    signal: str
+    time: Array
+    measured: Array
+    simulated: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CaseSummary:
+    """What a case of a batch came to.
+
+    ``name`` is that of no other case of the batch, ``case`` the path of its file, relative to the
+    folder of the batch where there is a way, and ``key`` the folder of its fit there, "" without
+    one. ``reason`` says why it is not done, or is the reason of the verdict. ``rmse`` (pu) is by
+    signal, the largest over the fitted records; ``parameters`` are all of the unit's, fitted or
+    not; ``unresolved`` names those fitted that the records do not determine. ``seconds`` is
+    processor time; ``about`` are the facts that the case of a fit states of its unit and test.
+    """
+
+    name: str
+    case: str
+    key: str
+    status: CaseStatus
+    reason: str = ""
+    unit: str = ""
+    bus: int | None = None
+    machine_id: str | None = None
+    model: str = ""
+    machine_model: str = ""
+    verdict: str = ""
+    holds: bool = False
+    rmse: Mapping[str, Annotated[float, nan]] = field(default_factory=dict)
+    validation: SummaryValidation = field(default_factory=SummaryValidation)
+    unresolved: tuple[str, ...] = ()
+    parameters: Mapping[str, SummaryParameter] = field(default_factory=dict)
+    curves: tuple[SummaryCurve, ...] = field(default=(), metadata=IN_FILE)
+    seconds: float = 0.0
+    notes: tuple[str, ...] = ()
+    about: Facts = field(default_factory=dict)
+
+    def named(self, name: str, case: str) -> "CaseSummary":
+        """Return the summary for another case of equal content."""
+        return replace(self, name=name, case=case)
+
+    @property
+    def outcome(self) -> str:
+        """What the case came to in a few words: its verdict, or why there is none."""
+        from exfit.results.side_by_side import NOT_ACCEPTED
+
+        if self.status != "done":
+            return self.status
+        if self.verdict in (GOOD, MATCHES) and not self.holds:
+            return NOT_ACCEPTED
+        return self.verdict or "no verdict"
+
+    @property
+    def fitted(self) -> dict[str, SummaryParameter]:
+        """The parameters that the fit of this case determined, or should have."""
+        return {name: value for name, value in self.parameters.items() if value.fitted}
+
+
+def facts_of(content: Mapping[str, Any]) -> CaseFacts:
+    """Return what the content of a case file, faulty or not, says of its unit."""
+    as_found, plant = _mapping(content.get("as_found")), _mapping(content.get("plant"))
+    bus, machine_id = as_found.get("bus"), as_found.get("id")
+    bus = bus if isinstance(bus, int) and not isinstance(bus, bool) else None
+    machine_id = None if machine_id is None else str(machine_id)
+    return CaseFacts(
+        unit=_unit(_mapping(content.get("about")), bus, machine_id),
+        bus=bus,
+        machine_id=machine_id,
+        model=_text(content.get("model")),
+        machine_model=_text(plant.get("machine")),
+    )
+
+
+def _unit(about: Mapping[Any, Any], bus: int | None, machine_id: str | None) -> str:
+    """Return what a case calls its unit, else its place in the planner's file in words."""
+    facts = {str(key): _text(fact) for key, fact in about.items()}
+    machine = None if machine_id is None else f"machine {machine_id}"
+    place = filter(None, (None if bus is None else f"bus {bus}", machine))
+    return stated(facts, UNIT) or ", ".join(place)
+
+
+def _mapping(content: Any) -> Mapping[Any, Any]:
+    return content if isinstance(content, Mapping) else {}
+
+
+def _text(content: Any) -> str:
+    return str(content) if isinstance(content, str | int | float) else ""
+
+
+def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
+    """Return the summary of a fit that has ended; ``seconds`` of processor time it took.
+
+    Its name and path are those of its case until a batch gives others.
+    """
+    from exfit.results.side_by_side import explanation_of, outcome_of
+
+    facts = _facts_of_result(result)
+    return CaseSummary(
+        name=result.name,
+        case=result.case.as_posix(),
+        key=key,
+        status="done",
+        reason=explanation_of(result),
+        **facts._asdict(),
+        verdict=result.verdict.verdict if result.verdict is not None else outcome_of(result),
+        holds=result.holds,
+        rmse=_largest_rmse(result.comparisons),
+        validation=_validation(result.validation),
+        unresolved=() if result.knowledge is None else _unresolved(result),
+        parameters=_parameters(result),
+        curves=tuple(curve for match in result.comparisons for curve in _curves(match)),
+        seconds=round(seconds, 3),
+        notes=(*result.notes, *(note for match in result.comparisons for note in match.notes)),
+        about=dict(result.about),
+    )
+
+
+def _facts_of_result(result: "FitResult") -> CaseFacts:
+    found = result.as_found
+    bus, machine_id = (None, None) if found is None else (found.bus, found.machine_id)
+    unit = _unit(result.about, bus, machine_id)
+    return CaseFacts(unit, bus, machine_id, result.model, result.machine_model or "")
+
+
+def _largest_rmse(comparisons: "Sequence[Comparison]") -> dict[str, float]:
+    """Return the rmse of each signal, the largest where several records have it."""
+    largest: dict[str, float] = {}
+    for comparison in comparisons:
+        for signal, match in comparison.channels.items():
+            largest[signal] = max(match.rmse, largest.get(signal, match.rmse))
+    return largest
+
+
+def _validation(validations: "Sequence[Comparison]") -> SummaryValidation:
+    if not validations:
+        return SummaryValidation()
+    accepted = all(match.accepted for match in validations)
+    largest = max(match.rmse for match in validations)
+    return SummaryValidation(
+        "accepted" if accepted else "not accepted", largest if largest < np.inf else None
+    )
+
+
+def _unresolved(result: "FitResult") -> tuple[str, ...]:
+    """Return what the records do not determine, as the verdict counts it.
+
+    A parameter whose interval was not looked for, as without a global search, or that has none as
+    the response misses the records, is none of these.
+    """
+    from exfit.results.intervals.determination import NEEDS_PROFILE, UNFINISHED
+
+    if result.verdict is not None and result.verdict.misfit:
+        return ()
+    return tuple(
+        name
+        for name, parameter in result.parameters.items()
+        if not (parameter.of_record or parameter.determined)
+        and parameter.why not in (NEEDS_PROFILE, UNFINISHED)
+    )
+
+
+def _parameters(result: "FitResult") -> dict[str, SummaryParameter]:
+    units = {
+        part.prefix + symbol: row.unit
+        for part in result.parts
+        for symbol, row in (part.sheet or {}).items()
+    }
+    of_records = result.of_records
+    parameters = {}
+    for name, value in result.values.items():
+        if name not in of_records:
+            fitted = result.parameters.get(name)
+            low, high = (None, None) if fitted is None else fitted.interval or (None, None)
+            unit = units.get(name, "") if fitted is None else fitted.unit
+            source = result.source_of(name)
+            bounds = () if fitted is None else (fitted.min, fitted.max)
+            parameters[name] = SummaryParameter(
+                value, low, high, source, unit, fitted is not None, *bounds
+            )
+    return parameters
+
+
+def _curves(comparison: "Comparison") -> list[SummaryCurve]:
+    """Return the signals of a comparison, thinned to their extremes."""
+    from exfit.dsp.decimation import kept_rows
+    from exfit.results.thinning import rounded
+
+    curves = []
+    for signal, overlay in comparison.overlays.items():
+        drawn = [overlay.measured, overlay.simulated]
+        rows = kept_rows(drawn, (MOST_POINTS - 2) // (2 * len(drawn)))
+        samples = [rounded(line[rows], CURVE_DIGITS) for line in (comparison.time, *drawn)]
+        curves.append(SummaryCurve(comparison.name, signal, *samples))
+    return curves

@@ -1,0 +1,148 @@
+"""One case of a batch, from its files to the files of its fit: the same in every worker."""
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from traceback import extract_tb
+from typing import TYPE_CHECKING, NamedTuple
+
+from exfit import __version__
+from exfit.errors import ExfitError
+from exfit.features.fleet.folder import KEY_DIGITS, CaseOutcome, Failure
+from exfit.features.fleet.summary import summary_of
+from exfit.util.files import read_regular, regular_size
+from exfit.util.root import on_disk
+
+if TYPE_CHECKING:
+    from exfit.case.case import Case
+    from exfit.results.model import FitResult
+
+FurtherFiles = Callable[["FitResult", Path], Iterable[tuple[str, str]]]
+
+CODE = ".py"
+CHANGED = "changed while the case was fitted: run the batch again"
+
+
+class FitSettings(NamedTuple):
+    """How the cases of a batch are fitted, in place of what each says: None for the case's own."""
+
+    strategy: str | None = None
+    search: str | None = None
+
+
+@dataclass(frozen=True)
+class CaseTask:
+    """A case to be fitted, as a worker is given it; it can be pickled.
+
+    ``files`` are the case and those that it names, the case first; ``key`` is the hash of their
+    contents and the settings. ``folder`` is where the fit will lie; a worker writes nothing there.
+    Cases of one ``group`` share their machine code. ``further`` are functions that make files
+    beside those of every fit, such as a report.
+    """
+
+    files: tuple[Path, ...]
+    key: str
+    folder: Path
+    settings: FitSettings = field(default_factory=FitSettings)
+    group: str = ""
+    further: tuple[FurtherFiles, ...] = ()
+
+    def run(self) -> CaseOutcome:
+        """Fit the case, in the process of a worker."""
+        return run_case(self)
+
+
+def key_of(files: Sequence[Path], settings: FitSettings, case: bytes | None = None) -> str:
+    """Return the key of a case: the hash of its files, the settings and the version of exfit.
+
+    A file that is missing or cannot be read counts as such. ``files`` are the case and those that
+    it names, in its order; ``case`` is the content of the first where it has been read already.
+    """
+    return _key(_digests(files, case), settings)
+
+
+def run_case(task: CaseTask) -> CaseOutcome:
+    """Fit a case; nothing that goes wrong is raised but what ends the process.
+
+    The files are those of which the key was made, before the fit and after it: else the outcome
+    only says that they have changed.
+    """
+    began = time.process_time()
+    try:
+        return _outcome(task, began)
+    except ExfitError as fault:
+        return CaseOutcome(failure=Failure("failed", str(fault), _seconds(began)))
+    except (Exception, SystemExit) as fault:
+        return crash(fault, _seconds(began))
+
+
+def crash(fault: BaseException, seconds: float = 0.0) -> CaseOutcome:
+    """Return the outcome of a case in which happened what should not, after processor time in s."""
+    frames = extract_tb(fault.__traceback__)
+    place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
+    return CaseOutcome(
+        failure=Failure("crashed", f"{type(fault).__name__}: {fault}{place}", seconds)
+    )
+
+
+def _outcome(task: CaseTask, began: float) -> CaseOutcome:
+    """Return what becomes of a case; raises ExfitError where it cannot be fitted."""
+    from exfit import workflows
+    from exfit.results.fit_files import files_of_fit
+
+    case = _case_of(task)
+    if case is None:
+        return CaseOutcome(changed=CHANGED)
+    result = workflows.fit(case, task.settings.strategy, search=task.settings.search)
+    files = dict(files_of_fit(result))
+    for further in task.further:
+        files |= further(result, task.folder)
+    if key_of(task.files, task.settings) != task.key:
+        return CaseOutcome(changed=CHANGED)
+    return CaseOutcome(files, summary_of(result, task.key, _seconds(began)))
+
+
+def _case_of(task: CaseTask) -> "Case | None":
+    """Return the case of a task; None where a file of it is another than when it got its key.
+
+    What is run is what the key was made of, code that the case names too.
+    """
+    from exfit.case.load import parse_case
+    from exfit.case.yaml import decoded
+
+    path = task.files[0]
+    try:
+        data = read_regular(path)
+    except OSError:
+        return None
+    digests = _digests(task.files, data)
+    if _key(digests, task.settings) != task.key:
+        return None
+    code = (digest for file, digest in zip(task.files, digests, strict=True) if file.suffix == CODE)
+    return parse_case(decoded(data, path), path, next(code, None) or "")
+
+
+def _key(digests: Sequence[str | None], settings: FitSettings) -> str:
+    content = {"exfit": __version__, "files": digests, **settings._asdict()}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:KEY_DIGITS]
+
+
+def _digests(files: Sequence[Path], case: bytes | None) -> list[str | None]:
+    first = _digest(files[0]) if case is None else hashlib.sha256(case).hexdigest()
+    return [first, *map(_digest, files[1:])]
+
+
+def _digest(file: Path) -> str | None:
+    try:
+        regular_size(file)
+        with on_disk(file).open("rb") as content:
+            return hashlib.file_digest(content, "sha256").hexdigest()
+    except OSError:
+        return None
+
+
+def _seconds(began: float) -> float:
+    return round(time.process_time() - began, 3)

@@ -1,0 +1,210 @@
+"""A batch in the terminal: how far it is while it runs, and what all its cases came to."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from textwrap import shorten
+
+from rich.console import Console
+from rich.live import Live
+from rich.markup import escape
+from rich.progress_bar import ProgressBar as Bar
+from rich.table import Table
+from rich.text import Text
+
+from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.summary import CaseSummary
+from exfit.results.verdict import GOOD, MATCHES
+from exfit.show.terminal.terminal import paragraph, plain_table, show_table, written
+
+FIRST_LINE, BETWEEN_LINES = 10.0, 60.0  # s: when a file or pipe gets its lines
+REFRESHES = 2.0  # a second
+FEWEST_DONE = 3  # cases, before the time left is estimated
+MOST_RUNNING = 4  # cases that are named
+MOST_ATTENTION = 20  # cases below the counts
+LONGEST_REASON = 160  # characters of it: the whole is in the table
+BETWEEN = 2  # characters between a bar and the words beside it
+SHORTEST_BAR = 10  # characters
+MINUTE, HOUR = 60.0, 3600.0
+LONG_WAIT = 100.0  # s: from here on in minutes
+HARMLESS = (GOOD, MATCHES, "no record")
+STYLES = {GOOD: "green", MATCHES: "yellow", "no record": "dim", "not run": "dim"}
+
+
+class BatchProgress:
+    """Shows how far a batch is: a few lines that change, or plain lines in a file or pipe."""
+
+    def __init__(self, console: Console, clock: Callable[[], float] = time.monotonic) -> None:
+        self.console, self._clock = console, clock
+        self._cases = self._workers = self._kept = 0
+        self._began = self._next_line = clock()
+        self._running: dict[str, float] = {}
+        self._durations: list[float] = []
+        self._outcomes = Counter[str]()
+        self._live: Live | None = None
+
+    @contextmanager
+    def running(self) -> Iterator["BatchProgress"]:
+        """Show it for as long as the batch runs."""
+        if not self.console.is_terminal:
+            yield self
+            return
+        live = Live(
+            get_renderable=self.picture,
+            console=self.console,
+            refresh_per_second=REFRESHES,
+            transient=True,
+        )
+        with live as self._live:
+            yield self
+
+    def begun(self, cases: int, workers: int) -> None:
+        """Show how much there is to do."""
+        self._cases, self._workers = cases, workers
+        self._began = self._clock()
+        self._next_line = self._began + FIRST_LINE
+        by = _plural(workers, "worker") if workers else "a cluster"
+        self.console.print(f"{_plural(cases, 'case')}, {by}", soft_wrap=True, markup=False)
+
+    def kept(self, case: str) -> None:
+        """Count a case that is done already."""
+        self._running.pop(case, None)
+        self._kept += 1
+        self._line()
+
+    def started(self, case: str) -> None:
+        """Show that a case begins."""
+        self._running[case] = self._clock()
+
+    def finished(self, summary: CaseSummary) -> None:
+        """Count a case that has ended."""
+        began = self._running.pop(summary.case, None)
+        if began is not None:
+            self._durations.append(self._clock() - began)
+        self._outcomes[summary.outcome] += 1
+        self._line()
+
+    @property
+    def done(self) -> int:
+        """How many cases have come to their end, those of earlier runs among them."""
+        return self._kept + self._outcomes.total()
+
+    @property
+    def seconds_left(self) -> float | None:
+        """The time until all are done, None while too little is known of it.
+
+        What is left is taken to need the mean time of a case, and no less than the longest of those
+        that run: a mean of all holds however mixed the cases are, a rate of the last ones does not.
+        """
+        if len(self._durations) < FEWEST_DONE:
+            return None
+        mean = sum(self._durations) / len(self._durations)
+        waiting = self._cases - self.done - len(self._running)
+        now = self._clock()
+        rest = [max(mean - (now - began), 0.0) for began in self._running.values()]
+        at_a_time = self._workers or max(sum(self._durations) / max(now - self._began, 1e-9), 1.0)
+        return max((waiting * mean + sum(rest)) / at_a_time, *rest, 0.0)
+
+    def picture(self) -> Table:
+        """Return the lines that a terminal shows."""
+        width = self.console.width - 1
+        head, pace = f"{self.done} of {self._cases} cases", self._pace()
+        room = width - len(head) - len(pace) - 2 * BETWEEN
+        lines = Table.grid(padding=(0, BETWEEN, 0, 0))
+        if room >= SHORTEST_BAR:
+            lines.add_row(head, Bar(max(self._cases, 1), self.done, width=room), pace)
+        else:
+            lines.add_row(", ".join(filter(None, (head, pace))))
+        running = self._now(self._clock())
+        running.truncate(max(width, 1), overflow="ellipsis")
+        grid = Table.grid()
+        for line in (lines, self._counts(), running):
+            grid.add_row(line)
+        return grid
+
+    def _line(self) -> None:
+        """Print a line of a file or pipe where it is time for one."""
+        if self._live is not None or self._clock() < self._next_line:
+            return
+        self._next_line = self._clock() + BETWEEN_LINES
+        counts = self._counts().plain
+        text = ", ".join(
+            filter(None, (f"{self.done} of {self._cases} cases", self._pace(), counts))
+        )
+        self.console.print(text, soft_wrap=True, markup=False)
+
+    def _pace(self) -> str:
+        """Return the rate and the time left in words, as far as they are known."""
+        elapsed = self._clock() - self._began
+        left = self.seconds_left
+        if left is None or elapsed <= 0.0:
+            return ""
+        rate = len(self._durations) / elapsed * MINUTE
+        return f"{rate:.3g}/min, {_duration(left)} left"
+
+    def _counts(self) -> Text:
+        kept = {"done before": self._kept} if self._kept else {}
+        parts = [*kept.items(), *self._outcomes.most_common()]
+        words = (Text(f"{word} {count}", STYLES.get(word, "")) for word, count in parts)
+        return Text(", ").join(words)
+
+    def _now(self, now: float) -> Text:
+        """Return what runs, the longest first."""
+        longest = sorted(self._running.items(), key=lambda item: item[1])
+        names = [
+            f"{_name(case)} ({_duration(now - began)})" for case, began in longest[:MOST_RUNNING]
+        ]
+        more = len(longest) - MOST_RUNNING
+        text = ", ".join(names) + (f" and {more} more" if more > 0 else "")
+        return Text(f"now {text}" if text else "", "dim")
+
+
+def batch(console: Console, fleet: Fleet) -> None:
+    """Show what the cases of a batch came to, and which of them need attention."""
+    counts = Counter(case.outcome for case in fleet.cases)
+    console.print()
+    table = plain_table("outcome", "cases", numbers=("cases",))
+    for outcome, count in counts.most_common():
+        table.add_row(outcome, str(count), style=STYLES.get(outcome, "bold red"))
+    show_table(console, table)
+    attention = [case for case in fleet.cases if case.outcome not in HARMLESS]
+    if attention:
+        console.print()
+        _attention(console, attention)
+    console.print()
+    if fleet.interrupted:
+        paragraph(console, "interrupted: run the same command again to go on", "bold red")
+    written(console, fleet.folder / "fleet.html")
+    written(console, fleet.folder / "fleet.csv")
+
+
+def _attention(console: Console, cases: Sequence[CaseSummary]) -> None:
+    table = plain_table("case", "outcome", "reason")
+    for case in cases[:MOST_ATTENTION]:
+        table.add_row(
+            escape(case.name),
+            case.outcome,
+            escape(shorten(case.reason, LONGEST_REASON, placeholder=" …")),
+        )
+    show_table(console, table)
+    if len(cases) > MOST_ATTENTION:
+        paragraph(console, f"… and {len(cases) - MOST_ATTENTION} more in fleet.csv", "dim")
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in round words."""
+    if seconds < LONG_WAIT:
+        return f"{seconds:.0f} s"
+    if seconds < 2 * HOUR:
+        return f"{seconds / MINUTE:.0f} min"
+    return f"{seconds / HOUR:.1f} h"
+
+
+def _plural(count: int, word: str) -> str:
+    return f"{count} {word}{'' if count == 1 else 's'}"
+
+
+def _name(case: str) -> str:
+    """Return the name of a case's file."""
+    return case.rsplit("/", 1)[-1].removesuffix(".yaml")

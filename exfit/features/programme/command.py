@@ -1,0 +1,131 @@
+"""The command run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli.given_files import GivenFile, Kind
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    Interruption,
+    Output,
+    output_options,
+    print_json,
+    warn,
+)
+from exfit.errors import FileError
+
+if TYPE_CHECKING:
+    from exfit.features.programme.case import Programme
+    from exfit.features.programme.result import ProgrammeResult
+
+
+@click.command(short_help="Run all tests of a unit, each feeding the later ones.")
+@click.argument("programme", type=GivenFile(Kind.CASE))
+@click.option("--again", is_flag=True, help="Run every test, whatever is kept of an earlier run.")
+@output_options
+def run(programme: Path, again: bool, output: Output) -> None:
+    """Run the tests of PROGRAMME in the order in which one feeds the next.
+
+    Saturation tests come first, then points on load, then tests that determine data of the machine:
+    what they measured enters the tests after them, with its source. Last all bump tests are fitted
+    together. A case is the programme of one test.
+
+    Writes a folder for each test to runs/PROGRAMME-run, or to DIR, and beside them programme.json
+    and one report.html. A test that is done there is not run again unless its section, its files,
+    the values that enter it or exfit have changed since: after an interruption, whatever it was,
+    the next run goes on with the rest.
+
+    Exit code 0: every test is matched; 1: bad input, or a test that failed; 3: a test that is not
+    matched, a validation that is not accepted, or not all tests are run.
+    """
+    from exfit.features.programme.case import load_programme
+
+    loaded = load_programme(programme)
+    folder = _folder_of(loaded, output)
+    result = _shown(loaded, folder, again) if output.shown else _quiet(loaded, folder, again)
+    if result.interrupted and not result.tests:
+        raise Interruption("no test is done")
+    _write(result, folder, output)
+    if result.failed:
+        raise FileError(f"{name}: {fault}" for name, fault in result.failed.items())
+    if not result.holds:
+        raise SystemExit(NOT_CONVERGED)
+
+
+def _folder_of(programme: "Programme", output: Output) -> Path:
+    """Return the folder of a programme; raises ExfitError where a result would replace an input."""
+    from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme.steps import steps_of
+
+    folder = output.folder(f"{programme.path.stem}-run")
+    names = [step.name for step in steps_of(programme)]
+    files = [programme.path, *(file for name in names for file in programme.files_of(name))]
+    programme_folder.refuse_inputs(files, names, folder)
+    return folder
+
+
+def _quiet(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResult":
+    """Run a programme and write the numbers of its tests, without a word."""
+    from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme.run import run
+
+    return run(programme, folder, again, keep=programme_folder.write_test)
+
+
+def _shown(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResult":
+    """Run a programme, write the numbers of its tests, and show how far it is."""
+    from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme.run import run
+    from exfit.features.programme.steps import steps_of
+    from exfit.show import terminal
+
+    shown = terminal.ProgrammeProgress(terminal.console(), steps_of(programme))
+    with shown.running():
+        return run(
+            programme,
+            folder,
+            again,
+            shown,
+            shown.finished,
+            keep=programme_folder.write_test,
+        )
+
+
+def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
+    """Write what all tests came to and their report, show it, and draw the figures."""
+    from exfit.features.programme import folder as programme_folder
+    from exfit.features.report import write_report
+
+    try:
+        programme_folder.write_programme(result, folder)
+        if not result.interrupted:
+            write_report(folder)
+    finally:  # whatever becomes of the files
+        if output.as_json:
+            print_json(result.to_dict())
+        elif output.shown:
+            _show(result, folder)
+    if output.figures and not result.interrupted:
+        _draw(result, folder, output)
+
+
+def _show(result: "ProgrammeResult", folder: Path) -> None:
+    from exfit.show import terminal
+
+    console = terminal.console()
+    terminal.programme(console, result)
+    console.print()
+    terminal.written(console, folder)
+
+
+def _draw(result: "ProgrammeResult", folder: Path, output: Output) -> None:
+    """Draw the figures of each test that are missing, with a line for each test."""
+    from exfit.features.programme import folder as programme_folder
+    from exfit.show import terminal
+
+    for name, figures in programme_folder.figures_of(result, folder).items():
+        warn(figures.draw())
+        if output.shown:
+            terminal.figures_of_fit(terminal.console(), name)

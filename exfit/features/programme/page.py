@@ -1,0 +1,98 @@
+"""The report of a programme: the form, the tests of its machine, the fit of its bump tests."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from exfit.features.programme.page_steady import saturation_view, v_curve_view
+from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
+from exfit.features.programme.saturation_result import SaturationResult
+from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.report.page import Page, fit_page
+from exfit.features.report.sections import FORM, ReportSection
+from exfit.features.report.sections.findings import findings
+from exfit.features.report.sections.form import form_without_bumps
+from exfit.features.report.sections.matches import MatchView, fitted_matches
+from exfit.features.report.sections.parameters import parameters
+from exfit.features.report.sections.signatures import signatures
+from exfit.features.report.sections.unit_and_test import unit_without_bumps
+from exfit.features.report.verdict import Headline
+from exfit.results.model import FitResult
+
+Sections = Iterator[tuple[ReportSection, Any]]
+
+
+@dataclass(frozen=True)
+class ProgrammeView:
+    """The tests of a programme with what each came to, and the values that they gave."""
+
+    tests: tuple[FinishedTest, ...]
+    failed: tuple[tuple[str, str], ...]
+    values: tuple[EnteredValue, ...]
+    warnings: tuple[str, ...]
+
+
+def programme_page(result: ProgrammeResult, folder: Path) -> Page:
+    """Return what the page of a programme shows."""
+    sections = [_overview(result)]
+    for number, test in enumerate(result.tests, 1):
+        if test.result is not result.fit:
+            sections += _of_test(test, f"test-{number}")
+    if result.fit is None:
+        form = _section("form", FORM, form_without_bumps(result), "form")
+        unit = _section("test", "Unit and test", unit_without_bumps(result), "unit_and_test")
+        signed = _section("signatures", "Revision and signatures", signatures(result), "signatures")
+        whole = [form, *sections, unit, signed]
+        return Page(f"Programme {result.name}", _headline(result), whole, folder)
+    page = fit_page(result.fit, folder)
+    form, *others = page.sections
+    return replace(page, sections=[form, *sections, *others])
+
+
+def _headline(result: ProgrammeResult) -> Headline:
+    """Return what a programme without bump tests comes to."""
+    words = "; ".join(f"{test.name}: {test.verdict}" for test in result.tests)
+    word = "All tests are matched" if result.holds else "Not all tests are matched"
+    return Headline(f"{word}.", f"{words}.", result.holds, ())
+
+
+def _overview(result: ProgrammeResult) -> tuple[ReportSection, Any]:
+    view = ProgrammeView(result.tests, tuple(result.failed.items()), result.values, result.warnings)
+    return ReportSection("programme", "Test programme", lambda _: view, "programme"), view
+
+
+def _of_test(test: FinishedTest, key: str) -> Sections:
+    """Yield the sections of a test that is not among the bump tests."""
+    result = test.result
+    if isinstance(result, SaturationResult):
+        heading = f"Saturation test {test.name}"
+        yield _section(key, heading, saturation_view(result, key), "saturation_test")
+    elif isinstance(result, VCurve):
+        heading = f"Points on load {test.name}"
+        yield _section(key, heading, v_curve_view(result, key), "v_curve_test")
+    else:
+        yield from _of_machine_fit(test.name, result, key)
+
+
+def _of_machine_fit(name: str, result: FitResult, key: str) -> Sections:
+    """Yield the sections of a test that determines data of the machine."""
+    views = tuple(_with_key(view, key) for view in fitted_matches(result))
+    yield _section(key, f"Test {name}: record", views, "fit")
+    yield _section(
+        f"{key}-parameters", f"Test {name}: parameters", parameters(result), "parameters"
+    )
+    yield _section(f"{key}-findings", f"Test {name}: findings", findings(result), "findings")
+
+
+def _section(key: str, heading: str, content: Any, template: str) -> tuple[ReportSection, Any]:
+    return ReportSection(key, heading, lambda _: content, template), content
+
+
+def _with_key(view: MatchView, key: str) -> MatchView:
+    """Return a record whose charts have ids of their own on the page."""
+    overlays = tuple(
+        replace(overlay, chart=replace(overlay.chart, key=f"{key}-{overlay.chart.key}"))
+        for overlay in view.overlays
+    )
+    return replace(view, overlays=overlays)

@@ -1,0 +1,220 @@
+"""Programmes run: each test in its turn, with what those before it measured."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+from exfit import estimate, workflows
+from exfit.case.case import Case
+from exfit.case.schema import SaturationTest, SteadyTest
+from exfit.errors import CaseError, ExfitError
+from exfit.features.programme.case import FIT, Programme, load_programme
+from exfit.features.programme.kept import KEY, Keep, keep, key_of, result_kept
+from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
+from exfit.features.programme.steady.points import points_of
+from exfit.features.programme.steady.saturation_test import saturation
+from exfit.features.programme.steady.steady_test import steady
+from exfit.features.programme.steps import ProgrammeStep, steps_of
+from exfit.features.programme.values import bases_of, errors_of_bases, values_given, with_values
+from exfit.fitting.recordings import record_of
+from exfit.plants import MACHINE
+from exfit.records.reading import file_hash
+from exfit.results.description import UnitDescription
+from exfit.results.model import FitResult, Iteration
+from exfit.workflows.descriptions.case_description import parts_of
+
+Progress = Iteration | estimate.Progress
+Values = tuple[EnteredValue, ...]
+
+
+def _ignore_progress(_: ProgrammeStep, __: Progress | None) -> None:
+    """Ignore how far a test is."""
+
+
+def _ignore_test(_: FinishedTest) -> None:
+    """Ignore that a test has ended."""
+
+
+def run(
+    programme: Programme | str | PathLike[str],
+    folder: str | PathLike[str] | None = None,
+    again: bool = False,
+    progress: Callable[[ProgrammeStep, Progress | None], None] = _ignore_progress,
+    finished: Callable[[FinishedTest], None] = _ignore_test,
+    keep: Keep = keep,
+) -> ProgrammeResult:
+    """Run the tests of a programme in the order in which one feeds the next.
+
+    Saturation tests come first, then points on load, then tests that determine data of the
+    machine; what they measured enters the tests after them. Last all bump tests are fitted
+    together. A case is the programme of one test.
+
+    Args:
+        programme: a programme, or the path of its file.
+        folder: keeps the result of each test as soon as it is there. A test whose result is there
+            already is not run again, unless its section, its files, the values that enter it or
+            exfit have changed since. None: nothing is kept.
+        again: runs all tests, whatever is kept.
+        progress: called with the test that runs and its iteration, or how far its search from
+            further starts is; None as it begins.
+        finished: called with every test that has ended.
+        keep: writes the result of a test into the folder.
+
+    A KeyboardInterrupt ends the run: the result has the tests that were done, and the best point of
+    the fit that was running, which is not kept as done. A test that fails keeps no other from
+    running. Raises CaseError with all faults of the file, and of its records.
+
+    Example:
+        >>> result = exfit.run("programme.yaml", "runs/unit-3")
+        >>> {test.name: test.verdict for test in result.tests}
+    """
+    if not isinstance(programme, Programme):
+        programme = load_programme(Path(programme))
+    refuse_unreadable(programme)
+    steps, done, values = steps_of(programme), list[FinishedTest](), list[EnteredValue]()
+    failed: dict[str, str] = {}
+    place = None if folder is None else Path(folder)
+    turns = _turns(programme, place, again, progress, keep, values, failed)
+    interrupted = False
+    try:
+        for test in turns:
+            done.append(test)
+            finished(test)
+    except KeyboardInterrupt:
+        interrupted = True
+    ended = {*failed, *(test.name for test in done)}
+    return ProgrammeResult(
+        path=programme.path,
+        about=programme.about,
+        tests=tuple(done),
+        values=tuple(values),
+        failed=failed,
+        not_run=tuple(step.name for step in steps if step.name not in ended),
+        interrupted=interrupted or any(test.interrupted for test in done),
+        unit=_unit_of(programme, tuple(values)),
+    )
+
+
+def _unit_of(programme: Programme, values: Values) -> UnitDescription:
+    """Return the models of a programme, with what its tests gave where the file allows it."""
+    case = programme.shared_case()
+    with suppress(CaseError):  # a fit with these values has failed, which says why
+        case = with_values(case, values)
+    return UnitDescription(tuple(parts_of(case)), case.values(), case.sources())
+
+
+def _turns(
+    programme: Programme,
+    folder: Path | None,
+    again: bool,
+    progress: Callable[[ProgrammeStep, Progress | None], None],
+    keep: Keep,
+    values: list[EnteredValue],
+    failed: dict[str, str],
+) -> Iterator[FinishedTest]:
+    """Yield each test as it ends; ``values`` and ``failed`` take what it gives, or its error."""
+    for step in steps_of(programme):
+        try:
+            test = finished_test(
+                programme, step, tuple(values), None if again else folder, progress
+            )
+            if folder is not None:
+                keep(test, folder)
+        except ExfitError as fault:
+            failed[step.name] = str(fault)
+            continue
+        values += values_given(test, programme)
+        yield test
+        if test.interrupted:
+            return
+
+
+def refuse_unreadable(programme: Programme) -> None:
+    """Raise CaseError with what hinders the files of a programme from being read."""
+    faults: list[str] = []
+    for read in _readings(programme):
+        try:
+            read()
+        except ExfitError as fault:
+            faults += str(fault).splitlines()
+    if faults:
+        raise CaseError(dict.fromkeys(faults))
+
+
+def _readings(programme: Programme) -> "list[Callable[[], object]]":
+    """Return what reads each file of a programme."""
+    readings: list[Callable[[], object]] = []
+    for step in steps_of(programme):
+        section = None if step.name == FIT else programme.test(step.name)
+        if isinstance(section, SaturationTest | SteadyTest):
+            readings.append(partial(points_of, section, programme.folder))
+        else:
+            case = case_of(programme, step)
+            records = (*case.recordings, *case.validations)
+            readings += [partial(record_of, case, recording) for recording in records]
+    return readings
+
+
+def case_of(programme: Programme, step: ProgrammeStep) -> Case:
+    """Return the case of a fit of a programme, without what other tests measured."""
+    return programme.bump_case() if step.name == FIT else programme.rejection_case(step.name)
+
+
+def finished_test(
+    programme: Programme,
+    step: ProgrammeStep,
+    values: Values,
+    folder: Path | None,
+    progress: Callable[[ProgrammeStep, Progress | None], None] = _ignore_progress,
+) -> FinishedTest:
+    """Return a test with its result: the one that is kept in a folder, or else that of a run."""
+    programme = programme.with_bases(bases_of(values))
+    key = key_of(step, programme, values)
+    kept = None if folder is None else result_kept(step, key, folder)
+    if kept is not None:
+        result = _as_it_is_now(kept, programme)
+        return FinishedTest(step.name, step.kind, step.tests, key, result, kept=True)
+    progress(step, None)
+    result = _result_of(programme, step, values, partial(progress, step))
+    if isinstance(result, FitResult) and not result.interrupted:
+        result = replace(
+            result,
+            inputs={**result.inputs, KEY: key},
+            files={**result.files, KEY: "all that goes into it"},
+        )
+    return FinishedTest(step.name, step.kind, step.tests, key, result)
+
+
+def _result_of(
+    programme: Programme,
+    step: ProgrammeStep,
+    values: Values,
+    progress: Callable[[Progress | None], None],
+) -> StepResult:
+    section = None if step.name == FIT else programme.test(step.name)
+    shared = programme.shared_case()
+    machine = shared.parts.machine
+    if isinstance(section, SaturationTest):
+        return saturation(section, points_of(section, programme.folder), machine)
+    if isinstance(section, SteadyTest) and machine is not None:
+        case = with_values(shared, values)
+        own, errors = case.values(), {**case.std_errors(), **errors_of_bases(values)}
+        data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
+        std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
+        points = points_of(section, programme.folder)
+        return steady(section, points, machine, data, std_errors)
+    case = with_values(case_of(programme, step), values)
+    return workflows.fit(case, progress=progress, search_progress=progress)
+
+
+def _as_it_is_now(result: StepResult, programme: Programme) -> StepResult:
+    """Return a result that is kept, with what the file of the programme says beside its tests."""
+    if not isinstance(result, FitResult):
+        return result
+    inputs = dict(result.inputs)
+    with suppress(OSError):
+        inputs["case"] = file_hash(programme.path)
+    return replace(result, about=programme.about, case_text=programme.text, inputs=inputs)

@@ -1,0 +1,50 @@
+"""The sections of a programme: all tests of a unit, of which each feeds the later ones."""
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from exfit.case.schema.records import Recording
+from exfit.case.schema.values import FreeSection, Frozen
+from exfit.features.programme.schema_saturation import SaturationTest
+from exfit.features.programme.schema_steady import SteadyTest
+
+SATURATION: Final = "saturation"
+STEADY: Final = "steady"
+REJECTION: Final = "rejection"
+BUMP: Final = "bump"
+ORDER = (SATURATION, STEADY, REJECTION, BUMP)  # what measures the machine before what needs it
+
+
+class RecordedBump(Recording):
+    """A bump test of a programme; all that are fitted are fitted together, as records are."""
+
+    kind: Literal["bump"] = Field(default=BUMP, description="Kind of test.")
+    use: Literal["fit", "validate"] = Field(
+        default="fit",
+        description="Whether it is fitted, or the result of the others is validated on it.",
+    )
+
+
+class RecordedRejection(Recording):
+    """A test of a programme that determines data of the machine before the bump tests."""
+
+    kind: Literal["rejection"] = Field(description="Kind of test.")
+    free: Annotated[Frozen[FreeSection], Field(min_length=1)] = Field(
+        description="Machine data that it is fitted for, as under parameters.free; nothing else "
+        "is fitted."
+    )
+
+
+def _kind_of_test(value: Any) -> str:
+    kind = value.get("kind", BUMP) if isinstance(value, dict) else getattr(value, "kind", BUMP)
+    return f"[{kind}]"
+
+
+TestOfProgramme = Annotated[
+    Annotated[SaturationTest, Tag(f"[{SATURATION}]")]
+    | Annotated[SteadyTest, Tag(f"[{STEADY}]")]
+    | Annotated[RecordedRejection, Tag(f"[{REJECTION}]")]
+    | Annotated[RecordedBump, Tag(f"[{BUMP}]")],
+    Discriminator(_kind_of_test),
+]

@@ -1,0 +1,87 @@
+"""A steady test of a programme: its points read, and compared with the machine of the unit."""
+
+from collections.abc import Mapping
+from math import isfinite
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.schema import PointColumn, SteadyTest, Unknown
+from exfit.errors import CaseError, RecordError
+from exfit.features.programme.steady.field_on_load import field_on_load
+from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad, base_of
+from exfit.features.programme.steady.v_curve import v_curve
+from exfit.features.programme.v_curve_result import VCurve
+from exfit.fitting.parameters import FreeParameter, free_parameter
+from exfit.models.machines import Machine
+from exfit.records.points import Points
+from exfit.records.units import needs_base
+from exfit.signals import FIELDS, TERMINALS
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+FARTHEST_BASE = 4.0  # times the base that fits best at the start: as far as one without bounds goes
+
+
+def steady(
+    test: SteadyTest,
+    points: Points,
+    machine: Machine,
+    data: Values,
+    std_errors: Values = MappingProxyType({}),
+) -> VCurve:
+    """Return the points of a test beside the machine's model, fitted where the test asks for it.
+
+    ``data`` has a value for each symbol of the machine's sheet, ``std_errors`` the standard errors
+    of some of them and of bases, for which the intervals allow. Raises ExfitError for input that
+    cannot be used.
+    """
+    columns = {signal: column_of(test, points, signal) for signal in points.columns}
+    numbers = {signal: points.columns[signal] * columns[signal].scale for signal in columns}
+    p, q, vt = (numbers[signal] / given_base(columns[signal]) for signal in TERMINALS)
+    start = {**data, **{symbol: free.start for symbol, free in test.free.items()}}
+    ifd = field_on_load(machine, start, p, q, vt)
+    measurements = {
+        signal: measurement_of(signal, columns[signal], numbers[signal], ifd)
+        for signal in FIELDS
+        if signal in numbers
+    }
+    rows = {row.symbol: row for row in machine.sheet}
+    free = [free_parameter(symbol, free, rows[symbol]) for symbol, free in test.free.items()]
+    limit = None if test.accept is None else test.accept.rmse
+    return v_curve(machine, data, PointsOnLoad(p, q, vt, measurements), free, limit, std_errors)
+
+
+def given_base(column: PointColumn) -> float:
+    """Return what 1 pu is of a column, 1 where that is not given as a number."""
+    return column.base if isinstance(column.base, float) else 1.0
+
+
+def column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
+    """Return how a signal is converted to per unit; raises RecordError where it is not."""
+    column = test.columns.get(signal) or PointColumn()
+    unit = column.unit or points.units.get(signal) or "pu"
+    if column.base is None and column.scale == 1.0 and needs_base(unit):
+        raise RecordError(f"{points.source}: {signal}: base: is missing: what is 1 pu in {unit}?")
+    return column.model_copy(update={"unit": unit})
+
+
+def measurement_of(
+    signal: str, column: PointColumn, measured: Array, ifd: Array
+) -> FieldMeasurement:
+    """Return the readings of a field signal (M,), of which the model has ``ifd`` (M,) at the start.
+
+    A base that is found starts from its own start or, with ``auto``, from the one that fits best.
+    """
+    unit, base = column.unit or "pu", column.base
+    if not isinstance(base, Unknown):
+        return FieldMeasurement(measured, unit, given_base(column), column.noise)
+    start = float(ifd @ measured / (ifd @ ifd)) if base.start == "auto" else base.start
+    if not (isfinite(start) and start > 0.0):
+        raise CaseError([f"columns.{signal}.base: {start:g} {unit} fits best, which is no base"])
+    low = start / FARTHEST_BASE if base.min is None else base.min
+    high = start * FARTHEST_BASE if base.max is None else base.max
+    free = FreeParameter(base_of(signal), min(max(start, low), high), low, high, logarithmic=True)
+    return FieldMeasurement(measured, unit, free.start, column.noise, free)

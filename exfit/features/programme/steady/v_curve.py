@@ -1,0 +1,201 @@
+"""V-curves: the field current that holds points on load, measured beside the machine's model."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+from exfit.features.programme.steady.field_on_load import field_on_load
+from exfit.features.programme.steady.fields_on_load import (
+    FieldsOnLoad,
+    PointsOnLoad,
+    base_of,
+    weight_of,
+)
+from exfit.features.programme.steady.point_errors import allowing_for_errors
+from exfit.features.programme.steady.point_fit import FittedPoints
+from exfit.features.programme.steady.v_curve_causes import causes_of
+from exfit.features.programme.v_curve_result import FieldReading, PowerLevel, VCurve
+from exfit.fitting.parameters import FreeParameter
+from exfit.models.machines import Machine
+from exfit.results.model import FittedParameter
+from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, NOT_CONVERGED, Cause, Verdict
+from exfit.util.text import show
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+LARGEST_SHARE = 0.02  # of the rms of a field signal: what instruments and model may leave
+LARGEST_NOISES = 3.0  # times the noise that is given
+LEVEL_GAP = 0.04  # pu of power, between points of one level and those of the next
+CURVE_POINTS = 101  # of the model's curve of a level, odd: one lies at its middle
+WIDER = 0.1  # of the range of q: how far the model's curve goes beyond the points
+
+
+def v_curve(
+    machine: Machine,
+    data: Values,
+    points: PointsOnLoad,
+    free: Sequence[FreeParameter] = (),
+    limit: float | None = None,
+    std_errors: Values = MappingProxyType({}),
+) -> VCurve:
+    """Return the points beside the machine's model, after a fit of its ``free`` data if there are.
+
+    Args:
+        machine: the model.
+        data: a value for each symbol of its sheet.
+        points: with readings of ``ifd``, ``efd`` or both.
+        free: machine data by symbol, which the points are fitted for beside the free bases.
+        limit: largest rms of the residuals of a field signal that counts as a match, pu; None:
+            LARGEST_SHARE of its rms, or LARGEST_NOISES times its noise where that is larger.
+        std_errors: of machine data by symbol, and of bases such as ``ifd.base`` (in their unit):
+            the intervals allow for them.
+
+    Raises RecordError for a point at which the model has no rest.
+
+    Source: IEEE Std 115, cf. the saturation curves and the excitation on load; the model's
+    equations are those of its dynamics at rest.
+    """
+    _refuse_no_rest(machine, data, points)
+    fields = FieldsOnLoad(machine, points)
+    problem = fields.problem(data, free)
+    fit = None
+    if problem.free:
+        fit = allowing_for_errors(problem, fields.fit(problem), std_errors)
+    values = problem.given if fit is None else fit.values
+    readings = {
+        signal: _reading_of(signal, fields, values, fit, limit) for signal in points.measurements
+    }
+    fitted = {} if fit is None else _parameters(fields, problem.free, fit)
+    machine_data = {symbol: values[symbol] for symbol in data}
+    verdict = _verdict(readings, fitted, fit, causes_of(fields, values, problem))
+    if verdict.misfit:
+        fitted = {name: each.without_interval(verdict.no_interval) for name, each in fitted.items()}
+    return VCurve(
+        machine=machine.name,
+        p=points.p,
+        q=points.q,
+        vt=points.vt,
+        readings=readings,
+        given=dict(data),
+        machine_data=machine_data,
+        parameters=fitted,
+        verdict=verdict,
+        undetermined=() if fit is None else fit.undetermined,
+        notes=() if fit is None else fit.notes,
+        levels=tuple(power_levels(machine, machine_data, points)),
+    )
+
+
+def power_levels(machine: Machine, data: Values, points: PointsOnLoad) -> Iterator[PowerLevel]:
+    """Yield the levels of power of some points, the lowest first, with the model's curves."""
+    order = np.argsort(points.p, kind="stable")
+    ends = np.flatnonzero(np.diff(points.p[order]) > LEVEL_GAP) + 1
+    for rows in np.split(order, ends):
+        p, low, high = float(np.mean(points.p[rows])), points.q[rows].min(), points.q[rows].max()
+        beyond = WIDER * (points.q.max() - points.q.min())
+        q = np.linspace(low - beyond, high + beyond, CURVE_POINTS)
+        vt = _voltage_along(points.q[rows], points.vt[rows], q)
+        ifd = field_on_load(machine, data, np.full_like(q, p), q, vt)
+        it = np.hypot(p, q) / vt
+        yield PowerLevel(p, tuple(int(row) for row in np.sort(rows)), q, vt, it, ifd)
+
+
+def _voltage_along(q: Array, vt: Array, curve: Array) -> Array:
+    """Return the voltages on the line through those of some points, their mean for one q."""
+    spread = q - np.mean(q)
+    square = float(spread @ spread)
+    slope = float(spread @ vt) / square if square > 0.0 else 0.0
+    inside = np.clip(curve, q.min(), q.max())
+    return np.asarray(np.mean(vt) + slope * (inside - np.mean(q)))
+
+
+def _refuse_no_rest(machine: Machine, data: Values, points: PointsOnLoad) -> None:
+    ifd = field_on_load(machine, data, points.p, points.q, points.vt)
+    for row in np.flatnonzero(~np.isfinite(ifd))[:1]:
+        place = f"p {show(points.p[row])}, q {show(points.q[row])}, vt {show(points.vt[row])} pu"
+        raise RecordError(f"point {row + 1} ({place}): the machine has no rest there")
+
+
+def _reading_of(
+    signal: str,
+    fields: FieldsOnLoad,
+    values: Values,
+    fit: FittedPoints | None,
+    limit: float | None,
+) -> FieldReading:
+    reading, base = fields.points.measurements[signal], values[base_of(signal)]
+    measured, simulated = reading.measured / base, fields.simulated(values)
+    usual = max(
+        LARGEST_SHARE * float(np.sqrt(np.mean(measured**2))),
+        LARGEST_NOISES * (reading.noise or 0.0),
+    )
+    scatter = None if fit is None else fit.scatter(signal) / weight_of(signal, reading)
+    return FieldReading(
+        signal=signal,
+        unit=reading.unit,
+        base=base,
+        measured=measured,
+        simulated=simulated,
+        noise=reading.noise,
+        scatter=scatter,
+        limit=usual if limit is None else limit,
+        base_fitted=reading.free_base is not None,
+    )
+
+
+def _parameters(
+    fields: FieldsOnLoad, free: Sequence[FreeParameter], fit: FittedPoints
+) -> dict[str, FittedParameter]:
+    rows = {row.symbol: row for row in fields.machine.sheet}
+    fitted = {}
+    for parameter in free:
+        row, known = rows.get(parameter.name), fit.confidence.parameters[parameter.name]
+        value, signal = fit.values[parameter.name], parameter.name.partition(".")[0]
+        fitted[parameter.name] = FittedParameter(
+            value=value,
+            start=parameter.start,
+            min=parameter.low,
+            max=parameter.high,
+            at_bound=parameter.bound(value),
+            of_record=row is None,
+            std_error=known.std_error,
+            interval=known.interval,
+            interval_method=known.method,
+            why=known.why,
+            unit=fields.points.measurements[signal].unit if row is None else row.unit,
+            meaning=f"1 pu of {signal}" if row is None else row.meaning,
+            physical=row is None or row.is_physical(value),
+        )
+    return fitted
+
+
+def _verdict(
+    readings: Mapping[str, FieldReading],
+    fitted: Mapping[str, FittedParameter],
+    fit: FittedPoints | None,
+    causes: tuple[Cause, ...],
+) -> Verdict:
+    reason = "; ".join(map(_match, readings.values()))
+    if fit is not None and not fit.result.success:
+        return Verdict(NOT_CONVERGED, fit.result.message, causes)
+    if not all(reading.matches for reading in readings.values()):
+        return Verdict(NO_MATCH, reason, causes)
+    if not all(parameter.determined for parameter in fitted.values()):
+        return Verdict(MATCHES, reason, causes)
+    return Verdict(GOOD, reason, causes)
+
+
+def _match(reading: FieldReading) -> str:
+    """Return how a field signal matches, in words: rms beside the limit, and the noise."""
+    beside = "within" if reading.matches else "beyond"
+    noise = "" if reading.noise is None else f", noise {reading.noise:.2g} pu"
+    worst = reading.worst
+    return (
+        f"{reading.signal} differs by {reading.rms:.2g} pu rms, {beside} the limit of "
+        f"{reading.limit:.2g} pu, by {reading.residuals[worst]:+.2g} pu at most (point "
+        f"{worst + 1}){noise}"
+    )

@@ -1,0 +1,1 @@
+"""The models of a standard, each fitted to the same records: exfit rank."""

@@ -1,0 +1,84 @@
+"""The command rank."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli import completion
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    Output,
+    case_argument,
+    load,
+    output_options,
+    print_json,
+)
+from exfit.cli.several_fits import draw_each, refuse_files_of_cases, run_planned
+from exfit.util.strategies import SEARCHES, SEARCHES_EXPLAINED
+
+if TYPE_CHECKING:
+    from exfit.features.rank.ranked_cases import Ranking
+    from exfit.show.figure_files import FigureFiles
+
+
+@click.command(short_help="Fit the records of a case under several models, and compare these.")
+@case_argument
+@click.option(
+    "--models",
+    metavar="NAME[,NAME]",
+    help="Exciters, or files of models; AC, DC, ST: all of a type; all: the whole catalogue "
+    "(default: those of the type of CASE's). A type has the form of the edition of IEEE Std 421.5 "
+    "that CASE's is of.",
+    shell_complete=completion.several_exciters,
+)
+@click.option(
+    "--search",
+    type=click.Choice([*SEARCHES]),
+    default="global",
+    help=f"How far to search for each. {SEARCHES_EXPLAINED}.",
+)
+@output_options
+def rank(case: Path, models: str | None, search: str, output: Output) -> None:
+    """Fit the records of CASE under several exciters, and rank these.
+
+    The exciter of CASE has its values there. Every other one starts from the typical data of its
+    data sheet, within a tenth and ten times of these; what its sheet does not mark as fitted, such
+    as a limit, stays typical and is named. All else is as CASE has it.
+
+    The table is in the order of the error on records that no fit saw, or without any of BIC, the
+    Bayesian information criterion; the lines below it say which models the records tell apart.
+
+    Writes rank.csv, rank.json, a figure, and a folder for the fit of each model to runs/CASE-rank,
+    or to DIR. Ctrl-C keeps the models that are done. Exit code 0: all were fitted, and the first
+    one matches; 1: bad input; 3: otherwise.
+    """
+    from exfit.features.rank.ranked_cases import planned_models, ranking_of
+    from exfit.show import run_folder
+
+    loaded = load(case)
+    names = [] if models is None else [name.strip() for name in models.split(",")]
+    plan = planned_models(loaded, names, search)
+    folder = output.folder(f"{case.stem}-rank")
+    refuse_files_of_cases(plan, folder, "rank")
+    figures: dict[str, FigureFiles] = {}
+    ranking = ranking_of(loaded, run_planned(plan, folder, figures, output))
+    try:
+        of_all = run_folder.write_ranking(ranking, folder)
+    finally:  # whatever becomes of the files
+        _show(ranking, folder, output)
+    output.draw(of_all)
+    if output.figures:
+        draw_each(figures, output)
+    if not ranking.complete:
+        raise SystemExit(NOT_CONVERGED)
+
+
+def _show(ranking: "Ranking", folder: Path, output: Output) -> None:
+    if output.as_json:
+        print_json(ranking.to_dict())
+    elif output.shown:
+        from exfit.show import terminal
+
+        terminal.ranking(terminal.console(), ranking)
+        terminal.written(terminal.console(), folder)

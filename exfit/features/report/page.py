@@ -1,0 +1,196 @@
+"""The page of a report: one HTML file that needs nothing beside it."""
+
+import re
+import shlex
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.util import find_spec
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exfit import __version__
+from exfit.dsp.features import LABELS
+from exfit.errors import ExfitError
+from exfit.features.report.charts import drawing
+from exfit.features.report.sections import AGAINST, OF_VALIDATION, SECTIONS, ReportSection
+from exfit.features.report.sections.against import against
+from exfit.features.report.sections.matches import MatchView, OverlayChart, live_data
+from exfit.features.report.sections.other_program import NO_TWIN, has_no_equations
+from exfit.features.report.verdict import Headline, headline, headline_of_validation
+from exfit.results.feature_digits import feature_cells
+from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported, ValidationResult
+from exfit.util.text import percentage, rounded
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TEMPLATES = Path(__file__).parent / "templates"
+CHART_STYLE = TEMPLATES / "chart.css"
+CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of caption counts
+CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
+LIBRARY = ("bokeh.min.js", "bokeh-api.min.js")
+LONG = 12  # lines of a history that a reader sees without asking for more
+MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
+GENERATOR = '<meta name="generator" content="exfit '
+NO_BEHAVIOUR = (
+    "The result does not hold this: the fit was interrupted, or an earlier version of exfit "
+    "wrote it."
+)
+HEAD = 2000  # characters at the beginning of a page, among which it says what made it
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page shows: its title, what it comes to, its sections with their content.
+
+    ``folder`` is where the results lie, for the commands on the page; ``fitted`` is whether values
+    were fitted; ``simulated_by`` is what shows how they behave, ``no_behaviour`` why nothing does.
+    """
+
+    title: str
+    headline: Headline
+    sections: Sequence[tuple[ReportSection, Any]]
+    folder: Path
+    fitted: bool = True
+    simulated_by: str = "exfit"
+    no_behaviour: str = NO_BEHAVIOUR
+
+
+def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str:
+    """Return the page of a fit; ``folder`` is where the fit lies, for the commands on the page.
+
+    With an ``other`` fit, an earlier revision or another unit, a section compares both.
+    """
+    return page_html(fit_page(result, folder, other))
+
+
+def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) -> Page:
+    """Return what the page of a fit shows, beside an ``other`` fit where there is one."""
+    sections = [(section, section.content(result)) for section in SECTIONS]
+    if other is not None:
+        sections.insert(len(sections) - 1, (AGAINST, against(result, other)))
+    page = Page(f"{result.model}: {result.name}", headline(result), sections, folder)
+    return _with_other_program(page, result)
+
+
+def validation_page(result: ValidationResult, folder: Path) -> Page:
+    """Return what the page of a validation shows: nothing of a search, which there was none."""
+    every = ((section, section.content(result)) for section in OF_VALIDATION)
+    sections = [(section, content) for section, content in every if content]
+    title = f"{result.model}: {result.name}"
+    page = Page(title, headline_of_validation(result), sections, folder, fitted=False)
+    return _with_other_program(page, result)
+
+
+def _with_other_program(page: Page, result: Reported) -> Page:
+    """Return a page that names the twin as what shows how values behave, or its lack."""
+    if result.other_program is None:
+        return page
+    if has_no_equations(result):
+        return replace(page, simulated_by="", no_behaviour=f"{NO_TWIN}.".capitalize())
+    return replace(page, simulated_by="the twin in exfit")
+
+
+def page_html(page: Page, interactive: bool = True) -> str:
+    """Return a page as HTML; without scripts, for a print, where it is not ``interactive``."""
+    style, script = (TEMPLATES / "report.css", TEMPLATES / "report.js")
+    scripts = [*library(), script.read_text(encoding="utf-8")] if interactive else []
+    overlays = _overlays(content for _, content in page.sections) if interactive else []
+    text: str = (
+        environment()
+        .get_template("report.html.jinja")
+        .render(
+            title=page.title,
+            headline=page.headline,
+            sections=page.sections,
+            numbers={part.key: k for k, (part, _) in enumerate(page.sections, start=1)},
+            folder=str(page.folder),
+            fitted=page.fitted,
+            simulated_by=page.simulated_by,
+            no_behaviour=page.no_behaviour,
+            data=list(live_data(overlays)),
+            css=CHART_STYLE.read_text(encoding="utf-8") + style.read_text(encoding="utf-8"),
+            scripts=scripts,
+        )
+    )
+    return _numbered(text)
+
+
+def _numbered(page: str) -> str:
+    """Return a page whose figures and tables are numbered, in the order in which they stand."""
+    counts = Counter[str]()
+
+    def with_number(caption: re.Match[str]) -> str:
+        kind = CAPTIONS[caption[1]]
+        counts[kind] += 1
+        return f'{caption[0]}<span class="number">{kind} {counts[kind]}.</span> '
+
+    return CAPTION.sub(with_number, page)
+
+
+def is_page(path: Path) -> bool:
+    """Return whether a file is a page that this module made."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return GENERATOR in file.read(HEAD)
+
+
+def library() -> list[str]:
+    """Return the scripts of BokehJS, which the package bokeh brings.
+
+    They are read as files: importing bokeh takes longer than all of a report.
+    """
+    package = find_spec("bokeh")
+    if package is None or package.origin is None:
+        raise ExfitError("the package bokeh is missing: pip install bokeh")
+    folder = Path(package.origin).parent / "server" / "static" / "js"
+    return [(folder / name).read_text(encoding="utf-8") for name in LIBRARY]
+
+
+def _overlays(contents: Iterable[Any]) -> list[OverlayChart]:
+    """Return the overlays of all sections that have some."""
+    return [
+        overlay
+        for content in contents
+        if isinstance(content, tuple)
+        for view in content
+        if isinstance(view, MatchView)
+        for overlay in view.overlays
+    ]
+
+
+@cache
+def environment() -> "Environment":
+    """Return what renders the templates of pages: every text is escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    shared = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    shared.filters |= {
+        "number": _number,
+        "rounded": rounded,
+        "percentage": percentage,
+        "feature_cells": feature_cells,
+    }
+    shared.filters |= {"drawing": drawing, "command": shlex.join}
+    shared.tests |= {"finite": _is_finite}
+    shared.globals |= {"version": __version__, "features": LABELS, "long": LONG}
+    shared.globals |= {"most_printed": MOST_PRINTED}
+    return shared
+
+
+def _is_finite(value: float | None) -> bool:
+    return value is not None and isfinite(value)
+
+
+def _number(value: float | None, digits: int = 5) -> str:
+    """Return a number in a few digits, a dash where there is none."""
+    return "–" if value is None or not isfinite(value) else f"{value:.{digits}g}"

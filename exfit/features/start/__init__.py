@@ -1,0 +1,1 @@
+"""From records, tables and planners' files to a first case: exfit new."""

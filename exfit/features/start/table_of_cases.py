@@ -1,0 +1,246 @@
+"""A table of records from which cases are made: the rows of one unit are one case."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from exfit.case.draft.bases import Base, base_of
+from exfit.case.draft.record_settings import RecordSettings
+from exfit.case.messages import FILE_NAME, PATTERNS
+from exfit.errors import ExfitError, FileError
+from exfit.features.start.cells import Cells, read_cells
+from exfit.features.start.table_of_tests import COLUMNS, TableRow, checked, number_in, table_row
+from exfit.records.units import unit_of
+from exfit.util.text import near
+
+OF_UNIT = ("dyr", "bus", "id", "model", "machine", "name")
+OF_RECORD = ("time", "time unit", "sheet", "vt")
+OF_NETWORK = {"f0": "f0", "x": "X", "p": "P", "q": "Q"}  # columns, and their keys in a case
+ABOUT = "about."  # begins the names of columns for reports
+ALL_COLUMNS = (*COLUMNS, "unit", *OF_RECORD, *OF_UNIT, *OF_NETWORK)
+MOST_BUSES = 999_999
+LONGEST_ID = 2
+TIME_UNITS = ("s", "ms", "us", "min")
+BETWEEN_COLUMNS = ";"  # of date and time
+
+
+@dataclass(frozen=True)
+class CaseOfTable:
+    """A case to be made: its name, its unit, its tests, and how each record is read.
+
+    The unit is that of a bus and an id of ``dyr``, with another exciter where a ``model`` is given;
+    without ``dyr`` a ``model`` and a ``machine`` with typical data. ``network`` are values of the
+    grid by their keys in a case, ``about`` what a report shows; ``place`` is where its first row
+    is.
+    """
+
+    place: str
+    name: str
+    dyr: Path | None
+    bus: int | None
+    machine_id: str | None
+    model: str | None
+    machine: str | None
+    tests: tuple[TableRow, ...]
+    settings: Mapping[Path, RecordSettings]
+    network: Mapping[str, float]
+    about: Mapping[str, str]
+
+
+def read_case_table(path: Path, dyr: Path | None = None) -> tuple[CaseOfTable, ...]:
+    """Return the cases that the rows of a CSV file or workbook describe, in its order.
+
+    Columns are file (required), at, step, base and validates as in a table of tests; unit, that of
+    base; time (columns of date and time with ; between), time unit, sheet and vt (its column) of
+    the record; dyr, bus, id, model, machine and name of the unit; f0, X, P and Q of its grid;
+    about.NAME for reports. Files are relative to the table's folder. What a unit has is given in
+    one of its rows or more. With a ``dyr`` every row is of a unit of that file.
+
+    Raises ExfitError with all faults, each with its row and column.
+    """
+    faults = list[str]()
+    by_case: dict[tuple[str, ...], list[Cells]] = {}
+    for row in read_cells(path, ALL_COLUMNS, (ABOUT,)):
+        by_case.setdefault(_identity(row), []).append(row)
+    faults += _half_named(by_case)
+    cases = [_case(rows, path.parent, dyr, faults) for rows in by_case.values()]
+    faults += _repeated(cases)
+    if faults:
+        raise FileError(dict.fromkeys(faults))
+    return tuple(cases)
+
+
+def case_name_of(bus: int, machine_id: str | None) -> str:
+    """Return the name of the case of a unit, which any system takes for a file: bus-101-1."""
+    letters = [
+        letter if letter.isascii() and letter.isalnum() else f"x{ord(letter):02x}"
+        for letter in machine_id or ""
+    ]
+    return "-".join([f"bus-{bus}", *(["".join(letters)] if letters else [])])
+
+
+def _identity(row: Cells) -> tuple[str, ...]:
+    """Return what rows of one case have in common: their name, or their unit, or their record."""
+    cells = row.by_name
+    if cells.get("name"):
+        return (cells["name"].casefold(),)
+    if cells.get("bus"):
+        return (cells.get("dyr", ""), cells["bus"], cells.get("id", "").upper())
+    return (cells.get("dyr", ""), "", cells.get("file", ""))
+
+
+def _half_named(by_case: Mapping[tuple[str, ...], Sequence[Cells]]) -> Iterator[str]:
+    """Yield units that have an id in one row and none in another: they may be the same."""
+    for identity, rows in by_case.items():
+        dyr, bus, machine_id = (*identity, "", "")[:3]
+        others = {key for key in by_case if key[:2] == (dyr, bus) and len(key) > 1 and key[2]}
+        if len(identity) > 1 and bus and not machine_id and others:
+            yield f"{rows[0].place}: id: missing, but given in another row of bus {bus}"
+
+
+def _repeated(cases: Sequence[CaseOfTable]) -> Iterator[str]:
+    first: dict[str, str] = {}
+    for case in cases:
+        place = first.setdefault(case.name.casefold(), case.place)
+        if place != case.place:
+            yield f"{case.place}: name: {case.name}: also that of another unit, at {place}"
+
+
+def _case(rows: Sequence[Cells], folder: Path, dyr: Path | None, faults: list[str]) -> CaseOfTable:
+    """Return the case of rows of one unit; add all that is wrong with them."""
+    unit = _common(rows, [*OF_UNIT, *OF_NETWORK, *_about_columns(rows)], faults)
+    cells = unit.by_name
+    own = folder / cells["dyr"] if cells.get("dyr") else dyr
+    bus = checked(unit, "bus", lambda text: _bus(text, unit.place), faults)
+    machine_id = checked(unit, "id", lambda text: _id(text, unit.place), faults)
+    name = checked(unit, "name", lambda text: _name(text, unit.place), faults)
+    faults += _of_unit(unit, own, dyr)
+    network = {key: number_in(unit, column, faults) for column, key in OF_NETWORK.items()}
+    return CaseOfTable(
+        rows[0].place,
+        name or _default_name(bus, machine_id, rows[0]),
+        own,
+        bus,
+        machine_id,
+        _model(cells.get("model", ""), folder),
+        cells.get("machine") or None,
+        tuple(_test(row, folder, faults) for row in rows),
+        _settings(rows, folder, faults),
+        {key: value for key, value in network.items() if value is not None},
+        {name.removeprefix(ABOUT): cells[name] for name in _about_columns(rows) if cells[name]},
+    )
+
+
+def _model(name: str, folder: Path) -> str | None:
+    """Return the exciter that a table names; a file is relative to the table's folder."""
+    return str(folder / name) if name.endswith(".py") else name or None
+
+
+def _common(rows: Sequence[Cells], names: Sequence[str], faults: list[str]) -> Cells:
+    """Return cells that all rows share where they have them; add those that differ."""
+    shared: dict[str, str] = {}
+    for row in rows:
+        for name in names:
+            text = row.by_name.get(name, "")
+            former = shared.get(name) or text
+            if text and text.casefold() != former.casefold():
+                faults.append(
+                    f"{row.place}: {name}: {text}, but {former} in a row of the same unit"
+                )
+            shared[name] = former
+    return Cells(rows[0].place, shared)
+
+
+def _about_columns(rows: Sequence[Cells]) -> list[str]:
+    return [name for name in rows[0].by_name if name.startswith(ABOUT)]
+
+
+def _of_unit(unit: Cells, dyr: Path | None, of_all: Path | None) -> Iterator[str]:
+    """Yield what of a unit is missing or contradicts the rest."""
+    cells, place = unit.by_name, unit.place
+    if of_all is not None:
+        for name in ("dyr", "model", "machine"):
+            if cells.get(name):
+                yield f"{place}: {name}: not allowed: every row is of a unit of {of_all}"
+        if not cells.get("bus"):
+            yield f"{place}: bus: missing"
+        return
+    if dyr is None and not cells.get("model"):
+        yield f"{place}: model: missing, and no dyr is given"
+    for name in ("bus", "id"):
+        if dyr is None and cells.get(name):
+            yield f"{place}: {name}: {cells[name]}: only with dyr, in which it is looked for"
+    if dyr is not None and cells.get("machine"):
+        yield f"{place}: machine: {cells['machine']}: not allowed with dyr, which has its own"
+
+
+def _bus(text: str, place: str) -> int:
+    if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) <= MOST_BUSES):
+        raise ExfitError(f"{place}: bus: {text!r} is not a whole number of 1 ... {MOST_BUSES}")
+    return int(text)
+
+
+def _id(text: str, place: str) -> str:
+    if len(text) > LONGEST_ID:
+        raise ExfitError(f"{place}: id: {text!r} has more than {LONGEST_ID} letters or digits")
+    return text
+
+
+def _name(text: str, place: str) -> str:
+    if not re.match(FILE_NAME, text):
+        raise ExfitError(f"{place}: name: {text!r} {PATTERNS[FILE_NAME]}")
+    return text
+
+
+def _default_name(bus: int | None, machine_id: str | None, row: Cells) -> str:
+    if bus is not None:
+        return case_name_of(bus, machine_id)
+    stem = Path(row.by_name.get("file", "")).stem
+    return re.sub("[^A-Za-z0-9._%-]+", "-", stem).lstrip("-._%") or "case"
+
+
+def _test(row: Cells, folder: Path, faults: list[str]) -> TableRow:
+    test = table_row(row, folder, faults)
+    if test.file is None:
+        faults.append(f"{row.place}: file: missing")
+    return test._replace(base=_base(row, test.base, faults))
+
+
+def _base(row: Cells, base: Base | None, faults: list[str]) -> Base | None:
+    """Return the base of the voltage with the unit of its own column, where it has none."""
+    unit, place = row.by_name.get("unit", ""), f"{row.place}: unit"
+    if not unit:
+        return base
+    if unit_of(unit) is None:
+        faults.append(f"{place}: {unit!r} is not a unit of a voltage, as kV")
+    elif base is None:
+        faults.append(f"{place}: {unit}: it is that of base, which is missing")
+    elif base.unit is not None:
+        faults.append(f"{place}: {unit}: not allowed beside a base with its own, {base.unit}")
+    else:
+        return base_of(f"{base.value!r} {unit}", place)
+    return base
+
+
+def _settings(rows: Sequence[Cells], folder: Path, faults: list[str]) -> dict[Path, RecordSettings]:
+    """Return how each record of a unit is read."""
+    by_file: dict[str, list[Cells]] = {}
+    for row in rows:
+        by_file.setdefault(row.by_name.get("file", ""), []).append(row)
+    return {
+        folder / file: _reading(_common(own, OF_RECORD, faults), faults)
+        for file, own in by_file.items()
+        if file
+    }
+
+
+def _reading(row: Cells, faults: list[str]) -> RecordSettings:
+    cells = row.by_name
+    unit = cells["time unit"]
+    if unit and unit not in TIME_UNITS:
+        faults.append(f"{row.place}: time unit: {unit!r}; {near(unit, TIME_UNITS)}")
+    clock = (name.strip() for name in cells["time"].split(BETWEEN_COLUMNS))
+    return RecordSettings(
+        tuple(filter(None, clock)), unit or None, cells["sheet"] or None, cells["vt"] or None
+    )

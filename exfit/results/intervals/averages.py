@@ -1,0 +1,222 @@
+"""Whether the recorder averages, where the case does not say: what the fit would find then.
+
+Samples of single instants and averages are two hypotheses, neither of which contains the other: at
+a low rate the parameters make up for most of an average, and the instant of the step for its delay.
+Twice the difference of their log-likelihoods is normal about -s or s, with a variance of 4 s, where
+s is what the parameters cannot make up for: beyond STRONG it is wrong at most once in 1000 records.
+
+Source: Cox 1962, Further results on tests of separate families of hypotheses.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.errors import SimulationError
+from exfit.fitting.descents import descent_near
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.forms.averaged import finds_instant, with_averages
+from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.inference.confidence import Interval
+from exfit.results.intervals.minima import own_values, variance_of
+from exfit.results.recorder_averages import STRONG, RecorderAverages
+from exfit.util.sorting import median
+
+Array = NDArray[np.float64]
+
+USUAL = (0.02, 0.05, 0.1, 0.2, 0.5)  # s: windows of recorders, beside the time between samples
+LONGEST = 0.1  # of the record: a longer window hides the response
+MATTERS = 0.5  # standard errors
+MOST_SAMPLES = 100_000  # of all records: so many are no low rate
+UNSEEN = 1e-9  # of the largest singular value: rounding
+
+
+def recorder_averages(
+    case: Case, residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
+) -> RecorderAverages | None:
+    """Return what averages would change at the minimum theta (N,); None where that is nothing.
+
+    Over the time between samples, or over a usual window that the record shows to be likelier. None
+    also where the record excludes them, and where the case says whether the recorder averages.
+    Raises KeyboardInterrupt at an interruption.
+    """
+    numbers = [*_unstated(case, residuals)]
+    if not numbers or sum(residuals.sizes) > MOST_SAMPLES:
+        return None
+    try:
+        errors, slopes = residuals.errors(theta)
+        low, high = residuals.bounds
+        basis = _basis(slopes[:, (theta > low) & (theta < high)])
+        variance = variance_of(residuals, 0.5 * float(errors @ errors), uncertainty)
+        found = [
+            _compared(residuals, theta, averaged, window, variance, uncertainty)
+            for averaged, window in _likeliest(residuals, theta, numbers, errors, basis, variance)
+        ]
+    except SimulationError:
+        return None
+    likeliest = max(found, key=lambda each: each.chi_square, default=None)
+    return None if likeliest is None or likeliest.chi_square < -STRONG else likeliest
+
+
+def _unstated(case: Case, residuals: Residuals) -> Iterator[int]:
+    """Yield the records of which the case does not say whether they hold averages.
+
+    What drives a simulation, too, is averaged like what is compared.
+    """
+    if case.external is not None or case.kind.finds_rest:
+        return
+    pairs = zip(case.recordings, residuals.experiments, strict=True)
+    for number, (recording, experiment) in enumerate(pairs):
+        sections = (recording.record.channels[signal] for signal in experiment.signals)
+        stated = any(section.averaged is not None for section in sections)
+        filterings = [each.filtering for each in experiment.channels]
+        plain = all(each is None or each.averaged is None for each in filterings)
+        if plain and not stated and not experiment.simulator.inputs.recorded:
+            yield number
+
+
+def _basis(slopes: Array) -> Array:
+    """Return an orthonormal basis (M, K) of what the parameters can do; raises SimulationError."""
+    if not np.isfinite(slopes).all():
+        raise SimulationError("no finite derivatives")
+    left, singular, _ = np.linalg.svd(slopes, full_matrices=False)
+    return np.asarray(left[:, singular > UNSEEN * np.max(singular, initial=0.0)])
+
+
+class AveragesTried(NamedTuple):
+    """Residuals with averages over a window (s), and what they gain in chi-square by linear theory.
+
+    ``of_rate``: over the time between samples, about each of them.
+    """
+
+    gain: float
+    window: float
+    of_rate: bool
+    averaged: Residuals
+
+
+def _likeliest(
+    residuals: Residuals,
+    theta: Array,
+    numbers: Sequence[int],
+    errors: Array,
+    basis: Array,
+    variance: float,
+) -> Iterator[tuple[Residuals, float]]:
+    """Yield residuals with averages that matter, and their window (s), by linear theory.
+
+    Those over the time between samples, and those that match best, if clearly better.
+    """
+    candidates = list[AveragesTried]()
+    for window, of_rate, averaged in _averaged(residuals, numbers):
+        off, _ = averaged.errors(theta)
+        made_up_for = basis.T @ off
+        left = float(off @ off - made_up_for @ made_up_for)
+        gain = (float(errors @ errors) - left) / variance
+        change = off - errors
+        matters = float(np.linalg.norm(basis.T @ change)) > MATTERS * np.sqrt(variance)
+        visible = float(np.max(np.abs(change))) > LEAST_NOISE
+        if matters and visible and (of_rate or gain > STRONG):
+            candidates.append(AveragesTried(gain, window, of_rate, averaged))
+    best = max(candidates, key=lambda each: each.gain, default=None)
+    for each in candidates:
+        if each.of_rate or each is best:
+            yield each.averaged, each.window
+
+
+def _averaged(
+    residuals: Residuals, numbers: Sequence[int]
+) -> Iterator[tuple[float, bool, Residuals]]:
+    """Yield residuals with averages over a window (s), and whether that is the rate's.
+
+    Averages are about each sample; of a test whose instant is given also over the time before.
+    """
+    chosen = [residuals.experiments[number] for number in numbers]
+    slowest = max(map(_spacing, chosen))
+    lates = (0.0,) if any(map(finds_instant, chosen)) else (0.0, 0.5)
+    for usual, late in product((None, *_usual_windows(chosen)), lates):
+        windows = [usual or _spacing(each) for each in residuals.experiments]
+        experiments = [
+            with_averages(each, windows[k], late * windows[k]) if k in numbers else each
+            for k, each in enumerate(residuals.experiments)
+        ]
+        averaged = replace(residuals, experiments=experiments, counter=None)
+        yield usual or slowest, usual is None and not late, averaged
+
+
+def _usual_windows(chosen: Sequence[Experiment]) -> list[float]:
+    """Return the windows (s) that hold several samples, and are short beside the records."""
+    slowest = max(map(_spacing, chosen))
+    longest = LONGEST * min(float(np.ptp(each.simulator.times)) for each in chosen)
+    return [window for window in USUAL if slowest < window < longest]
+
+
+def _spacing(experiment: Experiment) -> float:
+    return float(median(np.diff(experiment.simulator.times)))
+
+
+def _compared(
+    residuals: Residuals,
+    theta: Array,
+    averaged: Residuals,
+    window: float,
+    variance: float,
+    uncertainty: UncertaintyAnalysis,
+) -> RecorderAverages:
+    """Return what a fit with averages finds, from the minimum theta (N,) without them."""
+    end, errors = descent_near(averaged, theta), residuals(theta)
+    cost, values = 0.5 * float(errors @ errors), own_values(averaged, end.x)
+    of_records = {n.name for each in residuals.experiments for n in each.nuisances}
+    return RecorderAverages(
+        window=window,
+        chi_square=2.0 * (cost - end.cost) / variance,
+        given=own_values(residuals, theta),
+        values=values,
+        beyond=tuple(
+            name
+            for name, own in uncertainty.confidence.parameters.items()
+            if name not in of_records and _is_beyond(values[name], own.interval)
+        ),
+    )
+
+
+def _is_beyond(value: float, interval: Interval | None) -> bool:
+    low, high = interval or (None, None)
+    return (low is not None and value < low) or (high is not None and value > high)
+
+
+def allowing_for_averages(
+    uncertainty: UncertaintyAnalysis, residuals: Residuals, averages: RecorderAverages | None
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with intervals that hold the parameters with averages, too.
+
+    Each holds the one without them, and the same about the value with them.
+    """
+    if averages is None:
+        return uncertainty
+    parameters = {**uncertainty.confidence.parameters}
+    for free in residuals.free:
+        own = parameters[free.name]
+        if own.interval is not None:
+            given, with_them = averages.given[free.name], averages.values[free.name]
+            shift = free.scaled(with_them) - free.scaled(given)
+            low, high = own.interval
+            interval = _moved(free, low, min(shift, 0.0)), _moved(free, high, max(shift, 0.0))
+            parameters[free.name] = replace(own, interval=interval, method="averages")
+    confidence = replace(uncertainty.confidence, parameters=parameters)
+    return replace(uncertainty, confidence=confidence)
+
+
+def _moved(free: FreeParameter, limit: float | None, shift: float) -> float | None:
+    """Return a limit that is moved by a shift of the scaled parameter, within its bounds."""
+    if limit is None:
+        return None
+    bounds = free.scaled(free.low), free.scaled(free.high)
+    return free.value(float(np.clip(free.scaled(limit) + shift, *bounds)))

@@ -1,0 +1,204 @@
+"""The minima that a search found: which of them the records refute, and what is said of them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.estimate import LocalMinimum
+from exfit.fitting.descents import taken_for_validation
+from exfit.fitting.global_search import SearchResult, is_same
+from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.results.intervals.valleys import valleys
+from exfit.results.model import Minima, Minimum
+from exfit.results.search_summary import multiple
+from exfit.util.text import rounded_value
+
+Values = Mapping[str, float]
+
+TINY = float(np.finfo(float).tiny)
+REMARKABLE = 0.1  # difference between values of a parameter, as a share, that is worth a word
+WITHIN = 2.0  # standard errors: an interval says it already
+MOST_VALUES = 6  # of a minimum, in a sentence
+
+
+def minima_of(
+    residuals: Residuals,
+    search: SearchResult,
+    uncertainty: UncertaintyAnalysis | None,
+    walked: Residuals | None,
+) -> Minima | None:
+    """Return the minima of a search from several starts, in the parameters' own values.
+
+    Half the likelihood ratio of two of them is the difference of their costs over the variance of
+    the residuals, which the ``uncertainty`` of the result widens where they are not white. Ways
+    from one to another are looked for with the residuals ``walked``, unless that is None. None
+    where the search came to no minimum, or there were no further starts.
+    """
+    if search.minima is None or not search.minima.minima:
+        return None
+    found = search.minima
+    ends = [
+        (search.best.x, search.best.cost) if k == search.place else (local.x, local.cost)
+        for k, local in enumerate(found.minima)
+    ]
+    lowest = min(cost for _, cost in ends)
+    variance = variance_of(residuals, lowest, uncertainty)
+    chi_squares = [2.0 * (cost - lowest) / variance for _, cost in ends]
+    places: list[int | None] = [None] * len(ends)
+    several = sum(chi_square <= REFUTED for chi_square in chi_squares) > 1
+    if walked is not None and search.place is not None and several:
+        allowed = lowest + 0.5 * REFUTED * variance
+        places = valleys(walked, [x for x, _ in ends], search.place, allowed)
+    minima = tuple(
+        Minimum(own_values(residuals, x), cost, each.starts, above, above > REFUTED, valley)
+        for each, (x, cost), above, valley in zip(
+            found.minima, ends, chi_squares, places, strict=True
+        )
+    )
+    return Minima(minima, found.start_costs, found.end_costs, search.ways)
+
+
+def variance_of(
+    residuals: Residuals, cost: float, uncertainty: UncertaintyAnalysis | None
+) -> float:
+    """Return the variance of the residuals at a minimum: no less than that of any recorder."""
+    freedom = max(1, residuals.count - len(residuals.free))
+    own = 2.0 * cost / freedom if uncertainty is None else uncertainty.confidence.variance
+    return max(own, LEAST_NOISE**2)
+
+
+def own_values(residuals: Residuals, x: NDArray[np.float64]) -> dict[str, float]:
+    """Return the values of the free parameters."""
+    values = residuals.values(x)
+    return {parameter.name: values[parameter.name] for parameter in residuals.free}
+
+
+def minima_notes(
+    residuals: Residuals,
+    search: SearchResult,
+    minima: Minima | None,
+    uncertainty: UncertaintyAnalysis | None,
+) -> Iterator[str]:
+    """Yield what must be known of the other minima beside the result of a search.
+
+    Those within the intervals of the ``uncertainty`` are no news.
+    """
+    if search.minima is None:
+        return
+    if search.minima.interrupted:
+        ends = search.minima.end_costs
+        done = int(np.count_nonzero(np.isfinite(ends)))
+        yield (
+            f"interrupted in the search from further starts: {done} of {len(ends)} descents were "
+            "done, and this is the best of them"
+        )
+    own, best = search.own, search.best
+    if search.for_validation:
+        lowest = min(local.cost for local in search.minima.minima)
+        yield taken_for_validation(best.cost / lowest)
+    if search.goes_on and not own.success:
+        yield (
+            f"the descent from the start of the case ended at {times(own.cost, best.cost)} this "
+            f"cost: {own.message}"
+        )
+    if minima is not None:
+        errors = {} if uncertainty is None else uncertainty.confidence.parameters
+        std_errors = {name: each.std_error or 0.0 for name, each in errors.items()}
+        yield from _of_others(residuals, search, search.minima.minima, minima.minima, std_errors)
+
+
+def _of_others(
+    residuals: Residuals,
+    search: SearchResult,
+    ends: Sequence[LocalMinimum],
+    minima: Sequence[Minimum],
+    std_errors: Values,
+) -> Iterator[str]:
+    """Yield where the start of the case led, if elsewhere, and what the records do not refute."""
+    here = own_values(residuals, search.best.x)
+    valleys: dict[object, list[tuple[bool, Minimum]]] = {}
+    for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
+        from_start = search.goes_on and search.own.success and is_same(end.result, search.own)
+        apart = any(
+            abs(value - here[name]) > WITHIN * std_errors.get(name, 0.0)
+            for name, value in minimum.values.items()
+        )
+        if k != search.place and (from_start or (apart and not minimum.refuted)):
+            own = ("alone", k) if minimum.valley is None else minimum.valley
+            valleys.setdefault(own, []).append((from_start, minimum))
+    for place, members in valleys.items():
+        if place == 0:
+            along = [minimum for _, minimum in members]
+            yield valley_in_words(along, search.best.cost, _above(minima), here, residuals)
+            continue
+        from_start, minimum = max(members, key=lambda member: member[0])  # else the lowest
+        subject = "the descent from the start of the case ended at" if from_start else "there is"
+        yield f"{subject} {minimum_in_words(minimum, search.best.cost, here)}"
+
+
+def _above(minima: Sequence[Minimum]) -> float:
+    """The largest chi-square in the valley of the result."""
+    return max(each.chi_square or 0.0 for each in minima if each.valley == 0)
+
+
+def valley_in_words(
+    others: Sequence[Minimum], cost: float, above: float, here: Values, residuals: Residuals
+) -> str:
+    """Return what moves along the flat valley of the result, in which other minima lie.
+
+    ``above`` is the largest chi-square of them and the result.
+    """
+    values = {name: [here[name], *(each.values[name] for each in others)] for name in here}
+    bounds = {free.name: (free.low, free.high) for free in residuals.free}
+    moves = ", ".join(
+        f"{name} {rounded_value(min(values[name]), None, *bounds[name])} ... "
+        f"{rounded_value(max(values[name]), None, *bounds[name])} "
+        f"(here {rounded_value(here[name], None, *bounds[name])})"
+        for name in most_different({name: (min(own), max(own)) for name, own in values.items()})
+    )
+    count = "another minimum lies" if len(others) == 1 else f"{len(others)} other minima lie"
+    height = f"{'up to ' * (len(others) > 1)}{times(max(each.cost for each in others), cost)}"
+    return (
+        f"{count} in one flat valley with this one, {height} this cost, and the record "
+        f"refutes no point of the way (chi-square up to {above:.2g}, limit {REFUTED}): along it "
+        f"move {moves}"
+    )
+
+
+def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
+    """Return how another minimum lies to the result, and what the records say of it."""
+    verdict = "which the record refutes"
+    if not minimum.refuted:
+        verdict = (
+            f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
+            f"lowest, limit {REFUTED})"
+        )
+    height = times(minimum.cost, cost)
+    return f"another minimum, {height} this cost, {verdict}: {differences(minimum.values, here)}"
+
+
+def times(cost: float, other: float) -> str:
+    """Return a cost in words, as a multiple of another one."""
+    return multiple(cost / other) if other > 0.0 else f"{cost:.3g} pu² above"
+
+
+def differences(there: Values, here: Values) -> str:
+    """Return which values of a minimum are others than here: those that differ most."""
+    pairs = {name: (value, here[name]) for name, value in there.items()}
+    return ", ".join(
+        f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in most_different(pairs)
+    )
+
+
+def most_different(pairs: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return the parameters of which two values differ most, in their own order."""
+    apart = {
+        name: abs(one - other) / max(abs(one), abs(other), TINY)
+        for name, (one, other) in pairs.items()
+    }
+    remarkable = [name for name in apart if apart[name] > REMARKABLE] or [*apart]
+    most = sorted(remarkable, key=lambda name: -apart[name])[:MOST_VALUES]
+    return [name for name in apart if name in most]

@@ -1,0 +1,180 @@
+"""Intervals that allow for the errors of the values that a fit takes as given."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from math import hypot, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.features.events.driving_noise.weighing import BIAS_KNOWN_TO, bias_of
+from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation
+from exfit.inference import UNDETERMINED, Uncertainty
+from exfit.inference.confidence import NORMAL
+from exfit.inference.wording import digits, listed
+from exfit.results.intervals.determination import with_parameters, without_linear_intervals
+from exfit.results.intervals.value_shifts import shifts_by_values
+
+Array = NDArray[np.float64]
+
+TINY = float(np.finfo(float).tiny)  # where the errors given leave nothing of a variance
+
+
+class ErrorsOfValues(NamedTuple):
+    """What the standard errors of given values move; ``without`` has those without derivatives."""
+
+    given: Mapping[str, GivenError]
+    without: tuple[str, ...] = ()
+
+
+def errors_of_values(case: Case, problem: FitProblem, theta: Array) -> ErrorsOfValues:
+    """Return what the standard errors of given values move at the minimum theta (N,).
+
+    Values that move nothing are left out.
+    """
+    residuals = problem.compressed
+    std_errors = case.std_errors()
+    std_errors = {name: std_errors[name] for name in std_errors if name in residuals.fixed}
+    if not std_errors:
+        return ErrorsOfValues({})
+    shifts = shifts_by_values(residuals, theta, std_errors, bounds_hold=False)
+    if shifts is None:
+        return ErrorsOfValues({}, tuple(std_errors))
+    names = [free.name for free in residuals.free]
+    given = {
+        name: GivenError(std_error, dict(zip(names, column.tolist(), strict=True)))
+        for (name, std_error), column in zip(std_errors.items(), shifts.T, strict=True)
+        if column.any()
+    }
+    return ErrorsOfValues(given)
+
+
+def allowing_for(
+    errors: ErrorsOfValues,
+    uncertainty: UncertaintyAnalysis,
+    problem: FitProblem,
+    theta: Array,
+    of_record: tuple[str, ...],
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with standard errors and intervals that allow for those of values.
+
+    Each value adds the square of its first-order shift to the variance of a parameter, and the
+    square of 1.96 times that shift to that of each side of its interval, in scaled parameters; an
+    open side stays open. The values count as independent of each other and of the noise.
+    Correlation and covariance remain those of the records alone. As in `confidence` there is no
+    interval where the standard error exceeds UNDETERMINED; where a profile took the place of
+    linear theory, where the shift alone does.
+
+    Source: JCGM 100:2008, section 5.1.2, the law of propagation of uncertainty.
+    """
+    if errors.without:
+        why = (
+            f"has no interval: no finite derivatives by {listed(errors.without)}, given with errors"
+        )
+        return without_linear_intervals(uncertainty, uncertainty.confidence.names, why)
+    if not errors.given:
+        return uncertainty
+    sizes = linearisation(problem, theta, of_record).own_size
+    widened, given = {}, errors.given
+    for parameter, x, size in zip(problem.residuals.free, theta, sizes, strict=True):
+        own, name = uncertainty.confidence.parameters[parameter.name], parameter.name
+        shift = hypot(*(error.shifts[name] for error in given.values()))
+        widened[name] = widened_by(shift, own, parameter, float(x), float(size), [*given])
+    together = replace(uncertainty, given_errors=given)
+    return with_parameters(together, widened)
+
+
+def allowing_for_bias(
+    uncertainty: UncertaintyAnalysis, problem: FitProblem, theta: Array, of_record: tuple[str, ...]
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with that of the bias by the noise of driving signals, at theta (N,).
+
+    That bias was taken out: it is as uncertain as the variance of the noise.
+    """
+    bias = bias_of(problem.residuals, theta)
+    if bias is None:
+        return uncertainty
+    sizes = linearisation(problem, theta, of_record).own_size
+    widened = {}
+    for parameter, x, size, moved in zip(problem.residuals.free, theta, sizes, bias, strict=True):
+        shift = BIAS_KNOWN_TO * abs(float(moved) * parameter.slope(float(x)))
+        own = uncertainty.confidence.parameters[parameter.name]
+        widened[parameter.name] = widened_by(
+            shift, own, parameter, float(x), float(size), ["the noise of what drives the unit"]
+        )
+    return with_parameters(uncertainty, widened)
+
+
+def given_error_notes(
+    uncertainty: UncertaintyAnalysis, of_record: Collection[str]
+) -> Iterator[str]:
+    """Yield for which errors of given values the intervals allow, and what these widen most.
+
+    What belongs to a record, ``of_record``, is not named.
+    """
+    given, parameters = uncertainty.given_errors, uncertainty.confidence.parameters
+    if not given:
+        return
+    ratios = {
+        name: own.std_error / sqrt(max(own.std_error**2 - uncertainty.variance_given(name), TINY))
+        for name, own in parameters.items()
+        if own.std_error and name not in of_record
+    }
+    text = f"the intervals allow for the errors of {listed([*given])} (given)"
+    if ratios:
+        widest = max(ratios, key=lambda name: ratios[name])
+        value = max(given, key=lambda name: abs(given[name].shifts[widest]))
+        times = f"the standard error of {widest} is {digits(ratios[widest])} times as large"
+        text += f": {times}, most by {value}" if len(given) > 1 else f": {times}"
+    yield text
+
+
+def widened_by(
+    shift: float,
+    own: Uncertainty,
+    parameter: FreeParameter,
+    scaled: float,
+    size: float,
+    names: Sequence[str],
+) -> Uncertainty:
+    """Return what is known of a parameter, widened by a shift for the errors of values.
+
+    ``size`` is what counts as 100 %; ``names`` are those of the values.
+    """
+    linear = own.std_error if own.method == "linear" else None
+    share = hypot(linear or 0.0, shift) / size
+    widened = _widened(own, parameter, scaled, shift, share <= UNDETERMINED)
+    if own.interval is None or share <= UNDETERMINED:
+        return widened
+    why = f"is not determined for the errors of {listed(names)}: standard error"
+    return replace(widened, why=f"{why} {digits(100.0 * share)} %")
+
+
+def _widened(
+    own: Uncertainty, parameter: FreeParameter, scaled: float, shift: float, determined: bool
+) -> Uncertainty:
+    """Return what is known of a parameter, widened by a shift in its own unit.
+
+    It keeps its interval only where it is still ``determined``.
+    """
+    value = parameter.value(scaled)
+    std_error = None if own.std_error is None else hypot(own.std_error, shift)
+    relative = std_error / abs(value) if std_error is not None and value else None
+    wider = replace(own, std_error=std_error, relative_error=relative)
+    if own.interval is None or not determined:
+        return replace(wider, interval=None)
+    beyond = NORMAL * shift / parameter.slope(scaled)
+    bounds = parameter.scaled(parameter.low), parameter.scaled(parameter.high)
+
+    def moved(limit: float | None, sign: float) -> float | None:
+        if limit is None:
+            return None
+        side = max(sign * (parameter.scaled(limit) - scaled), 0.0)
+        return parameter.value(float(np.clip(scaled + sign * hypot(side, beyond), *bounds)))
+
+    low, high = own.interval
+    return replace(wider, interval=(moved(low, -1.0), moved(high, 1.0)))

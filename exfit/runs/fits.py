@@ -1,0 +1,229 @@
+"""Fits of several cases with several strategies, one after the other."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from exfit import estimate, workflows
+from exfit.case.case import Case
+from exfit.errors import CaseError, ExfitError
+from exfit.fitting.build import build_experiment
+from exfit.fitting.search import checked_search, checked_strategy, fitted
+from exfit.runs.names import distinct_names, numbered
+from exfit.results.model import FitResult, Iteration
+from exfit.results.side_by_side import outcome_of
+from exfit.util.typed import plain
+from exfit.workflows import CaseOrPath
+
+Progress = Iteration | estimate.Progress
+
+
+@dataclass(frozen=True)
+class PlannedFit:
+    """A fit that has still to run: the name that no other of its series has, case and strategy.
+
+    ``case_name`` is that of the case, which no other case of the series has; ``search`` is how far
+    to search, None: as the case says.
+    """
+
+    case_name: str
+    case: Case
+    strategy: str
+    search: str | None
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class FitRun:
+    """A fit of a series: its name, that of its case, and its result."""
+
+    name: str
+    case_name: str
+    result: FitResult
+
+
+@dataclass(frozen=True, eq=False)
+class FitSeries:
+    """The fits of several cases with several strategies, in the order of the cases.
+
+    ``failed`` holds the error of each fit that could not be run or written, by its name;
+    ``not_run`` names those that an interruption left out.
+    """
+
+    runs: tuple[FitRun, ...]
+    failed: dict[str, str]
+    not_run: tuple[str, ...]
+    interrupted: bool
+
+    @property
+    def results(self) -> dict[str, FitResult]:
+        """The results by the names of the fits."""
+        return {run.name: run.result for run in self.runs}
+
+    @property
+    def by_case(self) -> dict[str, tuple[FitRun, ...]]:
+        """The fits of each case, by its name."""
+        names = dict.fromkeys(run.case_name for run in self.runs)
+        return {name: tuple(run for run in self.runs if run.case_name == name) for name in names}
+
+    @property
+    def all_hold(self) -> bool:
+        """Whether all fits were run, and each matches its records and is accepted."""
+        done = not (self.failed or self.not_run or self.interrupted)
+        return done and all(result.holds for result in self.results.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of all fits as plain data, as ``exfit fit --json`` prints them."""
+        return {
+            "runs": [
+                {
+                    "name": run.name,
+                    "case_name": run.case_name,
+                    "outcome": outcome_of(run.result),
+                    "result": run.result.to_dict(),
+                }
+                for run in self.runs
+            ],
+            "failed": plain(self.failed),
+            "not_run": list(self.not_run),
+            "interrupted": self.interrupted,
+        }
+
+
+def _ignore_progress(_: PlannedFit, __: Progress) -> None:
+    """Ignore how far a fit is."""
+
+
+def _ignore_run(_: FitRun) -> None:
+    """Ignore that a fit has ended."""
+
+
+def fit_all(
+    cases: Iterable[CaseOrPath],
+    strategies: Iterable[str] = (),
+    progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
+    finished: Callable[[FitRun], None] = _ignore_run,
+    search: str | None = None,
+) -> FitSeries:
+    """Fit every case with every strategy; all cases are checked before the first fit.
+
+    Args:
+        cases: cases, or the paths of their files.
+        strategies: of the descent from the start of a case; none: the own strategy of each case.
+            Several are compared by that descent alone, unless ``search`` or the case says how far
+            to search.
+        progress: called with the fit that runs and its iteration, or how far its search from
+            further starts is.
+        finished: called with every fit that has ended, so that its files can be written.
+        search: "global", or "local" for the descent from the start of each case alone; None: as
+            each case says.
+
+    A KeyboardInterrupt ends the series: it has the fits that were done, and the best point of the
+    one that was running. Raises CaseError with the faults of all cases.
+
+    Example:
+        >>> series = exfit.fit_all(["a.yaml", "b.yaml"], ["dgn", "lm"])
+        >>> {name: result.cost for name, result in series.results.items()}
+    """
+    return run_all(planned([*cases], [*strategies], search=search), progress, finished)
+
+
+def planned(
+    cases: Sequence[CaseOrPath],
+    strategies: Sequence[str],
+    load: Callable[[Any], Case] = workflows.loaded,
+    search: str | None = None,
+) -> tuple[PlannedFit, ...]:
+    """Return the fits of every case with every strategy, or with its own where none is given.
+
+    Cases and records are read; raises CaseError with the faults of all of them.
+    """
+    read: list[Case] = []
+    files = [case for case in cases if not isinstance(case, Case)]
+    faults = [
+        *_repeated("case", files, [Path(file).resolve() for file in files]),
+        *_repeated("strategy", strategies, strategies),
+        *_faults(checked_strategy, strategies),
+        *_faults(checked_search, [] if search is None else [search]),
+        *_faults(lambda source: read.append(_ready(load(source))), cases),
+    ]
+    if faults:
+        raise CaseError(faults)
+    names = distinct_names([case.path for case in read])
+    combinations = [
+        (name, case, strategy)
+        for name, case in zip(names, read, strict=True)
+        for strategy in strategies or [case.estimate.strategy]
+    ]
+    runs = numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
+    return tuple(
+        PlannedFit(name, case, strategy, _how_far(case, strategies, search), run)
+        for (name, case, strategy), run in zip(combinations, runs, strict=True)
+    )
+
+
+def _how_far(case: Case, strategies: Sequence[str], search: str | None) -> str | None:
+    """Return how far to search, None: as the case says.
+
+    Several strategies are compared: a search that goes on would lead all of them to one minimum.
+    """
+    asked = search is not None or case.estimate.model_fields_set & {"search", "starts"}
+    return "local" if len(strategies) > 1 and not asked else search
+
+
+def run_all(
+    plan: Sequence[PlannedFit],
+    progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
+    finished: Callable[[FitRun], None] = _ignore_run,
+) -> FitSeries:
+    """Run planned fits one after the other; one that fails keeps no other from running."""
+    runs: list[FitRun] = []
+    failed: dict[str, str] = {}
+    interrupted = False
+    try:
+        for fit in plan:
+            shown = partial(progress, fit)
+            try:
+                result = workflows.fit(fit.case, fit.strategy, shown, shown, search=fit.search)
+                runs.append(FitRun(fit.name, fit.case_name, result))
+                finished(runs[-1])
+            except ExfitError as fault:
+                failed[fit.name] = str(fault)
+                continue
+            if result.interrupted:
+                interrupted = True
+                break
+    except KeyboardInterrupt:
+        interrupted = True
+    done = {*failed, *(run.name for run in runs)}
+    return FitSeries(
+        tuple(runs), failed, tuple(fit.name for fit in plan if fit.name not in done), interrupted
+    )
+
+
+def _ready(case: Case) -> Case:
+    """Return a case whose records have been read; raises ExfitError where no fit could begin."""
+    fitted(case)
+    start = case.values()
+    for recording in case.validations:
+        build_experiment(case, recording, start)
+    return case
+
+
+def _faults(check: Callable[[Any], object], subjects: Iterable[object]) -> Iterator[str]:
+    """Yield the lines of what a check raises for each subject."""
+    for subject in subjects:
+        try:
+            check(subject)
+        except ExfitError as fault:
+            yield from str(fault).splitlines()
+
+
+def _repeated(kind: str, given: Sequence[object], identities: Sequence[object]) -> Iterator[str]:
+    """Yield what is given more than once, whatever it is called."""
+    for identity, count in Counter(identities).items():
+        if count > 1:
+            yield f"{kind} {given[identities.index(identity)]}: given {count} times"

@@ -1,0 +1,120 @@
+"""Fits of several cases with several strategies: while they run, and when they are done."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from exfit.results.model import FitResult, Iteration
+from exfit.results.side_by_side import explanation_of, outcome_of
+from exfit.results.verdict import MATCHES, MISSES
+from exfit.runs.fits import FitRun, FitSeries, PlannedFit, Progress
+from exfit.show.terminal.side_by_side import side_by_side
+from exfit.show.terminal.terminal import paragraph, remarks
+
+HEADS = ("fit", "it", "f", "rmse", "s", "")
+FORMS = ("{:>4}", "{:>10}", "{:>10}", "{:>7}", "{:<13}")  # behind the name
+MOST_OF_NAME = 28  # characters: the line has then 80
+DESCENTS_ALONE = (
+    "each fit is the descent from the start of its case alone: --search global looks further"
+)
+BRIEF = {MATCHES: "matches", MISSES: "misses"}  # what a line has no room for
+
+
+class SeriesProgress:
+    """Shows fits as they end, a line for each; a terminal has the one that runs below them."""
+
+    def __init__(self, console: Console, plan: Sequence[PlannedFit]) -> None:
+        self.console, self.count = console, len(plan)
+        self._alone = any(fit.search == "local" for fit in plan)
+        self._width = min(max(len(fit.name) for fit in plan), MOST_OF_NAME)
+        self._done, self._shown = 0, ""
+        self._live: Live | None = None
+
+    @contextmanager
+    def running(self) -> Iterator["SeriesProgress"]:
+        """Show the lines for as long as the fits run."""
+        if self._alone:
+            paragraph(self.console, DESCENTS_ALONE)
+        self.console.print(self._line(HEADS), style="bold", soft_wrap=True, markup=False)
+        if not self.console.is_terminal:
+            yield self
+            return
+        with Live(console=self.console, transient=True) as self._live:
+            yield self
+
+    def __call__(self, fit: PlannedFit, progress: Progress) -> None:
+        """Show how far the fit that runs is."""
+        self._show(fit.name, progress_words(progress))
+
+    def finished(self, run: FitRun) -> None:
+        """Show a fit that has ended."""
+        result, outcome = run.result, outcome_of(run.result)
+        numbers = (f"{result.cost:.4e}", f"{result.rmse:.4e}", f"{result.seconds:.2f}")
+        style = "" if result.holds else "yellow"
+        line = self._line((run.name, f"{result.nit}", *numbers, BRIEF.get(outcome, outcome)))
+        self.console.print(Text(line, style), soft_wrap=True)
+        self._show(run.name, "writing numbers")
+        self._done += 1
+
+    def _show(self, name: str, state: str) -> None:
+        """Show below the lines what a fit is at; at once where it is another fit than before."""
+        if self._live is not None:
+            text = f"{self._done + 1} of {self.count}: {name}, {state}"
+            self._live.update(Text(text, "dim"), refresh=name != self._shown)
+            self._shown = name
+
+    def _line(self, cells: Sequence[str]) -> str:
+        name = cells[0]
+        if len(name) > self._width:
+            name = f"…{name[1 - self._width :]}"
+        others = (form.format(cell) for form, cell in zip(FORMS, cells[1:], strict=True))
+        return " ".join([f"{name:<{self._width}}", *others]).rstrip()
+
+
+def progress_words(progress: Progress) -> str:
+    """Return how far a fit is, in words."""
+    if isinstance(progress, Iteration):
+        return f"iteration {progress.number}, f {progress.cost:.4e}"
+    return f"{progress.stage} {progress.done} of {progress.total}, best f {progress.best:.4e}"
+
+
+def fit_series(console: Console, series: FitSeries) -> None:
+    """Show the results of a series: a table for each case, or one where each case was fitted once.
+
+    How each fit ended stands below its table, and last what was not run.
+    """
+    if series.runs:
+        _tables(console, series)
+    console.print()
+    for name in series.failed:
+        console.print(Text.assemble(f"{name}: ", ("failed", "bold red")), soft_wrap=True)
+    if series.not_run:
+        names = ", ".join(series.not_run)
+        paragraph(console, f"not run, interrupted: {names}", "bold red")
+
+
+def _tables(console: Console, series: FitSeries) -> None:
+    by_case = series.by_case
+    if all(len(runs) == 1 for runs in by_case.values()):
+        results = {name: runs[0].result for name, runs in by_case.items()}
+        console.print()
+        side_by_side(console, results, models=True)
+        _outcomes(console, results)
+        return
+    for name, runs in by_case.items():
+        results = {run.result.strategy: run.result for run in runs}
+        first = runs[0].result
+        console.print()
+        paragraph(console, f"{name}: {first.model} fitted to {first.comparison.record}", "bold")
+        side_by_side(console, results, start=True)
+        _outcomes(console, results)
+
+
+def _outcomes(console: Console, results: Mapping[str, FitResult]) -> None:
+    for name, result in results.items():
+        outcome = outcome_of(result)
+        style = "green" if result.holds else "bold red"
+        remarks(console, f"{name}: {outcome}:", [explanation_of(result)], style)

@@ -1,0 +1,175 @@
+"""Why a fit is not as good as its records allow: each cause has a small function that sees it.
+
+A recogniser gets the `Evidence` of a fit and yields a `Suspicion` for each thing that may be wrong:
+the cause, with its place and its figures, what to do about it, and how likely the record is with
+it. Some look at the residuals; others fit the record once more with one thing left open. Where the
+residuals are noise nothing of that is done. The `Pace` of the evidence ends it where its time is
+over.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import inf, isfinite
+
+from exfit.case.case import Case
+from exfit.features.events.record_causes import wrong_event
+from exfit.features.events.unit_causes import (
+    idle_control,
+    missing_governor,
+    missing_stabiliser,
+    other_motion,
+    other_swing,
+    other_transformer,
+)
+from exfit.results.verdict import Cause
+from exfit.verdict.causes.channels import clipped_channel, wrong_offset, wrong_scale, wrong_start
+from exfit.verdict.causes.evidence import Evidence, FittedRecord
+from exfit.verdict.causes.pace import OutOfTime, Pace
+from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
+from exfit.verdict.causes.rest import unsteady_record, wrong_levels, wrong_voltage
+from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
+from exfit.verdict.causes.suspicion import Recogniser, Suspicion
+from exfit.verdict.causes.typical import typical_values
+from exfit.verdict.causes.unit import (
+    fixed_values,
+    machine_data,
+    narrow_bound,
+    not_ended,
+    with_model,
+    wrong_limit,
+)
+
+__all__ = ["Evidence", "FittedRecord", "Pace", "Recogniser", "Suspicion", "causes_of"]
+
+ALWAYS: tuple[Recogniser, ...] = (
+    wrong_voltage,
+    wrong_event,
+    unsteady_record,
+    wrong_levels,
+    typical_values,
+)
+WITHOUT_TRIAL: tuple[Recogniser, ...] = (
+    not_ended,
+    other_clock,
+    spiky_channel,
+    ripple,
+    drift,
+    wrong_voltage,
+    wrong_event,
+    unsteady_record,
+    typical_values,
+)
+BY_TRIAL: tuple[Recogniser, ...] = (
+    wrong_sign,
+    wrong_size,
+    wrong_instant,
+    wrong_scale,
+    wrong_offset,
+    wrong_start,
+    clipped_channel,
+    narrow_bound,
+    machine_data,
+    fixed_values,
+    wrong_limit,
+    further_step,
+)
+OF_EVENT: tuple[Recogniser, ...] = (
+    other_swing,
+    missing_governor,
+    missing_stabiliser,
+    idle_control,
+    other_motion,
+    other_transformer,
+)
+WORDS: Mapping[Recogniser, str] = {
+    wrong_voltage: "level of vt",
+    wrong_event: "record of the event",
+    unsteady_record: "rest before the step",
+    wrong_levels: "levels at rest",
+    typical_values: "typical values",
+    not_ended: "iterations",
+    other_clock: "unit of the time",
+    spiky_channel: "spikes",
+    ripple: "ripple",
+    drift: "drift",
+    other_swing: "equation of the speed",
+    missing_governor: "governor",
+    missing_stabiliser: "stabiliser",
+    idle_control: "controls out of service",
+    other_motion: "inertia and damping",
+    other_transformer: "transformer",
+    wrong_sign: "sign of the step",
+    wrong_size: "size of the step",
+    wrong_instant: "instant of the step",
+    wrong_scale: "base of a channel",
+    wrong_offset: "zero of a channel",
+    wrong_start: "vt0",
+    clipped_channel: "clipped channel",
+    narrow_bound: "bounds",
+    machine_data: "machine data",
+    fixed_values: "other fixed values",
+    wrong_limit: "limits",
+    further_step: "further step",
+    averaging: "recorder that averages",
+}  # of a cause that was not tried
+FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
+
+
+def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
+    """Return what may be wrong with a fit, its test or its record, the likeliest first.
+
+    ``matched``: a minimum whose residuals are noise, of which only what is at rest is looked at.
+    Where an interruption or its pace ends the search for them, they are those found by then.
+    """
+    nothing_to_explain = matched or evidence.interrupted
+    found = _found(evidence, ALWAYS if nothing_to_explain else recognisers_of(evidence.case))
+    suspicions = sorted(_credible(evidence, found), key=lambda each: -each.likelihood)
+    if not nothing_to_explain:
+        suspicions = likely(with_model(evidence, suspicions))
+    return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
+
+
+def recognisers_of(case: Case) -> tuple[Recogniser, ...]:
+    """Return what looks for the causes of a misfit in turn, the recorder's last."""
+    return *WITHOUT_TRIAL, *(OF_EVENT if case.kind.finds_rest else ()), *BY_TRIAL, averaging
+
+
+def _credible(
+    evidence: Evidence, found: Mapping[Recogniser, Sequence[Suspicion]]
+) -> list[Suspicion]:
+    """Return what was found; of averages in a grid event only what explains more than all others.
+
+    One device measures what drives the unit and what is compared, over the same windows.
+    """
+    others = [each for recognise, own in found.items() if recognise != averaging for each in own]
+    averages = found.get(averaging, ())
+    if evidence.case.kind.finds_rest:
+        most = max((each.likelihood for each in others if isfinite(each.likelihood)), default=-inf)
+        averages = [each for each in averages if each.likelihood > most]
+    return [*others, *averages]
+
+
+def likely(suspicions: Sequence[Suspicion]) -> list[Suspicion]:
+    """Return suspicions without those that the first makes unlikely; the second stays."""
+    compared = [each for each in suspicions if isfinite(each.likelihood)]
+    left_out = [
+        each for each in compared[2:] if each.likelihood < compared[0].likelihood - FAR_LESS_LIKELY
+    ]
+    return [each for each in suspicions if each not in left_out]
+
+
+def _found(
+    evidence: Evidence, recognisers: Sequence[Recogniser]
+) -> dict[Recogniser, list[Suspicion]]:
+    """Return what each recogniser finds, until an interruption or the pace ends it."""
+    pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
+    try:
+        for done, recognise in enumerate(recognisers):
+            found[recognise] = []
+            pace.counts(done, len(recognisers), evidence.cost)
+            for suspicion in recognise(evidence):
+                found[recognise].append(suspicion)
+        pace.ended()
+    except (KeyboardInterrupt, OutOfTime) as ending:
+        left = recognisers[max(len(found) - 1, 0) :]
+        pace.stopped(tuple(WORDS[each] for each in left), isinstance(ending, KeyboardInterrupt))
+    return found

@@ -1,0 +1,265 @@
+"""What a recorder adds to a record: ripple, drift, spikes, averages, another clock."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.noise import NEIGHBOURS, noise
+from exfit.dsp.step_detection import find_step
+from exfit.fitting.experiment import Channel
+from exfit.fitting.forms.averaged import finds_instant, with_averages
+from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.records.channel_inspection import SPIKE_LIMIT
+from exfit.records.ripple import MAINS, Ripple
+from exfit.results.verdict import Cause
+from exfit.util.sorting import median
+from exfit.verdict.causes.evidence import Evidence
+from exfit.verdict.causes.linear import LinearFit, blocks, linear_fit
+from exfit.verdict.causes.lines import delay_found
+from exfit.verdict.causes.suspicion import CERTAIN, LAST, Suspicion, suspected
+from exfit.verdict.causes.trials import Opened, Trial, tried, with_experiment, with_opened
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
+FEWEST_AT_REST = 20  # samples from which a drift at rest is taken
+FINER = 8  # points of the spectrum for each of a transform without padding
+FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
+MOST_SPIKES = 0.05  # of the samples: more are no spikes
+NEAREST_RATIO = 0.1  # of a factor between the clocks
+CLOCKS = {1e3: "ms", 1e6: "microseconds", 60.0: "minutes", 50.0: "cycles of 50 Hz"}
+WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
+
+
+class ChannelErrors(NamedTuple):
+    """The errors of one channel: where they are among all, their times (s), their weight."""
+
+    number: int
+    channel: Channel
+    rows: slice
+    time: Array
+
+    def columns(self, count: int, own: Array) -> Array:
+        """Return columns (count, C) that are those of this channel, (M, C) pu, weighted."""
+        columns = np.zeros((count, own.shape[1]))
+        columns[self.rows] = self.channel.weight * own
+        return columns
+
+
+def errors_of_channels(evidence: Evidence) -> Iterator[ChannelErrors]:
+    """Yield the errors of each channel whose samples are compared one by one."""
+    for number, places in enumerate(blocks(evidence)):
+        experiment = evidence.residuals.experiments[number]
+        time = evidence.records[number].setup.record.time
+        for channel, rows in zip(experiment.channels, places, strict=True):
+            yield ChannelErrors(number, channel, rows, time[channel.kept])
+
+
+UNSTEADY = "check the recorder, and whether speed and voltage were steady; use a shorter window"
+MOVED_IN_EVENT = (
+    "the set power, the reference, or the tap of a transformer may have moved; use a shorter window"
+)
+
+
+def ripple(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the channels in whose errors a line of the spectrum stands out."""
+    linear = linear_fit(evidence)
+    if linear is None:
+        return
+    for own in errors_of_channels(evidence):
+        frequency = _line(own, linear)
+        if frequency is None:
+            continue
+        phase = 2.0 * np.pi * frequency * own.time
+        columns = own.columns(len(linear.errors), np.column_stack([np.cos(phase), np.sin(phase)]))
+        explained = linear.with_columns(columns)
+        height = float(np.hypot(*explained.coefficients))
+        cause = Cause(
+            f"a ripple of {frequency:.1f} Hz, {height:.1e} pu, in "
+            f"{own.channel.signal}{evidence.name_of(own.number)}",
+            Ripple(frequency, height, 1.0 / float(median(np.diff(own.time)))).remedy,
+        )
+        yield from suspected(evidence, explained.cost, 3, cause)
+
+
+def _line(own: ChannelErrors, linear: LinearFit) -> float | None:
+    """Return the frequency (Hz) at which the errors of a channel have most, None if too few."""
+    errors = linear.errors[own.rows]
+    if len(errors) < FEWEST_PERIODS:
+        return None
+    step, length = float(median(np.diff(own.time))), FINER * len(errors)
+    even = np.interp(own.time[0] + step * np.arange(len(errors)), own.time, errors)
+    power = np.abs(np.fft.rfft(even - np.mean(even), length)) ** 2
+    frequencies = np.fft.rfftfreq(length, step)
+    slowest = FEWEST_PERIODS / (own.time[-1] - own.time[0])
+    power[frequencies < slowest] = 0.0
+    return float(frequencies[np.argmax(power)])
+
+
+def drift(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the channels that drift all along the record.
+
+    One that a record does not show at rest may as well be slow parts of a response.
+    """
+    linear = linear_fit(evidence)
+    if linear is None:
+        return
+    for own in errors_of_channels(evidence):
+        way = (own.time - own.time[0]) / (own.time[-1] - own.time[0])
+        columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
+        explained = linear.with_columns(columns)
+        change = float(explained.coefficients[0])
+        of_event = evidence.case.kind.finds_rest  # its phasors hold no ripple of the mains
+        folding = "" if of_event else _folding(1.0 / float(median(np.diff(own.time))))
+        cause = Cause(
+            f"a drift{folding} of {own.channel.signal}{evidence.name_of(own.number)}: "
+            f"{change:+.1e} pu from start to end",
+            MOVED_IN_EVENT if of_event else UNSTEADY,
+        )
+        errors = linear.errors[own.rows]
+        prior = 0.0 if _shows_at_rest(evidence, own, errors, change) else LAST
+        yield from suspected(evidence, explained.cost, 2, cause, prior)
+
+
+def _folding(rate: float) -> str:
+    """Return that a ripple may look like a drift where a rate (Hz) of samples folds it to one."""
+    folds = any(
+        abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5 for mains in MAINS
+    )
+    return ", or ripple of the mains that its sampling folds," if folds else ""
+
+
+def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change: float) -> bool:
+    """Return whether a record drifts before its step, rather so than not at all.
+
+    ``errors`` (M,) are those of its channel, ``change`` is that of all the record, pu. It is so
+    where the record does not begin at rest.
+    """
+    until = evidence.records[own.number].steady_until
+    at_rest = own.time < (-np.inf if until is None else until)
+    if np.count_nonzero(at_rest) < FEWEST_AT_REST:
+        return True
+    slope = np.polyfit(own.time[at_rest], -errors[at_rest] / own.channel.weight, 1)[0]
+    return bool(slope * (own.time[-1] - own.time[0]) / change > 0.5)
+
+
+def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the channels that have spikes, which count as errors of the model."""
+    if evidence.residuals.robust is not None:
+        return
+    for number, record in enumerate(evidence.records):
+        for channel in evidence.residuals.experiments[number].channels:
+            error = record.comparison.overlays[channel.signal].error
+            kept = np.isfinite(error)
+            time, own = record.comparison.time[kept], error[kept]
+            places = _spikes(own)
+            if not len(places):
+                continue
+            square = channel.weight**2 * float(np.sum(own[places] ** 2))
+            at = f"{time[places[0]]:.4g} s" + (" and later" if len(places) > 1 else "")
+            cause = Cause(
+                f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} are spikes, "
+                f"at {at}",
+                f"outliers: {SPIKE_LIMIT:g} on the channel leaves them out",
+            )
+            cost = max(evidence.cost - 0.5 * square, 0.0)
+            yield from suspected(evidence, cost, len(places), cause)
+
+
+def _spikes(errors: Array) -> Places:
+    """Return the places of errors (M,) far beyond the noise, if these are few and alone."""
+    if len(errors) < NEIGHBOURS:
+        return np.zeros(0, np.intp)
+    far = np.abs(errors - median(errors)) > SPIKE_LIMIT * noise(errors)
+    places = np.flatnonzero(far)
+    alone = not np.any(far[1:-1] & far[:-2] & far[2:])
+    return places if alone and len(places) <= MOST_SPIKES * len(errors) else places[:0]
+
+
+def averaging(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the recorder shows averages, by the window that matches best.
+
+    Where the fit finds the instant of the step, that makes up for the delay of averages.
+    """
+    for number, experiment in enumerate(evidence.residuals.experiments):
+        if any(channel.filtering is not None for channel in experiment.channels):
+            continue
+        window = _likeliest_window(evidence, number)
+        if window is None:
+            continue
+        delay = experiment.simulator.delay
+        averaged = with_averages(experiment, window)
+        changed = with_experiment(evidence.residuals, number, averaged)
+        late = Nuisance("cause.delay", "delay")
+        found = finds_instant(experiment)
+        opened = (
+            [] if found else [Opened(late, delay + 0.5 * window, delay - window, delay + window)]
+        )
+
+        def cause(trial: Trial, window: float = window, number: int = number) -> Cause:
+            late = trial.values.get("cause.delay")
+            after = "" if late is None else f", and is {1e3 * late:.0f} ms late"
+            delay = "" if late is None else f", {delay_found(late, window)}"
+            return Cause(
+                f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
+                f"{after}",
+                f"averaged: {window:.3g} on its channels{delay}",
+            )
+
+        yield from tried(evidence, with_opened(changed, number, opened), 1 + len(opened), cause)
+
+
+def _likeliest_window(evidence: Evidence, number: int) -> float | None:
+    """Return the window (s) of the average that matches best, by linear theory."""
+    experiment = evidence.residuals.experiments[number]
+    time = evidence.records[number].setup.record.time
+    step = float(median(np.diff(time)))
+    found = finds_instant(experiment)
+    costs = {}
+    for window in sorted({step, *(window for window in WINDOWS if window > step)}):
+        if not window < 0.1 * (time[-1] - time[0]):
+            continue
+        averaged = with_averages(experiment, window)
+        values, moves = evidence.values, [*evidence.residuals.moves(evidence.solution.x)]
+        if not found:
+            nuisance = Nuisance("cause.delay", "delay")
+            averaged = replace(averaged, nuisances=(*averaged.nuisances, nuisance))
+            values = {**values, "cause.delay": experiment.simulator.delay + 0.5 * window}
+            moves.append({"cause.delay": 1.0})
+        errors, slopes = averaged.tangents(values, moves)
+        if not np.isfinite(slopes).all():
+            return None
+        coefficients, *_ = np.linalg.lstsq(slopes, errors, rcond=None)
+        left = errors - slopes @ coefficients
+        costs[window] = float(left @ left)
+    return min(costs, key=lambda window: costs[window]) if costs else None
+
+
+def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the times of a record are in another unit, by when it shows the first step."""
+    for number, record in enumerate(evidence.records):
+        overlay = record.comparison.overlays.get("vt")
+        instants = record.setup.test.instants
+        if overlay is None or not instants or instants[0] <= 0.0:
+            continue
+        kept = np.isfinite(overlay.measured)
+        try:
+            detected = find_step(record.comparison.time[kept], overlay.measured[kept])
+        except ValueError:
+            continue
+        if detected is None:
+            continue
+        for factor, unit in CLOCKS.items():
+            if abs(detected.at / (factor * instants[0]) - 1.0) < NEAREST_RATIO:
+                yield Suspicion(
+                    Cause(
+                        f"the time column{evidence.name_of(number)} may be in {unit}: it shows the "
+                        f"step at {detected.at:.4g}, the case has it at {instants[0]:g} s",
+                        f"time: {{column: ..., unit: {unit}}}",
+                    ),
+                    CERTAIN,
+                )

@@ -1,0 +1,139 @@
+"""Fits with one thing more left open: what the record would be matched by."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit import estimate
+from exfit.errors import SimulationError
+from exfit.estimate.run import NotFinite
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.residuals import Residuals
+from exfit.results.verdict import Cause
+from exfit.verdict.causes.evidence import Evidence
+from exfit.verdict.causes.suspicion import Suspicion, suspected
+
+Array = NDArray[np.float64]
+
+MOST_ITERATIONS = 25  # of each phase: to compare causes, not to print digits
+AT_NOISE = 1.2  # times the cost of the noise: a descent that ends so low needs no other
+TOLERANCE = 1e-3  # of a step and of the gradient, in the units of the search
+
+
+class Opened(NamedTuple):
+    """Something about a record that a trial leaves open: where it starts, and how far it may go."""
+
+    nuisance: Nuisance
+    start: float
+    low: float
+    high: float
+
+
+class Trial(NamedTuple):
+    """The end of a trial: its cost, and every value by name."""
+
+    cost: float
+    values: Mapping[str, float]
+
+
+def with_experiment(residuals: Residuals, number: int, experiment: Experiment) -> Residuals:
+    """Return residuals with another experiment in one place."""
+    experiments = [*residuals.experiments]
+    experiments[number] = experiment
+    return replace(residuals, experiments=experiments, counter=None)
+
+
+def with_opened(residuals: Residuals, number: int, opened: Sequence[Opened]) -> Residuals:
+    """Return residuals that leave more open about the record of one experiment."""
+    experiment = residuals.experiments[number]
+    nuisances = (*experiment.nuisances, *(each.nuisance for each in opened))
+    free = [
+        FreeParameter(each.nuisance.name, each.start, each.low, each.high, logarithmic=False)
+        for each in opened
+    ]
+    changed = with_experiment(residuals, number, replace(experiment, nuisances=nuisances))
+    return replace(changed, free=[*residuals.free, *free])
+
+
+def with_freed(residuals: Residuals, freed: Sequence[FreeParameter]) -> Residuals:
+    """Return residuals with more free parameters, which were fixed."""
+    names = {parameter.name for parameter in freed}
+    fixed = {name: value for name, value in residuals.fixed.items() if name not in names}
+    return replace(residuals, free=[*residuals.free, *freed], fixed=fixed, counter=None)
+
+
+def freed_within(
+    name: str, value: float, factor: float, start: float | None = None
+) -> FreeParameter:
+    """Return a fixed value as a parameter that may change by a factor."""
+    first = value if start is None else start
+    low, high = sorted((value / factor, value * factor))
+    return FreeParameter(name, min(max(first, low), high), low, high, logarithmic=value > 0.0)
+
+
+def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
+    """Return the better end of two descents, from the case's start and from the solution.
+
+    None where neither has a response. Raises KeyboardInterrupt at an interruption, OutOfTime when
+    the time for causes is over.
+    """
+    own = {
+        free.name: x for free, x in zip(evidence.residuals.free, evidence.solution.x, strict=True)
+    }
+    start, (low, high) = residuals.start, residuals.bounds
+    solution = np.array(
+        [own.get(free.name, x) for free, x in zip(residuals.free, start, strict=True)]
+    )
+    ends = list[estimate.Result]()
+    for point in (start, np.clip(solution, low, high)):
+        if not ends or ends[0].cost > AT_NOISE * evidence.noise_cost:
+            end = _descended(evidence, residuals, point)
+            ends += [] if end is None else [end]
+    if not ends:
+        return None
+    best = min(ends, key=lambda end: end.cost)
+    return Trial(best.cost, residuals.values(best.x))
+
+
+def _descended(evidence: Evidence, residuals: Residuals, start: Array) -> estimate.Result | None:
+    evidence.pace.goes_on()
+    descent = estimate.Descent(
+        functions=estimate.OneByOne(residuals, residuals.exact),
+        bounds=residuals.bounds,
+        method="lm-then-dgn",
+        max_iterations=MOST_ITERATIONS,
+        gtol=TOLERANCE,
+        xtol=TOLERANCE,
+        x_scale=residuals.units,
+    )
+    try:
+        end = descent.run(start, lambda line: evidence.pace.goes_on(line.cost))
+    except (SimulationError, NotFinite):
+        return None
+    if end.stop is estimate.Stop.INTERRUPTED:
+        raise KeyboardInterrupt
+    return end if np.isfinite(end.cost) else None
+
+
+def always(cause: Cause) -> Callable[[Trial], Cause]:
+    """Return the cause of a trial that is the same whatever it finds."""
+    return lambda _: cause
+
+
+def tried(
+    evidence: Evidence,
+    residuals: Residuals,
+    numbers: int,
+    cause: Callable[[Trial], Cause | None],
+    prior: Callable[[Trial], float] = lambda _: 0.0,
+) -> Iterator[Suspicion]:
+    """Yield the cause that other residuals stand for, if the record is matched better by them."""
+    trial = refitted(evidence, residuals)
+    likely = None if trial is None else cause(trial)
+    if trial is not None and likely is not None:
+        yield from suspected(evidence, trial.cost, numbers, likely, prior(trial))

@@ -1,0 +1,215 @@
+"""What the case says of the unit: machine data, limits, bounds, the model itself."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from math import log, sqrt
+
+import numpy as np
+
+from exfit.case.case import Case
+from exfit.errors import SimulationError
+from exfit.estimate import Stop
+from exfit.fitting.parameters import FreeParameter
+from exfit.inference.wording import listed
+from exfit.plants import MACHINE
+from exfit.results.verdict import Cause
+from exfit.simulation.limit_hits import Extreme, extremes
+from exfit.verdict.causes.evidence import Evidence
+from exfit.verdict.causes.linear import DEPENDENT, linear_fit
+from exfit.verdict.causes.lines import freeing
+from exfit.verdict.causes.suspicion import CERTAIN, Suspicion, likelihood
+from exfit.verdict.causes.trials import Trial, freed_within, tried, with_freed
+
+LARGEST_FACTOR = 4.0  # of a fixed value
+WIDER = 10.0  # times: how much farther a bound is put
+MOST_FIXED = 2  # values that are tried, those that would explain most
+MOST_LIMITS = 4  # that are tried, those that were met first
+CUT = 0.8  # of the way to its highest value: where a limit that was not met is tried
+TPD0 = f"{MACHINE}Tpd0"
+SATURATION = (f"{MACHINE}S10", f"{MACHINE}S12")
+USUAL_ERROR = 0.5  # of the logarithm of a value that is given
+RARE = 5.0  # log-likelihood: other fixed values are wrong less often than machine data
+OF_SCATTER = 10.0  # variance of the logarithm of a squared scatter, times the samples it is from
+STRUCTURE = 0.01  # of the error beyond the noise: what leaves more is less likely than the model
+
+
+def machine_data(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that another time constant or saturation of the machine would match."""
+    fixed = evidence.residuals.fixed
+    for names in ((TPD0,), SATURATION):
+        given = [name for name in names if fixed.get(name, 0.0) > 0.0]
+        if given:
+            yield from _other_values(evidence, given)
+
+
+def fixed_values(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the fixed values another of which would match: those that linear theory prefers."""
+    fixed = evidence.residuals.fixed
+    rows = evidence.case.rows()
+    own = (TPD0, *SATURATION)
+    names = [
+        name
+        for name, value in fixed.items()
+        if value > 0.0 and name in rows and not _is_limit(name) and name not in own
+    ]
+    for name in _most_explaining(evidence, names):
+        yield from _other_values(evidence, [name], RARE)
+
+
+def _is_limit(name: str) -> bool:
+    return "MAX" in name or "MIN" in name
+
+
+def _most_explaining(evidence: Evidence, names: list[str]) -> list[str]:
+    """Return the fixed values that would explain most, the first first."""
+    linear = linear_fit(evidence)
+    if linear is None or not names:
+        return []
+    freed = [freed_within(name, evidence.residuals.fixed[name], LARGEST_FACTOR) for name in names]
+    residuals = with_freed(evidence.residuals, freed)
+    theta = np.append(evidence.solution.x, [each.scaled(each.start) for each in freed])
+    try:
+        _, slopes = residuals.errors(theta)
+    except SimulationError:
+        return []
+    own = slopes[:, -len(freed) :]
+    sizes = np.linalg.norm(own, axis=0)
+    costs = {
+        name: linear.with_columns(own[:, [k]]).cost
+        for k, name in enumerate(names)
+        if np.isfinite(sizes[k]) and sizes[k] > DEPENDENT * np.nanmax(sizes)
+    }
+    return sorted(costs, key=lambda name: costs[name])[:MOST_FIXED]
+
+
+def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> Iterator[Suspicion]:
+    fixed = evidence.residuals.fixed
+    freed = [freed_within(name, fixed[name], LARGEST_FACTOR) for name in names]
+    part = "machine data" if of_machine(names) else "fixed values"
+
+    def cause(trial: Trial) -> Cause:
+        pairs = [f"{name} {trial.values[name]:.3g} (given {fixed[name]:g})" for name in names]
+        starts = {name: trial.values[name] for name in names}
+        return Cause(f"the {part}: {listed(pairs)} would match", remedy_of(evidence.case, starts))
+
+    def prior(trial: Trial) -> float:
+        ratios = [log(trial.values[name] / fixed[name]) for name in names]
+        return -0.5 * sum((ratio / USUAL_ERROR) ** 2 for ratio in ratios) - rare
+
+    yield from tried(evidence, with_freed(evidence.residuals, freed), len(names), cause, prior)
+
+
+def of_machine(names: Sequence[str]) -> bool:
+    """Return whether values are data of the machine."""
+    return names[0].startswith(MACHINE)
+
+
+def remedy_of(case: Case, starts: Mapping[str, float]) -> str:
+    """Return what to do about values that may be wrong; a fit of them begins with ``starts``."""
+    sources = "nameplate and test reports" if of_machine([*starts]) else "the data sheet"
+    return ", ".join(filter(None, [f"check {sources}", freeing(case, starts)]))
+
+
+def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the limits that would match elsewhere: met too early, or never although the unit is."""
+    fixed = evidence.residuals.fixed
+    for number, record in enumerate(evidence.records):
+        experiment = evidence.residuals.experiments[number]
+        at = record.setup.with_start_values(evidence.values)
+        try:
+            reached = extremes(experiment.with_inputs(at), experiment.parameters(at))
+        except SimulationError:
+            continue
+        nearest = sorted(reached, key=lambda extreme: -extreme.share)
+        by_limit = {extreme.limit: extreme for extreme in reversed(nearest)}
+        names = dict.fromkeys(extreme.limit for extreme in nearest)
+        for name in [name for name in names if fixed.get(name, 0.0) != 0.0][:MOST_LIMITS]:
+            yield from _other_limit(evidence, by_limit[name])
+
+
+def _other_limit(evidence: Evidence, extreme: Extreme) -> Iterator[Suspicion]:
+    name = extreme.limit
+    given = evidence.residuals.fixed[name]
+    met = extreme.share >= 1.0
+    start = given if met else CUT * extreme.share * given
+    low, high = sorted((start / LARGEST_FACTOR, LARGEST_FACTOR * max(given / start, 1.0) * start))
+    freed = FreeParameter(name, start, low, high, logarithmic=given > 0.0)
+
+    def cause(trial: Trial) -> Cause:
+        value = trial.values[name]
+        if abs(value) < abs(given):
+            return Cause(
+                f"a limit that the case does not have: {name} {value:.3g} would match (given "
+                f"{given:g})",
+                f"check {name} in the data sheet and the settings",
+            )
+        return Cause(
+            f"the limit {name} {given:g}, which the response meets and the record does not: "
+            f"{value:.3g} or more would match",
+            f"check {name} in the data sheet and the settings",
+        )
+
+    yield from tried(evidence, with_freed(evidence.residuals, [freed]), 1, cause)
+
+
+def narrow_bound(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the parameters that a bound holds although the record asks for more."""
+    residuals = evidence.residuals
+    sides = {
+        parameter.name: side
+        for parameter in residuals.free
+        if (side := parameter.bound(evidence.values[parameter.name])) is not None
+    }
+    if not sides:
+        return
+    wider = [
+        _widened(parameter) if parameter.name in sides else parameter
+        for parameter in residuals.free
+    ]
+
+    def cause(trial: Trial) -> Cause:
+        held = [f"{name} on its {side}" for name, side in sides.items()]
+        values = [f"{name} {trial.values[name]:.3g}" for name in sides]
+        return Cause(
+            f"the bounds: {listed(held)}; beyond, {listed(values)} would match",
+            "widen the bounds where the data sheet allows it",
+        )
+
+    yield from tried(evidence, replace(residuals, free=wider, counter=None), len(sides), cause)
+
+
+def _widened(parameter: FreeParameter) -> FreeParameter:
+    if parameter.logarithmic:
+        return replace(parameter, low=parameter.low / WIDER, high=parameter.high * WIDER)
+    more = WIDER * (parameter.high - parameter.low)
+    return replace(parameter, low=parameter.low - more, high=parameter.high + more)
+
+
+def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the iterations of a case were too few."""
+    if evidence.solution.stop in (Stop.ITERATIONS, Stop.EVALUATIONS):
+        yield Suspicion(
+            Cause(
+                "the search had too few iterations",
+                "increase estimate.iterations, or use the default search",
+            ),
+            CERTAIN,
+        )
+
+
+def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
+    """Return suspicions, the likeliest first, and last that of the model.
+
+    None of another one was tried: it is what is left where nothing else is wrong.
+    """
+    samples = max(1, evidence.residuals.samples)
+    noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
+    beyond = evidence.cost - noise
+    if beyond <= 0.0 or not evidence.case.kind.has_exciter:
+        return [*suspicions]
+    own = likelihood(evidence, noise + STRUCTURE * beyond)
+    cause = Cause(
+        f"the model: the unit may be of another type than {evidence.case.subject}",
+        "compare others: exfit rank CASE --models A,B",
+    )
+    return [*suspicions, Suspicion(cause, own)]

@@ -1,0 +1,204 @@
+"""What a fit comes to, by one rule, which docs/verdict.md states."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from exfit.estimate import Stop
+from exfit.inference.wording import digits, listed
+from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.recorder_averages import RecorderAverages
+from exfit.results.typical_values import first_of
+from exfit.results.verdict import (
+    GOOD,
+    MATCHES,
+    MISSES,
+    NEGLIGIBLE,
+    NO_MATCH,
+    NOT_CONVERGED,
+    Cause,
+    ResidualTests,
+    Verdict,
+    VerdictWords,
+)
+from exfit.verdict.causes import Evidence, causes_of
+from exfit.verdict.diagnostics import NEAR_MINIMUM, distance_from_minimum
+from exfit.verdict.residual_tests import residual_tests
+from exfit.verdict.score_tests import Contradiction, contradictions
+
+MOST_CAUSES = 5  # that a reader is given
+VALUES = "values of the case"
+UNTESTED = f"interrupted before the {VALUES} were tested"
+OTHER_WAY = -0.3  # correlation of response and record: below it no noise and no lag explains it
+
+
+def verdict_of(evidence: Evidence) -> Verdict:
+    """Return what a fit comes to, why, and the likeliest causes.
+
+    An interruption in what follows the tests of its residuals leaves the verdict as it is.
+    """
+    try:
+        tests = residual_tests(evidence)
+    except KeyboardInterrupt:
+        tests, evidence = (), replace(evidence, interrupted=True)
+        evidence.pace.stopped((), interrupted=True)
+    words, reason = _judged(evidence, tests)
+    matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)
+    averages = evidence.averages
+    good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
+    contradicted: list[Contradiction | RecorderAverages] = []
+    try:
+        contradicted += _contradictions(evidence, tests) if good_but_for_averages else ()
+    except KeyboardInterrupt:
+        words, reason = MATCHES, UNTESTED
+        evidence.pace.stopped((VALUES,), interrupted=True)
+    contradicted += _shown(averages, matched, reason)
+    contradicted.sort(key=lambda each: -each.likelihood)
+    if contradicted and good_but_for_averages:
+        words, reason = MATCHES, contradicted[0].reason
+    causes = (*(each.cause for each in contradicted), *causes_of(evidence, matched))
+    if words == MATCHES:
+        causes = (*causes, *_in_doubt(averages), *_undetermined(evidence))
+    return Verdict(words, reason, causes[:MOST_CAUSES], tests)
+
+
+def _contradictions(evidence: Evidence, tests: Sequence[ResidualTests]) -> list[Contradiction]:
+    """Values of the case that the record contradicts, none where its noise is carried."""
+    carried = any(test.carried > NEGLIGIBLE for test in tests)
+    return [] if carried else contradictions(evidence)
+
+
+def _shown(
+    averages: RecorderAverages | None, matched: bool, reason: str
+) -> tuple[RecorderAverages, ...]:
+    """Averages that the record shows, unless a trial is to name them."""
+    if averages is None or not averages.shown:
+        return ()
+    return (averages,) if matched or averages.reason in reason else ()
+
+
+def _in_doubt(averages: RecorderAverages | None) -> Iterator[Cause]:
+    """Yield that the recorder may average, where that matters and the record does not show it."""
+    if averages is not None and averages.matters and not averages.shown:
+        yield averages.cause
+
+
+def verdict_alone(evidence: Evidence) -> Verdict:
+    """Return what a fit comes to and why, by its residuals alone: without causes."""
+    tests = residual_tests(evidence)
+    return Verdict(*_judged(evidence, tests), residuals=tests)
+
+
+def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[VerdictWords, str]:
+    solution = evidence.solution
+    if evidence.interrupted:
+        return NOT_CONVERGED, "interrupted: the values are the best until then"
+    no_match = next(_no_match(evidence, tests), None)
+    if no_match is not None:
+        return NO_MATCH, no_match
+    seen = [test for test in tests if test.are_seen]
+    if not solution.success and not (seen and solution.stop is Stop.STALLED):
+        return NOT_CONVERGED, solution.message
+    if seen:
+        return MISSES, _missed(max(seen, key=lambda test: test.share), evidence)
+    doubts = [*_doubts(evidence, tests)]
+    if doubts:
+        return MATCHES, "; ".join(doubts)
+    return GOOD, "the residuals are noise, and every parameter is determined"
+
+
+def _no_match(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
+    """Yield the signals that the response matches no better than a constant would.
+
+    The signal that a record is judged by counts as it is; another where what is left can be seen.
+    """
+    seen = {(test.record, test.signal) for test in tests if test.are_seen}
+    for comparison in evidence.comparisons:
+        judged = comparison.judged_by
+        signals = [judged, *(signal for signal in comparison.channels if signal != judged)]
+        for signal in signals:
+            counts = signal == judged or (comparison.name, signal) in seen
+            if counts and not comparison.channels[signal].describes:
+                yield _how_it_fails(comparison, signal, evidence)
+
+
+def _how_it_fails(comparison: Comparison, signal: str, evidence: Evidence) -> str:
+    where = _label(comparison.name, signal, evidence)
+    if correlation(comparison.overlays[signal]) < OTHER_WAY:
+        return f"the response goes the other way{f' ({where})' if where else ''}"
+    what = where or "the record"
+    return f"the response matches {what} no better than a constant would"
+
+
+def correlation(overlay: Overlay) -> float:
+    """Return the correlation of a response with its record; 0 where one of them does not move."""
+    compared = np.isfinite(overlay.error)
+    measured, simulated = overlay.measured[compared], overlay.simulated[compared]
+    measured, simulated = measured - np.mean(measured), simulated - np.mean(simulated)
+    size = float(np.linalg.norm(measured) * np.linalg.norm(simulated))
+    return float(measured @ simulated) / size if size else 0.0
+
+
+def _missed(test: ResidualTests, evidence: Evidence) -> str:
+    signal = _label(test.record, test.signal, evidence) or test.signal
+    share, times = digits(100.0 * test.share), digits(test.times)
+    return f"{signal} is off by {share} % of its range (rmse {times} x noise)"
+
+
+def _label(record: str, signal: str, evidence: Evidence) -> str:
+    """Return which signal is meant, "" where there is no other."""
+    several = len(evidence.records) > 1
+    if not several and len(evidence.residuals.channels) == 1:
+        return ""
+    return f"{signal} of {record}" if several else signal
+
+
+def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
+    """Yield what keeps a fit that matches from being good."""
+    undetermined = evidence.undetermined
+    if undetermined:
+        verb = "is" if len(undetermined) == 1 else "are"
+        yield f"{len(undetermined)} of {len(evidence.own)} parameters {verb} not determined"
+    elif evidence.without_profile:
+        yield "intervals are missing, which linear theory does not give"
+    for match in evidence.validation:
+        if not match.accepted:
+            yield f"{match.name} is not accepted"
+    if evidence.typical_values:
+        yield f"typical values matter: {first_of([*evidence.typical_values])}"
+    if evidence.averages is not None and evidence.averages.matters:
+        yield evidence.averages.reason
+    yield from _not_noise(tests, evidence)
+    if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
+        yield "the search ended before a minimum"
+
+
+def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[str]:
+    """Yield which residuals are not noise, or more of it than their record has."""
+
+    def signals(chosen: Iterable[ResidualTests]) -> str:
+        return listed([_label(t.record, t.signal, evidence) or t.signal for t in chosen])
+
+    coloured = [test for test in tests if not test.are_white]
+    larger = [test for test in tests if test.are_white and not test.are_noise]
+    if coloured:
+        yield f"the residuals of {signals(coloured)} are not noise"
+    if larger:
+        yield f"the residuals of {signals(larger)} exceed the scatter of the record"
+
+
+def _undetermined(evidence: Evidence) -> Iterator[Cause]:
+    """Yield which parameters the records do not determine."""
+    names = evidence.undetermined
+    if len(names) == 1:
+        remedy = "fix it if it is known, or plan a test that shows it (`exfit identify`)"
+        yield Cause(f"{names[0]} is not determined", remedy)
+    elif names:
+        remedy = "fix those that are known, or plan a test that shows them (`exfit identify`)"
+        yield Cause(f"{listed(names)} are not determined", remedy)
+    if evidence.without_profile:
+        cause = (
+            f"linear theory does not hold over the intervals of {listed(evidence.without_profile)}"
+        )
+        yield Cause(cause, "fit with the default search, or use `exfit profile`")

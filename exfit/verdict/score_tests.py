@@ -1,0 +1,278 @@
+"""Whether a record contradicts what its case holds fixed: a score test of each such value."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import erfc, exp, hypot, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import SimulationError
+from exfit.features.events.driving_noise.weighing import BIAS_KNOWN_TO, shift_of, without_bias
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
+from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.uncertainty import slopes_of
+from exfit.inference.wording import digits, listed
+from exfit.plants import REFERENCES, VT0
+from exfit.results.intervals.typical_values import parameters_of
+from exfit.results.verdict import REJECTED, Cause
+from exfit.simulation.inputs import InputStep
+from exfit.verdict.causes import Evidence
+from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
+from exfit.verdict.causes.linear import LinearFit, blocks, linear_model, moving
+from exfit.verdict.causes.steps import correct_instant, correct_step
+from exfit.verdict.causes.trials import Opened, freed_within, with_freed, with_opened
+from exfit.verdict.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
+
+Array = NDArray[np.float64]
+
+SAME = 1e-6  # of a direction: what other parameters leave of it is rounding below
+LEAST_SHARE = 0.5  # of the largest chi-square: what has less is explained by that
+SMALL = 0.1  # change of a logarithm that is given in per cent
+LARGEST_CHANGE = log(LARGEST_FACTOR)  # of a logarithm: no given value is farther off
+
+
+@dataclass(frozen=True)
+class Held:
+    """A value that a case holds fixed, or one that it takes from the record (``words`` empty).
+
+    ``size`` is by how much it is changed for a derivative; without ``unit`` that is its own size.
+    ``rare`` is by how much (log-likelihood) it is less often wrong than other values. ``std_error``
+    is that of the value as the case gives it, of its size.
+    """
+
+    words: str = ""
+    remedy: str = ""
+    size: float = 1.0
+    unit: str = ""
+    rare: float = 0.0
+    std_error: float = 0.0
+
+    def better(self, change: float) -> str:
+        """Return which change would match better."""
+        if self.unit == "s":
+            return f"{1e3 * abs(change):.2g} ms {'later' if change > 0.0 else 'earlier'}"
+        if self.unit:
+            return f"{change:+.2g} {self.unit}"
+        if abs(change) < SMALL:
+            return f"{digits(100.0 * abs(change))} % {'more' if change > 0.0 else 'less'}"
+        return f"{exp(change):.2g} times"
+
+
+class Contradiction(NamedTuple):
+    """A value that the record contradicts: chi-square, and which change would match better."""
+
+    chi_square: float
+    held: Held
+    change: float
+
+    @property
+    def reason(self) -> str:
+        """What the record contradicts, and how much."""
+        return f"the record contradicts {self.held.words} (chi-square {digits(self.chi_square)})"
+
+    @property
+    def cause(self) -> Cause:
+        """What would match better, and what to do."""
+        better = self.held.better(self.change)
+        return Cause(f"{self.held.words}: {better} would match better", self.held.remedy)
+
+    @property
+    def likelihood(self) -> float:
+        """How likely it is that this value is wrong: by the record, and beforehand."""
+        return 0.5 * self.chi_square - self.held.rare
+
+
+def contradictions(evidence: Evidence) -> list[Contradiction]:
+    """Return what the record contradicts of what its case holds fixed, the likeliest first.
+
+    The residuals are projected on what a value does that the free parameters cannot do, in their
+    own variances: chi-square of one degree of freedom, if the value is right. It may be exceeded
+    with 1 %, divided by the number of values (Bonferroni). A value that is given with a standard
+    error may be off by that as well.
+
+    Where the errors are weighed by the noise of what drives the simulation, the bias that it has
+    by each value is taken out, too; it is as uncertain as the variance of that noise.
+
+    Source: Rao 1948, the score test (Proc. Camb. Phil. Soc. 44, 50-57).
+    """
+    if evidence.uncertainty is None:
+        return []
+    try:
+        linear, directions, shift = _linearised(evidence)
+    except SimulationError:
+        return []
+    spread = _spread(evidence)
+    scores = [
+        score
+        for held, direction in directions
+        if (score := _score(held, direction, linear, spread, shift)) is not None
+    ]
+    rejected = [each for each in scores if _tail(each.chi_square) * len(scores) < REJECTED]
+    largest = max((each.chi_square for each in rejected), default=0.0)
+    rejected = [each for each in rejected if each.chi_square > LEAST_SHARE * largest]
+    return sorted(rejected, key=lambda each: -each.likelihood)
+
+
+def _tail(chi_square: float) -> float:
+    return erfc(sqrt(0.5 * chi_square))
+
+
+def _spread(evidence: Evidence) -> Array:
+    """Return the standard deviation (M,) of the weighted errors, widened if they are not white."""
+    noises = evidence.uncertainty.confidence.noise if evidence.uncertainty else ()
+    spreads = [
+        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
+        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
+    ]
+    return np.repeat(spreads, evidence.residuals.sizes)
+
+
+def _score(
+    held: Held, direction: Array, linear: LinearFit, spread: Array, shift: Array
+) -> Contradiction | None:
+    """Return the test of a value; None where it does nothing, or only an unlikely change would.
+
+    ``shift`` (M,) was taken from the errors for the bias by the noise of what drives.
+    """
+    own = linear.beyond(direction)
+    square = float(own @ own)
+    if not square > (SAME**2) * float(direction @ direction):
+        return None
+    by_bias = BIAS_KNOWN_TO * float(own @ shift)
+    by_noise = float(np.linalg.norm(spread * own))
+    error = hypot(by_noise / square, by_bias / square, held.std_error)
+    change = -float(own @ linear.errors) / square
+    if not held.unit and max(error, abs(change)) > LARGEST_CHANGE:
+        return None
+    return Contradiction((change / error) ** 2, held, change)
+
+
+def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]], Array]:
+    """Return the linear model, and what each value that the case holds fixed does to the errors.
+
+    All derivatives are taken at once. A voltage that the test takes from the record is as uncertain
+    as a parameter.
+    """
+    extended, of_test, fixed = _left_open(evidence)
+    count = len(evidence.solution.x)
+    added = extended.free[count:]
+    theta = np.append(evidence.solution.x, extended.start[count:])
+    if evidence.weighed_by_noise:
+        extended, _ = without_bias(extended, theta)
+    errors, slopes = extended.errors(theta)
+    own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
+    column = {free.name: each for free, each in zip(added, others.T, strict=True)}
+    directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
+    for names in _together([*fixed]):
+        direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
+        directions.append((_held_value(evidence, names), direction))
+    directions = [each for each in directions if np.isfinite(each[1]).all()]
+    from_record = [direction for held, direction in directions if not held.words]
+    known = np.column_stack([own[:, moving(evidence)], *from_record])
+    influence, _ = evidence.residuals.influence(errors)
+    tested = [each for each in directions if each[0].words]
+    tested.extend(_of_channels(evidence, errors))
+    return linear_model(influence, known), tested, shift_of(extended)
+
+
+def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, float]]:
+    """Return residuals that leave open what is tested: that of the tests first, fixed values."""
+    extended, of_test = evidence.residuals, list[Held]()
+    for number in range(len(evidence.records)):
+        for held, opened in _of_test(evidence, number):
+            extended = with_opened(extended, number, [opened])
+            of_test.append(held)
+    fixed = _acting(evidence)
+    freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
+    return with_freed(extended, freed), of_test, fixed
+
+
+def _acting(evidence: Evidence) -> dict[str, float]:
+    """Return the fixed values of the unit that its responses depend on, but for zeros."""
+    rows, used = evidence.case.rows(), parameters_of(evidence.case)
+    return {
+        name: value
+        for name, value in evidence.residuals.fixed.items()
+        if value and name in rows and name in used
+    }
+
+
+def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Yield names, those of a saturation as one: they come from the same curve."""
+    saturation = tuple(name for name in SATURATION if name in names)
+    if saturation:
+        yield saturation
+    yield from ((name,) for name in names if name not in saturation)
+
+
+def _held_value(evidence: Evidence, names: Sequence[str]) -> Held:
+    """Return the test of fixed values; those of a curve err as the one that errs most."""
+    fixed, std_errors = evidence.residuals.fixed, evidence.case.std_errors()
+    words = listed([f"{name} = {fixed[name]:.4g}" for name in names])
+    return Held(
+        words,
+        remedy_of(evidence.case, {name: fixed[name] for name in names}),
+        rare=0.0 if of_machine(names) else RARE,
+        std_error=max(std_errors.get(name, 0.0) / abs(fixed[name]) for name in names),
+    )
+
+
+def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
+    """Yield the steps of a test, their delay, and the voltage that it starts from."""
+    experiment, of_record = evidence.residuals.experiments[number], evidence.name_of(number)
+    found = {(nuisance.kind, nuisance.step) for nuisance in experiment.nuisances}
+    kinds = {kind for kind, _ in found}
+
+    def opened(kind: NuisanceKind, value: float, step: int = 0) -> Opened:
+        nuisance = Nuisance(f"held{number}.{kind}{step}", kind, step)
+        return Opened(nuisance, value, value - 1.0, value + 1.0)
+
+    steps = _steps_of_test(evidence, experiment)
+    for place, step in enumerate(steps):
+        if step.step and ("step", place) not in found:
+            words = f"the step of {step.step:+g} pu{of_record}"
+            yield (
+                Held(words, correct_step([step.step]), step.step),
+                opened("step", step.step, place),
+            )
+    if not kinds & {"at", "shift", "delay"} and steps:
+        remedy = correct_instant(experiment.simulator.delay)
+        held = Held(f"the instant of the step{of_record}", remedy, unit="s")
+        yield held, opened("delay", experiment.simulator.delay)
+    if VT0 in experiment.own and "vt0" not in kinds:
+        given = evidence.records[number].given_vt0
+        voltage = Held(f"vt0 = {given:g}{of_record}", LEAVE_VT0_OUT, unit="pu") if given else Held()
+        yield voltage, opened("vt0", experiment.own[VT0])
+
+
+def _steps_of_test(evidence: Evidence, experiment: Experiment) -> tuple[InputStep, ...]:
+    """Return the steps that a test makes; the others of an event are jumps of what is recorded."""
+    steps = experiment.simulator.inputs.steps
+    if not evidence.case.kind.finds_rest:
+        return steps
+    return tuple(step for step in steps if step.signal in REFERENCES)
+
+
+def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Array]]:
+    """Yield scale and offset of each channel, by what is simulated: a record has noise.
+
+    None of errors that the noise of what drives weighs: what is simulated has that noise, too.
+    """
+    if evidence.weighed_by_noise:
+        return
+    for number, places in enumerate(blocks(evidence)):
+        experiment = evidence.residuals.experiments[number]
+        for channel, rows in zip(experiment.channels, places, strict=True):
+            place = f"{channel.signal}{evidence.name_of(number)}"
+            measured = experiment.measured(channel, evidence.values)
+            simulated, constant = np.zeros(len(errors)), np.zeros(len(errors))
+            simulated[rows] = -errors[rows] - channel.weight * channel.filtered(measured)
+            constant[rows] = -channel.weight
+            if not is_found(experiment, channel, "scale"):
+                rare = RARE if channel.signal == "vt" else 0.0
+                yield Held(f"the base of {place}", CHECK_BASE, rare=rare), simulated
+            if channel.signal != "vt" and not is_found(experiment, channel, "offset"):
+                yield Held(f"the zero of {place}", check_zero(channel), unit="pu"), constant

@@ -1,0 +1,320 @@
+"""What can be done with a case: the functions behind the commands and behind ``import exfit``."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit import estimate
+from exfit.case import load
+from exfit.case.case import Case
+from exfit.features.external.program import ExternalProgram
+from exfit.features.external.program_files import refuse_changed_program
+from exfit.features.external.setups import (
+    external_simulator,
+    program_of,
+    refuse_without_equations,
+    simulated_by,
+    simulation_by_twin_notes,
+)
+from exfit.fitting.build import build_experiment, plain_simulator
+from exfit.fitting.recordings import read_section
+from exfit.fitting.search import checked_strategy, search_options
+from exfit.fitting.setup import with_enough_substeps
+from exfit.fitting.system import values_of
+from exfit.records.record import Record
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult, Iteration
+from exfit.simulation.simulator import Response
+from exfit.util.versions import versions
+from exfit.verdict.diagnostics import rest_notes, simulation_notes
+from exfit.workflows.fit_run import FitRequest, fit_result
+from exfit.workflows.given_values import ValuesOrResult, changes_of, with_values
+from exfit.workflows.iteration_responses import LiveResponse
+
+if TYPE_CHECKING:
+    from exfit.features.design.experiment_design import Design
+    from exfit.results.validation_result import ValidationResult
+    from exfit.workflows.model_check import Check
+    from exfit.workflows.profiles import Profiles
+
+Array = NDArray[np.float64]
+CaseOrPath = Case | str | PathLike[str]
+
+
+def _ignore(_: object) -> None:
+    """Ignore a progress message."""
+
+
+def fit(
+    case: CaseOrPath,
+    strategy: str | None = None,
+    progress: Callable[[Iteration], None] = _ignore,
+    search_progress: Callable[[estimate.Progress], None] = _ignore,
+    live: Callable[[LiveResponse], None] | None = None,
+    values: ValuesOrResult | None = None,
+    search: str | None = None,
+) -> FitResult:
+    """Fit the free parameters of a case to its records, and validate the result on its others.
+
+    Args:
+        case: a case, or the path of its file.
+        strategy: of the descent from the start of the case; None: the case's own.
+        progress: called with every iteration of the path that leads from the start of the case to
+            the result. A KeyboardInterrupt, raised in it too, ends the search with the best point
+            so far.
+        search_progress: called with how far the search from further starts is.
+        live: called before ``progress`` with the response of that iteration.
+        values: in place of those of the case, by name, or those of an earlier fit: of a free
+            parameter its start. The result says which.
+        search: "global", or "local" for the descent from the start of the case alone, with the
+            intervals of linear theory; None: the case's own.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> result = exfit.fit("case.yaml", progress=lambda iteration: print(iteration.cost))
+        >>> result.parameters["KA"].value
+    """
+    case = with_values(loaded(case, values), values)
+    method = checked_strategy(strategy or case.estimate.strategy)
+    options = search_options(case, search)
+    with program_of(case) as program:
+        request = FitRequest(case, method, options, progress, search_progress, live)
+        return fit_result(request, program)
+
+
+def load_case(path: str | PathLike[str]) -> Case:
+    """Return the case of a YAML file.
+
+    Raises CaseError with all faults of the file, each as ``file:line: place: what is wrong``.
+    """
+    return load.load_case(Path(path))
+
+
+def read_record(
+    path: str | PathLike[str],
+    time: str | Sequence[str] | Mapping[str, str],
+    channels: Mapping[str, str | Mapping[str, Any]],
+    window: tuple[float, float] | None = None,
+    missing: bool = False,
+    sheet: str | None = None,
+    resample: float | None = None,
+    memory: float | None = None,
+) -> Record:
+    """Return the record of a recorder's file of any supported format, per unit.
+
+    Args:
+        path: the file.
+        time: column with the time, or the two of date and time of day, or {column, unit}.
+        channels: column of each signal, or the mapping that a case has there: {column, unit, base,
+            scale, offset} or {phases, kind, unit, base, connection}.
+        window: first and last instant kept, s.
+        missing: whether a sample may be missing: it becomes nan.
+        sheet: of a workbook.
+        resample: rate of a slower, even clock, Hz.
+        memory: what reading may take, GB; default: 1, or four times the file's size up to 4.
+
+    Raises CaseError for columns and units that are not given rightly, RecordError for the file.
+
+    Example:
+        >>> volts = {"column": "Ugen", "unit": "kV", "base": 15.75}
+        >>> record = exfit.read_record("bump.csv", ["Date", "Time"], {"vt": volts})
+    """
+    from exfit.case.record_section import record_section
+
+    file = {"file": Path(path), "sheet": sheet, "memory": memory, "resample": resample}
+    gaps = "skip" if missing else "refuse"
+    samples = {"time": time, "channels": channels, "window": window, "gaps": gaps}
+    given = {key: value for key, value in (file | samples).items() if value is not None}
+    return read_section(record_section(given), Path(), per_unit=True)
+
+
+def loaded(case: CaseOrPath, values: ValuesOrResult | None = None) -> Case:
+    """Return a case, read from its file where it is a path, whose own model is that of a fit.
+
+    So is the program that simulates it.
+    """
+    hashes = values.inputs if isinstance(values, FitResult) else {}
+    if not isinstance(case, Case):
+        case = load.load_case(Path(case), hashes.get("model", ""))
+    refuse_changed_program(case, hashes.get("program", ""))
+    return case
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """A response of a case, with the record beside it where there is one."""
+
+    response: Response
+    comparison: Comparison | None
+    notes: tuple[str, ...]
+
+
+def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> SimulationResult:
+    """Simulate a case, with the test of its first record where it has several.
+
+    Args:
+        case: a case, or the path of its file.
+        values: of parameters, by name, or those of a fit; None: the start values of the case, which
+            also stand for what is not among them.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
+    """
+    case = loaded(case, values)
+    with program_of(case) as program:
+        return _simulated(case, values_of(case, changes_of(case, values)), program)
+
+
+def _simulated(
+    case: Case, values: Mapping[str, float], program: ExternalProgram | None
+) -> SimulationResult:
+    """Return a response of a case to values, simulated by a program where one is given."""
+    if case.recordings:
+        setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
+        if program is not None:
+            (setup,) = simulated_by(program, case, [setup])
+        response = setup.response(values)
+        comparison = compare_with_record(setup, "record", values) if setup.channels else None
+        notes = [] if comparison is None else rest_notes(setup, comparison)
+        at = setup.experiment.parameters(setup.with_start_values(values))
+        simulator = setup.experiment.with_inputs(setup.with_start_values(values))
+        simulated = simulation_notes(case, simulator, at, response)
+        by_twin = simulation_by_twin_notes(case, simulator, response.signals)
+        left_out = setup.record.notes
+        return SimulationResult(response, comparison, (*left_out, *simulated, *notes, *by_twin))
+    simulator, levels = plain_simulator(case, values)
+    at = {**values, **levels}
+    simulator = with_enough_substeps(simulator, at, case.path)
+    if program is not None:
+        simulator = external_simulator(program, case, simulator)
+    response = simulator.response(at)
+    notes = simulation_notes(case, simulator, at, response)
+    by_twin = simulation_by_twin_notes(case, simulator, response.signals)
+    return SimulationResult(response, None, (*notes, *by_twin))
+
+
+def validate(
+    case: CaseOrPath,
+    values: ValuesOrResult,
+    record: Record | Path | str | None = None,
+    step: float | Sequence[float] = (),
+    at: float | Sequence[float] = (),
+) -> list[Comparison]:
+    """Compare a case with its records: the fitted ones first, then those that no fit saw.
+
+    Those that no fit saw are judged: ``accepted``, or the ``reason`` why not.
+
+    Args:
+        case: a case, or the path of its file.
+        values: of parameters, by name, or those of a fit.
+        record: in place of all records that no fit saw: a record, or a file with the columns of
+            the first of them, or of the fitted one where there is no other. Its steps are found in
+            it: ``steps`` of the comparison says which.
+        step: size of its step, pu, in place of the one found; of several steps one for each.
+        at: instant of its step, s, in place of the one found; of several steps one for each.
+
+    Raises ExfitError for input that cannot be used, or where there is nothing to validate on.
+
+    Example:
+        >>> result = exfit.fit("case.yaml")
+        >>> [match.rmse for match in exfit.validate("case.yaml", result)]
+        >>> exfit.validate("case.yaml", result, "down.csv")[-1].accepted
+    """
+    from exfit.workflows import validation
+
+    case = loaded(case, values)
+    with program_of(case) as program:
+        return validation.validate(case, values, record, step, at, program).comparisons
+
+
+def validation_result(
+    case: CaseOrPath,
+    values: ValuesOrResult | None,
+    record: Record | Path | str | None = None,
+    step: float | Sequence[float] = (),
+    at: float | Sequence[float] = (),
+    sources: Mapping[str, str] | None = None,
+) -> "ValidationResult":
+    """Compare a case with its records as `validate` does, with all that a report shows of it.
+
+    Without ``values`` they are those of the model as found, or else the start values: no record was
+    fitted then. ``sources`` says where values come from that are given by name.
+    """
+    from exfit.workflows import validation
+    from exfit.workflows.descriptions.validation_description import validation_result
+
+    if isinstance(values, FitResult):
+        sources = values.sources
+    case = loaded(case, values)
+    with program_of(case) as program:  # it runs the model as found, too
+        compared = validation.validate(case, values, record, step, at, program)
+        return validation_result(compared, versions(), sources or {})
+
+
+def profile(
+    case: CaseOrPath,
+    names: str | Iterable[str] = (),
+    progress: Callable[[estimate.Progress], None] = _ignore,
+) -> "Profiles":
+    """Fit a case and find the 95 % intervals of its parameters from their profile likelihood.
+
+    Args:
+        case: a case, or the path of its file.
+        names: of free parameters, or of one; none: all.
+        progress: called with how far the profiles are.
+
+    An interruption keeps what is done of the profiles; one of the fit before them is passed on.
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> for profile in exfit.profile("case.yaml", ["KA"]).profiles:
+        ...     print(profile.name, profile.low, profile.high)
+    """
+    from exfit.workflows import profiles
+
+    names = [names] if isinstance(names, str) else names
+    case = loaded(case)
+    with program_of(case) as program:
+        return profiles.profile(case, names, progress, program)
+
+
+def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Design":
+    """Return how well tests would determine the free parameters of a case, at its start values.
+
+    Args:
+        case: a case, or the path of its file; it needs no record.
+        noise: standard deviation of the noise by signal, per unit; what is missing: the case's
+            own, else that of its record, else a typical one.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
+    """
+    from exfit.features.design import experiment_design
+
+    case = loaded(case)
+    refuse_without_equations(case, "identify")
+    return experiment_design.identify(case, noise or {})
+
+
+def check(case: CaseOrPath) -> "Check":
+    """Check a case before its fit: derivatives, bypasses, sub-steps, a run without a step.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.workflows.check("case.yaml").agrees
+    """
+    from exfit.workflows import model_check
+
+    return model_check.check(loaded(case))

@@ -1,0 +1,170 @@
+"""A fit from its case to its result: what `exfit.fit` and the command do."""
+
+import time as clock
+from collections.abc import Callable
+from typing import NamedTuple
+
+from exfit import estimate
+from exfit.case.case import Case
+from exfit.case.schema import Estimate
+from exfit.features.external.description import other_program_of
+from exfit.features.external.program import ExternalProgram
+from exfit.features.external.setups import LINEAR_ALONE, program_notes, simulated_by
+from exfit.fitting.build import build_experiment
+from exfit.fitting.search import fitted
+from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.results.intervals.minima import minima_notes, minima_of
+from exfit.results.model import FitResult, Iteration
+from exfit.util.versions import versions
+from exfit.verdict import verdict_of
+from exfit.verdict.causes import Pace
+from exfit.verdict.causes.pace import time_for_causes
+from exfit.workflows.case_search import SearchTask, search_outcome, with_lines
+from exfit.workflows.descriptions.case_description import (
+    criteria_of,
+    fixed_values,
+    identified_values,
+    input_hashes,
+    input_names,
+    of_limiters,
+    parts_of,
+    tests_of,
+    text_of,
+    values_by_part,
+)
+from exfit.workflows.given_values import given_values
+from exfit.workflows.iteration_responses import LiveResponse, live_response
+from exfit.workflows.solution import (
+    analysed,
+    comparisons_of,
+    evidence_of,
+    fit_notes,
+    fitted_parameters,
+    iteration_of,
+    without_intervals,
+)
+
+
+class FitRequest(NamedTuple):
+    """What is fitted, how, and what is called meanwhile; see `exfit.fit`."""
+
+    case: Case
+    method: str
+    options: Estimate
+    progress: Callable[[Iteration], None]
+    search_progress: Callable[[estimate.Progress], None]
+    live: Callable[[LiveResponse], None] | None
+
+
+def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResult:
+    """Return the result of a fit, simulated by a program where one is given."""
+    began = clock.perf_counter()
+    timer = _timer(program)
+    search_began = timer()
+    case, method, options, progress, search_progress, live = request
+    start = case.values()
+    setups, problem = fitted(case, program)
+    counter = SimulationCounter()
+    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
+    if program is not None:
+        unseen = simulated_by(program, case, unseen)
+    used = [*setups, *unseen]
+    # before the search: whoever edits the case meanwhile changes nothing of this fit
+    hashes, case_text = input_hashes(case, used), text_of(case)
+    task = SearchTask(case, setups, unseen, method, options, counter)
+    task, problem, line_notes = with_lines(task, problem, search_progress)
+    residuals = problem.residuals
+
+    def announce(line: estimate.SolverIteration) -> None:
+        response = None if live is None else live_response(task.setups[0], residuals, line.x)
+        if live is not None and response is not None:
+            live(response)
+        progress(iteration_of(line, residuals))
+
+    outcome = search_outcome(task, problem, announce, search_progress)
+    problem, setups, unseen, found, determined = outcome
+    residuals = problem.residuals
+    best = found.best
+    history = [iteration_of(line, residuals) for line in found.history]
+    values = residuals.values(best.x)
+    fine = [setup.with_enough_substeps(values) for setup in setups]
+    comparisons = comparisons_of(fine, residuals, values, history)
+    analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
+    walked = problem.compressed if program is None else None
+    minima = minima_of(residuals, found, analysis.uncertainty, walked)
+    interrupted = analysis.interrupted or found.interrupted
+    pace = Pace(time_for_causes(options.causes, timer() - search_began), search_progress, timer)
+    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted, pace)
+    verdict = verdict_of(evidence)
+    noted = [*minima_notes(residuals, found, minima, analysis.uncertainty)]
+    analysis = without_intervals(analysis, verdict.no_interval)
+    own_values = values_by_part(case, values)
+    models = {part.kind: part.name for part in case.parts.all}
+    parameters = fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why)
+    identified = identified_values(parameters, analysis.validation)
+    return FitResult(
+        case=case.path,
+        about=case.about,
+        model=case.subject,
+        strategy=method,
+        saturation=case.saturation,
+        parameters=parameters,
+        ties={name: tie.text for name, tie in case.ties.by_name.items()},
+        fixed=fixed_values(case, values),
+        machine=own_values.get("machine", {}),
+        machine_model=models.get("machine"),
+        network=own_values.get("network", {}),
+        network_model=models.get("network"),
+        stabiliser=own_values.get("stabiliser", {}),
+        stabiliser_model=models.get("stabiliser"),
+        governor=own_values.get("governor", {}),
+        governor_model=models.get("governor"),
+        limiters=of_limiters(case, own_values),
+        limiter_models=of_limiters(case, models),
+        cost=best.cost,
+        comparisons=comparisons,
+        knowledge=analysis.uncertainty,
+        minima=minima,
+        status=best.status,
+        message=best.message,
+        success=best.success,
+        interrupted=interrupted or pace.interrupted,
+        phase_ends=analysis.phase_ends,
+        history=tuple(history),
+        nfev=best.nfev,
+        njev=best.njev,
+        simulations=counter.simulations if program is None else program.counts.runs,
+        substeps=counter.substeps,
+        seconds=clock.perf_counter() - began,
+        notes=(
+            *found.notes,
+            *line_notes,
+            *noted,
+            *fit_notes(case, residuals, best, setups, comparisons, analysis),
+            *([] if program is None else program_notes(case, program, [*setups, *unseen])),
+            *([LINEAR_ALONE] if case.has_no_equations else []),
+            *filter(None, [pace.sentence]),
+        ),
+        validation=analysis.validation,
+        versions=versions(),
+        inputs=hashes,
+        verdict=verdict,
+        given_values=given_values(case),
+        typical_values=analysis.typical_values,
+        windows=analysis.windows,
+        sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
+        strategy_given=method != case.estimate.strategy,
+        parts=tuple(parts_of(case)),
+        tests=tuple(tests_of(case, used, identified)),
+        behaviour=analysis.behaviour,
+        files=input_names(case, used),
+        case_text=case_text,
+        as_found=analysis.as_found,
+        criteria=criteria_of(case),
+        other_program=other_program_of(case, program, [*setups, *unseen]),
+    )
+
+
+def _timer(program: ExternalProgram | None) -> Callable[[], float]:
+    """Return the clock of a fit: of its processor, but for a program that runs beside it."""
+    return clock.process_time if program is None else clock.perf_counter

@@ -1,0 +1,166 @@
+"""Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.errors import ExfitError
+from exfit.features.events.before_fit import event_warnings
+from exfit.features.external.fmu_setups import own_value_notes
+from exfit.features.external.setups import differences_of_program
+from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.problem import free_parameters
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.setup import ExperimentSetup
+from exfit.models.blocks import SHORTEST
+from exfit.signals import OF_FLAT_RUN
+from exfit.simulation.inputs import Inputs
+from exfit.simulation.simulator import Simulator
+from exfit.verdict.causes.before_fit import case_warnings, record_warnings
+from exfit.verdict.causes.run_quality import unstable_rest_notes
+from exfit.verdict.diagnostics import diagram_notes, search_range_notes, typical_notes
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
+AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
+COLUMN_ROUNDING = 1e-12  # of the largest column
+SMALLEST_COLUMN = float(np.finfo(float).tiny)
+FLAT_SECONDS = 60.0
+FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
+FLAT_DRIFT = 1e-9  # pu
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a check found.
+
+    ``deviations`` holds, for each free parameter, the largest difference between the exact column
+    of the Jacobian and the central difference at each of STEPS, relative to the column's largest
+    element; ``step_error`` is by how much halving every step moves the response (pu). ``warnings``
+    are what to correct before a fit. ``from_program`` is by how much, at most and per unit, another
+    program differs from its twin, by record, by signal; or from the record where it has no twin:
+    then it has no equations either, and nothing else but the notes holds.
+    """
+
+    deviations: Mapping[str, tuple[float, ...]]
+    bypassed: tuple[str, ...]
+    substeps: int
+    step: float
+    step_error: float
+    drift: float
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    from_program: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    has_equations: bool = True
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every column agrees with its best central difference."""
+        return all(min(quotients) <= AGREEMENT for quotients in self.deviations.values())
+
+    @property
+    def flat(self) -> bool:
+        """Whether a run without a step stays where it starts."""
+        return self.drift <= FLAT_DRIFT
+
+
+def check(case: Case) -> Check:
+    """Check a case at its start values; raises ExfitError for input that cannot be used."""
+    of_events = tuple(event_warnings(case))
+    if case.recordings:
+        setups = _ready(case, of_events)
+        experiments = [setup.experiment for setup in setups]
+    else:
+        setups, experiments = (), [planned(case)]
+    free = free_parameters(case, setups)
+    names = {parameter.name for parameter in free}
+    values = {**{parameter.name: parameter.start for parameter in free}, **case.values()}
+    fixed = {name: value for name, value in values.items() if name not in names}
+    drift, error = 0.0, 0.0
+    for experiment in experiments:
+        simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        signals = experiment.signals or OF_FLAT_RUN
+        drift = max(drift, flat_drift(simulator, at, signals))
+        error = max(error, simulator.step_error(at, signals))
+    first = experiments[0].simulator
+    at = experiments[0].parameters(values)
+    return Check(
+        deviations=_deviations(case, Residuals(experiments, free, fixed, case.ties)),
+        bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
+        substeps=max(
+            experiment.simulator.substeps(experiment.parameters(values))
+            for experiment in experiments
+        ),
+        step=first.step,
+        step_error=error,
+        drift=drift,
+        notes=(
+            *typical_notes(case, case.values()),
+            *diagram_notes(case),
+            *search_range_notes(case),
+            *own_value_notes(case),
+            *(note for setup in setups for note in setup.record.notes),
+            *dict.fromkeys(_rest_notes(experiments, values)),
+        ),
+        warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
+        has_equations=not case.has_no_equations,
+        from_program=differences_of_program(case, setups, values),
+    )
+
+
+def _deviations(case: Case, residuals: Residuals) -> dict[str, tuple[float, ...]]:
+    return {} if case.has_no_equations else deviations(residuals)
+
+
+def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
+    """Return the tests of a case at its values; a fault follows what is wrong with the records."""
+    try:
+        return tuple(
+            setup.with_enough_substeps(setup.with_start_values(case.values()))
+            for setup in build_experiments(case)
+        )
+    except ExfitError as fault:
+        if not warnings:
+            raise
+        raise ExfitError("\n".join([*warnings, str(fault)])) from fault
+
+
+def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[str]:
+    for experiment in experiments:
+        simulator = experiment.with_inputs(values)
+        yield from unstable_rest_notes(simulator, experiment.parameters(values))
+
+
+def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
+    """Return how far signals stray from their start (pu) in FLAT_SECONDS without any change.
+
+    ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
+    is no rest.
+    """
+    still = Simulator(simulator.system, Inputs(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
+    flat, _ = still.samples(values, tuple(signals))
+    return float(np.max(np.abs(flat - flat[0])))
+
+
+def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:
+    """Compare the exact Jacobian with central differences at the start, column by column."""
+    if not residuals.free:
+        return {}
+    start = residuals.start
+    exact = residuals.exact(start)
+    sizes = np.max(np.abs(exact), axis=0)
+    # a column of rounding errors belongs to a parameter without effect
+    sizes = np.maximum(sizes, COLUMN_ROUNDING * max(float(np.max(sizes)), SMALLEST_COLUMN))
+    rows = [
+        np.max(np.abs(residuals.differences(start, -h, h) - exact), axis=0) / sizes for h in STEPS
+    ]
+    return {
+        parameter.name: tuple(float(row[k]) for row in rows)
+        for k, parameter in enumerate(residuals.free)
+    }

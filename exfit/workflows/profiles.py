@@ -1,0 +1,304 @@
+"""The profile likelihood of a case's parameters: how far each can move if the others follow."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, isinf
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit import estimate
+from exfit.case.case import Case
+from exfit.errors import CaseError
+from exfit.features.external.program import ExternalProgram
+from exfit.features.external.setups import program_notes, settled, with_setups
+from exfit.fitting.build import build_experiment
+from exfit.fitting.channel_weights import as_fitted
+from exfit.fitting.global_search import SearchResult
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import fitted, names_of_records
+from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
+from exfit.inference import LEVEL, Interval
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.intervals.profile_hull import (
+    FoundMinimum,
+    ProfilesAboutMinima,
+    limits_of,
+    other_minima,
+    profiles_about,
+    reasons,
+)
+from exfit.results.verdict import Verdict
+from exfit.util.text import error_of_interval, near, rounded_value
+from exfit.verdict import verdict_alone
+from exfit.verdict.causes import Evidence, FittedRecord
+from exfit.verdict.diagnostics import search_range_notes
+from exfit.workflows.case_search import SearchTask, weighed_search, with_lines
+
+Array = NDArray[np.float64]
+
+LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
+LOWER_BY_TWIN = (
+    "the profiles led to a lower cost of the corrected twin, which the program need not have: a "
+    "fit from there shows whether it has"
+)
+ENCLOSED = "the intervals enclose another minimum, which the record does not refute"
+MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
+
+POINTS = 5  # of a side: enough for a smooth figure
+
+
+class Branch(NamedTuple):
+    """The profile about another minimum: values (K,) of the parameter, and the least costs (K,)."""
+
+    at: Array
+    costs: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The least cost (K,) for given values ``at`` (K,) of a parameter, the others fitted anew.
+
+    ``low`` and ``high`` end the interval, None where the cost does not rise as far before what
+    ``ends`` says: at the ends of the interval the cost is ``rise`` above the minimum.
+    ``linear`` is the interval of the linear theory, if it has one. ``others`` are profiles about
+    other minima that the record does not refute: the interval encloses theirs. ``min`` and ``max``
+    are the bounds.
+    """
+
+    name: str
+    unit: str
+    value: float
+    at: Array
+    costs: Array
+    low: float | None
+    high: float | None
+    ends: tuple[str, str]
+    rise: float
+    linear: Interval | None
+    others: tuple[Branch, ...] = ()
+    min: float = -inf
+    max: float = inf
+
+    def rounded(self, number: float | None) -> str:
+        """Return the value, or an end of an interval, as tables print it: within the bounds.
+
+        It has the digits that its interval allows, or else the linear one.
+        """
+        error = error_of_interval(self.low, self.high)
+        if error is None and self.linear is not None:
+            error = error_of_interval(*self.linear)
+        return rounded_value(number, error, self.min, self.max)
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Profiles of some parameters about the minimum ``cost``, with the ``verdict`` on the fit.
+
+    Where the response misses the records, or does not match them, no profile has an interval.
+    """
+
+    name: str
+    cost: float
+    profiles: tuple[Profile, ...]
+    notes: tuple[str, ...]
+    interrupted: bool
+    verdict: Verdict
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures."""
+        return {
+            "cost": self.cost,
+            "verdict": self.verdict.verdict,
+            "level": LEVEL,
+            "interrupted": self.interrupted,
+            "notes": list(self.notes),
+            "parameters": {
+                profile.name: {
+                    "value": profile.value,
+                    "low": profile.low,
+                    "high": profile.high,
+                    "ends": list(profile.ends),
+                    "rise": profile.rise,
+                    "linear": profile.linear,
+                    "at": profile.at.tolist(),
+                    "costs": profile.costs.tolist(),
+                    "others": [
+                        {"at": branch.at.tolist(), "costs": branch.costs.tolist()}
+                        for branch in profile.others
+                    ],
+                }
+                for profile in self.profiles
+            },
+        }
+
+
+def profile(
+    case: Case,
+    names: Iterable[str] = (),
+    progress: Callable[[estimate.Progress], None] = lambda _: None,
+    program: ExternalProgram | None = None,
+) -> Profiles:
+    """Fit a case and return the profiles of some of its free parameters, all by default.
+
+    ``progress`` is called with how far it is; an interruption keeps what is done of the profiles,
+    one of the fit before them is passed on. Where a ``program`` simulates the case its corrected
+    twin has the profiles, or, without a twin, the program itself. Raises ExfitError for input that
+    cannot be used.
+
+    Source: Venzon & Moolgavkar 1988.
+    """
+    setups, problem = fitted(case, program)
+    names = tuple(names)
+    if not any(setup.automatic_sines for setup in setups):  # else more may become free
+        _indices(case, problem.residuals, names)
+    setups, problem, found = _found(case, setups, problem, progress)
+    verdict = _verdict(case, setups, problem, found)
+    by_twin = program is not None and not case.has_no_equations
+    if by_twin:
+        setups, problem = _by_twin(setups, problem, found.best.x)
+    wanted = _indices(case, problem.residuals, names)
+    residuals, records, others = problem.compressed, names_of_records(setups), other_minima(found)
+    x = found.best.x
+    for _ in range(MOST_MINIMA):
+        uncertainty = uncertainty_at(problem, x, records)
+        rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
+        solution = FoundMinimum(x, estimate.half_square(residuals(x)))
+        profiles = profiles_about(residuals, solution, others, rises, POINTS, progress)
+        if profiles.lower is None or profiles.interrupted or by_twin:
+            break
+        x = profiles.lower  # its residuals, and so the rise, are others
+    first = next(iter(profiles.by_index.values()))[0]
+    return Profiles(
+        name=case.path.stem,
+        cost=first.cost,
+        profiles=tuple(
+            _profile(case, residuals, uncertainty, each, verdict)
+            for each in profiles.by_index.values()
+        ),
+        notes=(
+            *([f"no parameter has an interval: {verdict.misfit}"] if verdict.misfit else []),
+            *search_range_notes(case),
+            *_notes(found.best, profiles, by_twin),
+            *([] if program is None else program_notes(case, program, setups, "profiles")),
+        ),
+        interrupted=profiles.interrupted,
+        verdict=verdict,
+    )
+
+
+def _verdict(
+    case: Case, setups: Sequence[ExperimentSetup], problem: FitProblem, found: SearchResult
+) -> Verdict:
+    """Return what the fit comes to, without its causes."""
+    values = problem.residuals.values(found.best.x)
+    fine = [setup.with_enough_substeps(values) for setup in setups]
+    records = (
+        FittedRecord(recording.test, setup, compare_with_record(setup, setup.name, values))
+        for recording, setup in zip(case.recordings, fine, strict=True)
+    )
+    uncertainty = uncertainty_at(problem, found.best.x, names_of_records(setups))
+    return verdict_alone(Evidence(case, problem.residuals, found.best, tuple(records), uncertainty))
+
+
+def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:
+    """Return the indices of the named parameters among the free ones, all if none is named.
+
+    Raises CaseError for a name that is not free.
+    """
+    free = {parameter.name: index for index, parameter in enumerate(residuals.free)}
+    wanted = tuple(names) or tuple(free)
+    unknown = [name for name in wanted if name not in free]
+    if unknown:
+        raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
+    return {name: free[name] for name in wanted}
+
+
+def _found(
+    case: Case,
+    setups: tuple[ExperimentSetup, ...],
+    problem: FitProblem,
+    progress: Callable[[estimate.Progress], None],
+) -> tuple[tuple[ExperimentSetup, ...], FitProblem, SearchResult]:
+    """Return the tests and the problem of a case as they were searched, and that search.
+
+    Raises KeyboardInterrupt where it was interrupted.
+    """
+    options = case.estimate.to_the_minimum()
+    start, judged = case.values(), case.validations if options.strategy == "auto" else ()
+    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
+    task = SearchTask(case, setups, unseen, options.strategy, options, SimulationCounter())
+    task, problem, _ = with_lines(task, problem, progress)
+    problem, found = weighed_search(task, problem, lambda _: None, progress)
+    if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
+        raise KeyboardInterrupt
+    return task.setups, problem, found
+
+
+def _by_twin(
+    setups: tuple[ExperimentSetup, ...], problem: FitProblem, x: Array
+) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
+    """Return the tests and the problem of the twin of a program, corrected at a point (N,)."""
+    setups = settled(as_fitted(setups, problem), problem.residuals.values(x))
+    return setups, with_setups(problem, setups)
+
+
+def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:
+    """Yield what must be known of the minimum that the profiles are about, and of others."""
+    if not best.success:
+        yield f"the fit did not end at a minimum: {best.message}"
+    if by_twin and profiles.lower is not None:
+        yield LOWER_BY_TWIN
+    if not np.array_equal(next(iter(profiles.by_index.values()))[0].x, best.x):
+        yield LOWER
+    if any(others for _, *others in profiles.by_index.values()):
+        yield ENCLOSED
+
+
+def _profile(
+    case: Case,
+    residuals: Residuals,
+    uncertainty: UncertaintyAnalysis,
+    profiles: Sequence[estimate.CostProfile],
+    verdict: Verdict,
+) -> Profile:
+    """Return the profiles of a parameter about several minima in its own values.
+
+    It has no interval where the ``verdict`` leaves none.
+    """
+    first, *others = profiles
+    parameter = residuals.free[first.index]
+    low, high = (None if isinf(limit) else parameter.value(limit) for limit in limits_of(profiles))
+    units = {
+        nuisance.name: nuisance.unit
+        for experiment in residuals.experiments
+        for nuisance in experiment.nuisances
+    }
+
+    def branch(profile: estimate.CostProfile) -> Branch:
+        return Branch(np.array([parameter.value(float(x)) for x in profile.at]), profile.costs)
+
+    linear = uncertainty.confidence.parameters[parameter.name].interval
+    ends = reasons(parameter, profiles)
+    if verdict.misfit:
+        low = high = linear = None
+        ends = (verdict.no_interval, verdict.no_interval)
+    return Profile(
+        name=parameter.name,
+        unit={**units, **case.units()}.get(parameter.name, ""),
+        value=parameter.value(float(first.x[first.index])),
+        at=branch(first).at,
+        costs=first.costs,
+        low=low,
+        high=high,
+        ends=ends,
+        rise=uncertainty.rises[parameter.name],
+        linear=linear,
+        others=tuple(map(branch, others)),
+        min=parameter.low,
+        max=parameter.high,
+    )

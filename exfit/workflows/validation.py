@@ -1,0 +1,322 @@
+"""How fitted values do on other records: those of the case, or one that is given by hand."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from exfit.case.case import Case
+from exfit.case.schema import SINGLE, Recording
+from exfit.dsp.quality import noise_of, spikes
+from exfit.errors import CaseError
+from exfit.features.events.before_fit import event_causes
+from exfit.features.external.description import other_program_of
+from exfit.features.external.program import ExternalProgram
+from exfit.features.external.setups import as_by_program
+from exfit.fitting.build import build_experiment
+from exfit.fitting.parameters import scaled_values
+from exfit.fitting.problem import residuals_of
+from exfit.fitting.recorded.shown_instants import instants_of
+from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.system import values_of
+from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
+from exfit.records.channel_inspection import SPIKE_LIMIT
+from exfit.records.record import Record
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.comparisons import Comparison, ValidatedStep
+from exfit.results.description import OtherProgram
+from exfit.util.file_names import folded
+from exfit.verdict.causes.rest import unsteady_signals
+from exfit.verdict.causes.run_quality import (
+    step_error_notes,
+    switching_notes,
+    unstable_rest_notes,
+    voltage_notes,
+)
+from exfit.workflows.given_values import ValuesOrResult, changes_of
+from exfit.workflows.other_values import model_as_found
+from exfit.workflows.solution import aligned, fitted_to_record, validation_of
+
+Values = Mapping[str, float]
+
+EARLY_OR_LATE = {"min": "late", "max": "early"}  # a response, by the bound that its step is on
+LONE_RECORD = "record"  # its name, as in the case
+NOTHING_TO_VALIDATE_ON = (
+    "missing: there is no record to validate on but the fitted ones; name one there, or give it by "
+    "`exfit validate CASE --record FILE` (record in Python)"
+)
+
+
+class ComparedTest(NamedTuple):
+    """A test with sub-steps enough, its own values, and how its record compares."""
+
+    recording: Recording
+    setup: ExperimentSetup
+    values: Values
+    comparison: Comparison
+
+
+class Validation(NamedTuple):
+    """The tests that were compared, the fitted ones first, and a case that has just these.
+
+    ``values`` are those of the unit.
+    """
+
+    case: Case
+    values: Values
+    tests: tuple[ComparedTest, ...]
+    other_program: OtherProgram | None = None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether the values were fitted to some of the records."""
+        return not all(test.comparison.validation for test in self.tests)
+
+    @property
+    def comparisons(self) -> list[Comparison]:
+        """Their comparisons."""
+        return [test.comparison for test in self.tests]
+
+
+def validate(
+    case: Case,
+    values: ValuesOrResult | None,
+    record: Record | Path | str | None,
+    step: float | Sequence[float],
+    at: float | Sequence[float],
+    program: ExternalProgram | None = None,
+) -> Validation:
+    """Return the comparisons with the fitted records, then with those that no fit saw.
+
+    No fit saw any record where nothing in the case is free, nor without ``values``: they are those
+    of the model as found then. A ``program`` simulates if one is given. A ``record`` by hand, whose
+    steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
+    or where there is nothing to validate on.
+    """
+    given = GivenSteps(_numbers(step), _numbers(at))
+    if record is None and any(given):
+        raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
+    compared = _compared(*_with_values(case, values), record, given, program)
+    setups = [test.setup for test in compared.tests]
+    return compared._replace(other_program=other_program_of(case, program, setups))
+
+
+def _compared(
+    case: Case,
+    own: Values,
+    saw: tuple[Recording, ...],
+    record: Record | Path | str | None,
+    given: GivenSteps,
+    program: ExternalProgram | None,
+) -> Validation:
+    """Return the comparisons, by a program where one is given; a fit ``saw`` some records."""
+    fitted = tuple(_fitted(case, recording, own, program) for recording in saw)
+    matches = [test.comparison for test in fitted]
+    if record is not None:
+        case, test = _validated_by_hand(case, matches, own, record, given, program)
+        by_hand = (test.recording,)
+        case = replace(case, validations=by_hand) if saw else _with_records(case, by_hand)
+        return Validation(case, own, (*fitted, test))
+    recordings = (*(() if saw else case.recordings), *case.validations)
+    if not recordings:
+        raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
+    unseen = [
+        (each, as_by_program(program, case, build_experiment(case, each, own), own))
+        for each in recordings
+    ]
+    validated = (_validated(case, matches, *pair, own) for pair in unseen)
+    return Validation(case, own, (*fitted, *validated))
+
+
+def _with_values(
+    case: Case, values: ValuesOrResult | None
+) -> tuple[Case, Values, tuple[Recording, ...]]:
+    """Return the case whose model the values are of, all values, and what a fit saw of its records.
+
+    Without values it is the model as found.
+    """
+    if values is None:
+        return (*model_as_found(case), ())
+    saw = case.recordings if case.free() else ()
+    return case, values_of(case, changes_of(case, values)), saw
+
+
+def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Sequence) else (given,)
+
+
+def _with_records(case: Case, recordings: tuple[Recording, ...]) -> Case:
+    return replace(case, record=None, records=recordings, validations=())
+
+
+def _fitted(
+    case: Case, recording: Recording, values: Values, program: ExternalProgram | None
+) -> ComparedTest:
+    setup = build_experiment(case, recording, values).with_enough_substeps(values)
+    setup = as_by_program(program, case, setup, values)
+    moves = None
+    if program is None:  # a run of it for each would be many
+        residuals = residuals_of(case, [setup])
+        at = scaled_values(residuals.free, setup.with_start_values(values))
+        moves = residuals.moves(at)
+    comparison = compare_with_record(setup, setup.name, values, moves=moves)
+    return ComparedTest(recording, setup, values, comparison)
+
+
+def _validated(
+    case: Case,
+    fitted: Sequence[Comparison],
+    recording: Recording,
+    setup: ExperimentSetup,
+    values: Values,
+) -> ComparedTest:
+    setup, values = aligned(case, setup, values)
+    if setup.name == SINGLE:  # fit is no name for what was not fitted
+        setup = replace(setup, experiment=replace(setup.experiment, name=LONE_RECORD))
+    comparison = validation_of(case, fitted, setup, values)
+    notes = (
+        *comparison.notes,
+        *_event_notes(case, recording),
+        *_run_notes(case, setup, comparison, values),
+    )
+    return ComparedTest(recording, setup, values, replace(comparison, notes=notes))
+
+
+def _event_notes(case: Case, recording: Recording) -> Iterator[str]:
+    """Yield what is wrong with the record of a grid event, as before a fit."""
+    if case.seen_from(recording).kind.finds_rest:
+        for cause in event_causes(case, recording):
+            yield cause.sentence
+
+
+def _run_notes(
+    case: Case, setup: ExperimentSetup, comparison: Comparison, values: Values
+) -> Iterator[str]:
+    """Yield what speaks against the simulated response of a record."""
+    simulator = setup.experiment.with_inputs(values)
+    at = setup.experiment.parameters(values)
+    simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
+    yield from switching_notes(setup)
+    yield from unstable_rest_notes(simulator, at)
+    yield from step_error_notes(case, simulator, at, simulated)
+    yield from voltage_notes(case, comparison.time, simulated.get("vt"))
+
+
+def _validated_by_hand(
+    case: Case,
+    fitted: Sequence[Comparison],
+    values: Values,
+    record: Record | Path | str,
+    given: GivenSteps,
+    program: ExternalProgram | None,
+) -> tuple[Case, ComparedTest]:
+    """Return how values do on a record that the case does not name, judged by ``fitted`` ones.
+
+    The case has that record where it was given as samples. Its columns are those of the first
+    record under validate, or else of the first fitted one.
+    Raises ExfitError where the record or the steps given cannot be used.
+    """
+    recordings = (*case.validations, *case.recordings)
+    if not recordings:
+        text = "record: missing; its columns are needed to read a record"
+        raise CaseError([f"{case.path}: {text}"])
+    recording = _in_place_of(recordings[0], record, {match.name for match in fitted})
+    if isinstance(record, Record):
+        case = replace(case, given_records={**case.given_records, recording.name: record})
+    test = with_steps_of_record(case, recording, values, given)
+    setup = as_by_program(program, case, test.setup, values)
+    setup, own_values = aligned(case, setup, values)
+    comparison = validation_of(case, fitted, setup, own_values)
+    best = fitted_to_record(case, setup, own_values) if instants_of(setup) else own_values
+    comparison = replace(
+        comparison,
+        steps=tuple(_steps(setup, comparison, own_values, best, given)),
+        notes=(
+            *comparison.notes,
+            *_notes(test, setup, comparison, fitted, best),
+            *_event_notes(case, recording),
+            *_run_notes(case, setup, comparison, own_values),
+        ),
+    )
+    return case, ComparedTest(recording, setup, own_values, comparison)
+
+
+def _in_place_of(recording: Recording, record: Record | Path | str, taken: set[str]) -> Recording:
+    """Return a recording with another record, whole: windows and masks are those of its own."""
+    file = record.source if isinstance(record, Record) else Path(record)
+    update = {"file": str(file.absolute()), "window": None, "mask": ()}
+    name = file.name if folded(file.stem) in map(folded, taken) else file.stem
+    section = recording.record.model_copy(update=update)
+    return recording.model_copy(update={"name": name, "record": section})
+
+
+def _steps(
+    setup: ExperimentSetup, comparison: Comparison, values: Values, best: Values, given: GivenSteps
+) -> Iterator[ValidatedStep]:
+    """Yield the steps that the record holds, as they were found at last or given.
+
+    ``best`` are the values whose instants are fitted within what the record allows.
+    """
+    simulator, moved = (setup.experiment.with_inputs(each) for each in (values, best))
+    least = None
+    if instants_of(setup):
+        least = compare_with_record(setup, setup.name, best).rmse
+    found = tuple(
+        name
+        for name, numbers in (("instant", given.instants), ("size", given.sizes))
+        if not numbers
+    )
+    for step, other in zip(simulator.inputs.steps, moved.inputs.steps, strict=True):
+        at = step.at + simulator.delay
+        if at >= setup.record.time[0]:
+            best_at = None if least is None else other.at + moved.delay
+            yield ValidatedStep(step.signal, at, step.step, found, comparison.rmse, best_at, least)
+
+
+def _notes(
+    test: UnplannedTest,
+    setup: ExperimentSetup,
+    comparison: Comparison,
+    fitted: Sequence[Comparison],
+    best: Values,
+) -> Iterator[str]:
+    """Yield what must be known of a record that was given by hand.
+
+    ``setup`` has the bounds within which the record allows its instants, ``best`` those at which it
+    is matched best.
+    """
+    record, steady = test.setup.record, test.setup.test.steady
+    for match in fitted:
+        if match.sha256 == comparison.sha256:
+            yield (
+                f"{comparison.record} is a file that was fitted ({match.name}): what the fit saw "
+                "does not validate it"
+            )
+    yield from _spike_notes(test.setup)
+    yield from test.notes
+    if not test.notes and steady is not None:
+        causes = unsteady_signals(record, steady, test.setup.channels)
+        yield from (cause.sentence for cause in causes)
+    for parameter in setup.free:
+        side = parameter.bound(best[parameter.name])
+        if side is not None and parameter.name.endswith(".at"):
+            way = {"min": "earlier", "max": "later"}[side]
+            yield (
+                f"a step {way} than the record shows it would match better than the one at "
+                f"{parameter.start:.4g} s: the response is too {EARLY_OR_LATE[side]}"
+            )
+
+
+def _spike_notes(setup: ExperimentSetup) -> Iterator[str]:
+    """Yield the compared channels with spikes, which count as errors of the model."""
+    for channel in setup.channels:
+        kept = channel.kept & np.isfinite(channel.measured)
+        samples = channel.measured[kept]
+        count = len(spikes(setup.record.time[kept], samples, noise_of(samples), SPIKE_LIMIT))
+        if count:
+            yield (
+                f"{channel.signal} of {setup.record.source.name} has {count} samples that look "
+                f"like spikes: `outliers: {SPIKE_LIMIT:g}` on the channel leaves them out"
+            )

@@ -1,0 +1,100 @@
+"""Cases of grid events from the files of phasor measurement units."""
+
+import numpy as np
+import pytest
+import yaml
+from pmu_records import KV, MVA, pmu_columns, smooth_course, write_table
+
+from exfit.case.draft.bases import rated_bases
+from exfit.case.draft.record_settings import RecordSettings
+from exfit.case.draft.starting_case import starting_case
+from exfit.case.draft.starting_tests import starting_tests
+from exfit.case.draft.starting_unit import unit_with
+from exfit.case.open_values import open_values
+from exfit.case.record_section import record_section
+from exfit.features.events.suggestion import event_section
+from exfit.fitting.recordings import read_section
+
+RATED = rated_bases({}, KV, MVA)
+
+
+def inspected(folder, **changes):
+    columns = {**pmu_columns(smooth_course()), **changes}
+    return RecordSettings().inspect(write_table(folder / "event.csv", columns))
+
+
+def section(inspection, bases):
+    text = "\n".join(event_section(inspection, "event.csv", bases))
+    return text, yaml.safe_load(text)["record"]
+
+
+def test_with_the_ratings_of_the_unit_the_suggested_record_can_be_read(tmp_path):
+    text, content = section(inspected(tmp_path), RATED)
+    assert not open_values(text)
+    del content["channels"]["angle"]  # of no plant with a bump test
+    record = read_section(record_section(content), tmp_path, per_unit=True)
+    assert record.signals["p"][0] == pytest.approx(0.8, abs=1e-6)
+
+
+def test_the_connection_is_that_of_the_rated_voltage_and_its_comment_says_so(tmp_path):
+    text, content = section(inspected(tmp_path), RATED)
+    assert content["phasors"]["voltage"]["connection"] == "phase-to-ground"
+    assert "rests at 0.583 = 1.01 / sqrt(3) of the rated kV" in text
+    line_to_line = {"UNIT1-PM1 (V)": 1e3 * KV * smooth_course().vt}
+    _, content = section(inspected(tmp_path, **line_to_line), RATED)
+    assert content["phasors"]["voltage"]["connection"] == "phase-to-phase"
+
+
+@pytest.mark.parametrize("bases", [{}, rated_bases({}, 2.0 * KV, MVA)])
+def test_without_a_fitting_rating_the_connection_is_asked_for(tmp_path, bases):
+    text, _ = section(inspected(tmp_path), bases)
+    places = {value.place for value in open_values(text)}
+    assert "record.phasors.voltage.connection" in places
+    assert ("record.phasors.kV" in places) == (not bases)
+
+
+def test_a_table_with_an_angle_and_no_reference_is_an_event_too(tmp_path):
+    course = smooth_course(slip=0.3)
+    columns = {
+        "t": course.time,
+        "vt": course.vt,
+        "angle": np.degrees(course.angle) % 360.0,
+        "p": course.p,
+        "q": course.q,
+    }
+    inspection = RecordSettings().inspect(write_table(tmp_path / "event.csv", columns))
+    _, content = section(inspection, {})
+    assert content["channels"]["angle"] == {"column": "angle", "unit": "deg"}
+    assert content["channels"]["p"] == "p"
+    del columns["angle"]
+    assert not RecordSettings().inspect(write_table(tmp_path / "other.csv", columns)).is_event
+
+
+@pytest.mark.parametrize(
+    ("factor", "word"), [(-1.0, "turns against"), (57.3, "times as fast"), (0.01, "times as fast")]
+)
+def test_an_angle_that_contradicts_the_frequency_beside_it_is_named(tmp_path, factor, word):
+    course = smooth_course()
+    turned = {
+        "UNIT1-PA1 (deg)": factor * np.degrees(0.3 * course.angle),
+        "UNIT1-FQ (Hz)": 60.0 + 0.3 * (course.frequency - 60.0),
+    }
+    assert any(word in finding for finding in inspected(tmp_path, **turned).findings)
+    assert not inspected(tmp_path).findings
+
+
+def test_rows_that_the_flags_call_bad_are_named_with_their_line(tmp_path):
+    flags = ["0"] * 700 + ["0x8000"] * 20
+    (finding,) = inspected(tmp_path, **{"UNIT1-SF": flags}).findings
+    assert "20 rows are not valid" in finding
+    assert "event.csv:702: 0x8000, data error" in finding
+
+
+def test_a_case_of_an_event_has_no_test_and_plays_its_record_back(tmp_path):
+    tests = starting_tests([inspected(tmp_path)], (), RATED)
+    text = starting_case(unit_with("AC8B", None, None, tmp_path), tests, tmp_path)
+    content = yaml.safe_load(text)
+    assert content["plant"]["type"] == "grid-playback"
+    assert content["plant"]["network"]["f0"] == 60
+    assert "test" not in content
+    assert content["record"]["channels"]["vt"] == "phasors.vt"

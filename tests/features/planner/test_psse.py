@@ -1,0 +1,440 @@
+"""PSS/E dynamics files: what is written is read back; what is damaged is told with its line."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from dynamics import SAMPLE, SOUND, THREE, garbage, replaced
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loose_records import SWAPPED, loose, sound
+from tiers import few_of
+
+from exfit.case.load import parse_case
+from exfit.case.yaml import read_yaml
+from exfit.errors import DynamicsError
+from exfit.features.planner.fields import text_of
+from exfit.features.planner.import_case import case_text, import_unit
+from exfit.features.planner.psse.files import record_text
+from exfit.features.planner.psse.free_format import sound_records
+from exfit.features.planner.records import (
+    SIGNALS,
+    Definition,
+    definition_of,
+    definitions,
+    read_values,
+)
+from exfit.features.planner.unit import read_unit
+from exfit.models import MODELS
+from exfit.models.sheet import record, typical
+
+DEFINITIONS = {(one.model.name, one.record.name): one for one in definitions()}
+# a record with all that records may have, whatever the catalogue holds
+DEFINITIONS["AC1A", "MADEUP"] = Definition(
+    "exciter",
+    MODELS["AC1A"],
+    record(
+        "MADEUP",
+        "TR KA Switch TA E1 SE1 E2 SE2 TE Spare TUC",
+        icons={"UEL": 1, "VOS": 2},
+        absent={"Switch": 0.0, "Spare": -1.5},
+        ignored="TUC",
+        doubt="the order is made up",
+    ),
+)
+GENROU = definition_of("GENROU")
+ESAC1A = definition_of("ESAC1A")
+
+
+@pytest.fixture(params=DEFINITIONS, ids=" as ".join)
+def definition(request):
+    """Name each record of each model in turn."""
+    return DEFINITIONS[request.param]
+
+
+def read_back(definition, text):
+    ((line, fields),), faults = sound_records(text)
+    assert faults == []
+    return read_values(definition, line, fields[3:])
+
+
+@settings(derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1))
+def each_record_gives_the_same_numbers_back(definition, seed):
+    random = np.random.default_rng(seed)
+    values = sound(definition, random)
+    read = read_back(definition, text_of(loose(definition, values, random).encode(), "unit.dyr"))
+    assert read.faults == []
+    assert read.values == values
+    text = record_text(definition, values, 123456, "1")
+    assert max(map(len, text.splitlines())) <= 80
+    again = read_back(definition, text)
+    assert again.faults == []
+    curve = definition.record.cons
+    if "E1" in curve and values["E1"] > values["E2"]:
+        assert again.values == {name: values[SWAPPED.get(name, name)] for name in values}
+    else:
+        assert again.values == values
+    assert again.values.get("E1", 0.0) <= again.values.get("E2", 0.0)
+    assert record_text(definition, again.values, 123456, "1") == text
+
+
+def test_what_is_written_in_any_style_is_read_and_written_the_same(definition):
+    each_record_gives_the_same_numbers_back(definition)
+
+
+def test_a_record_names_only_what_the_sheet_or_the_record_explains(definition):
+    explained = {row.symbol for row in definition.model.sheet}
+    record = definition.record
+    explained |= {*record.ignored, *(name for name, _ in record.absent)}
+    assert set(definition.record.cons) <= explained
+    assert len(set(definition.names)) == len(definition.names)
+
+
+def test_a_record_of_a_model_s_own_name_is_found_under_it(definition):
+    if definition.record == definition.model.records[0]:
+        found = definition_of(definition.record.name.lower())
+        assert found == definition
+
+
+def test_another_model_s_name_does_not_stand_for_a_model_that_can_be_written_so():
+    """PSS/E's ESAC8B is no AC8B, though an AC8B may be handed over as one."""
+    found = definition_of("ESAC8B")
+    assert found is None or found.model.name != "AC8B"
+
+
+def partners(definition, random):
+    """Return a record with what makes it a unit: a machine, an exciter."""
+    records = [(definition, sound(definition, random))]
+    if definition.kind != "machine":
+        records.append((GENROU, sound(GENROU, random)))
+    if definition.kind != "exciter":
+        records.append((ESAC1A, sound(ESAC1A, random)))
+    random.shuffle(records)
+    return records
+
+
+@settings(max_examples=settings.default.max_examples // 3, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def each_case_holds_the_numbers_of_its_file(definition, seed):
+    random = np.random.default_rng(seed)
+    records = partners(definition, random)
+    text = "".join(loose(*one, random, bus=7, machine_id="G1") for one in records)
+    case = case_text(read_unit(text, "unit.dyr", 7, "g1"), "unit.dyr")
+    assert max(map(len, case.splitlines())) <= 100
+    mine, theirs = read_yaml(case, Path("case.yaml"))[0].value, yaml.safe_load(case)
+    places = {"machine": ("plant", "parameters"), "exciter": ("parameters", "fixed")}
+    for one, values in records:
+        for data in (mine, theirs):
+            for key in places.get(one.kind, (one.kind, "parameters")):
+                data = data[key]
+            assert data == values
+    if definition.kind != "stabiliser":
+        parsed = parse_case(case, Path("case.yaml"))
+        assert parsed.typical() == ()
+
+
+def test_a_case_holds_the_numbers_of_its_file(definition):
+    if definition_of(definition.record.name) == definition:
+        each_case_holds_the_numbers_of_its_file(definition)
+
+
+@pytest.mark.parametrize(("code", "signal"), SIGNALS.items())
+def test_the_codes_of_a_stabiliser_s_inputs_are_its_signals(code, signal):
+    unmodelled = f"{code} is not modelled"
+    for definition in (one for one in DEFINITIONS.values() if one.codes):
+        values = typical(definition.model.sheet) | dict(definition.record.held)
+        codes = dict.fromkeys(definition.codes, code)
+        text = record_text(definition, values | codes, 7, "1")
+        read = read_back(definition, text)
+        assert read.inputs == (signal,) * len(definition.model.inputs)
+        assert not [warning for warning in read.warnings if unmodelled in warning.text]
+        unit = "".join(
+            f"{record_text(other, typical(other.model.sheet), 7, '1')}\n"
+            for other in (GENROU, ESAC1A)
+        )
+        case = yaml.safe_load(case_text(read_unit(f"{unit}{text}\n", "unit.dyr"), "unit.dyr"))
+        given = case["stabiliser"].get("inputs", [*definition.model.inputs])
+        assert given == [signal] * len(definition.model.inputs)
+
+
+# ---- damage
+
+
+@pytest.mark.parametrize("seed", few_of(range(300), 60))
+def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
+    random = np.random.default_rng(seed)
+    path = tmp_path / "unit.dyr"
+    path.write_bytes(garbage(SAMPLE.read_bytes(), random))
+    try:
+        unit = import_unit(path)
+    except DynamicsError as error:
+        text = str(error)
+        assert text.startswith(str(path))
+        # a bus or id was damaged: the file holds two units
+        several = "2 units; choose by --bus and --id" in text
+        assert several or re.search(r"unit\.dyr:\d+: ", text) or "no record" in text
+        assert text.replace("\n", "").isprintable()
+    else:
+        parse_case(case_text(unit, path.name), tmp_path / "case.yaml")
+
+
+def fault_of(text, *given):
+    with pytest.raises(DynamicsError) as caught:
+        read_unit(text, "unit.dyr", *given)
+    return caught.value.faults
+
+
+FAULTS = {
+    "a letter in a number": (" 766 ", " 7b6 ", "unit.dyr:2: ESAC1A: KA: '7b6' is not a number"),
+    "no number": (" 766 ", " nan ", "unit.dyr:2: ESAC1A: KA: 'nan' is not a number"),
+    "too large": (" 766 ", " 1e999 ", "unit.dyr:2: ESAC1A: KA: '1e999' is too large"),
+    "a number in quotes": (" 766 ", " '766' ", "unit.dyr:2: ESAC1A: KA: '766' is not a number"),
+    "a repeat count": (" 1.3 ", " 2*1.3 ", "unit.dyr:3: ESAC1A: TE: '2*1.3' repeats a value"),
+    "an empty value": (" 766 ", ",,", "unit.dyr:2: ESAC1A: KA: empty, between two commas"),
+    "an empty value over two lines": (
+        " 766 ",
+        ",\n,",
+        "unit.dyr:3: ESAC1A: KA: empty, between two commas",
+    ),
+    "a value too many": (" 766 ", " 766 1 ", "unit.dyr:2: ESAC1A: 20 values after the id"),
+    "a value too few": (" 766 ", " ", "ESAC1A: 18 values after the id, but the record has 19"),
+    "a repeat count in place of values": (
+        " 1.3 .024 ",
+        " 2*1.3 ",
+        "KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN\n"
+        "unit.dyr:3: ESAC1A: '2*1.3' repeats a value; write each one out",
+    ),
+    "the order of the symbols": (" 766 ", " ", "(19 constants): TR TB TC KA TA VAMAX VAMIN TE"),
+    "a value outside the sheet": (
+        " 766 ",
+        " -1 ",
+        "unit.dyr:2: ESAC1A: KA: -1 lies outside 0.01 ... 100000 pu",
+    ),
+    "crossed limits": ("14.5 -14.5\n", "-14.5 14.5\n", "unit.dyr:2: ESAC1A: VAMIN: 14.5 is not"),
+    "a saturation that falls": (" .03 ", " .3 ", "unit.dyr:4: ESAC1A: SE2: 0.1 at 4.18"),
+    "reactances out of order": (" .55 .25 ", " .55 .35 ", "unit.dyr:1: GENROU: Xpd: 0.3 is below"),
+    "no end": (".4 /", ".4", "unit.dyr:1: the record that begins here has no '/' before the next"),
+    "no end of the last": ("-14.5 /", "-14.5", "unit.dyr:2: the record that begins here has no"),
+    "an open quote": ("ESAC1A", "'ESAC1A", "unit.dyr:2: a quote is opened and not closed"),
+    "a bus by its name": ("1 ESAC1A", "'WEST' ESAC1A", "unit.dyr:2: ESAC1A: 'WEST' is not the"),
+    "a bus of zero": ("1 ESAC1A", "0 ESAC1A", "unit.dyr:2: ESAC1A: '0' is not the number of a bus"),
+    "a long id": ("ESAC1A 1", "ESAC1A 123", "unit.dyr:2: ESAC1A: '123' is not a machine id"),
+    "no bus": ("1 ESAC1A", "ESAC1A", "unit.dyr:2: 'ESAC1A 1 0' is not bus, 'model' and id"),
+    "a typing error in the exciter": (
+        "ESAC1A",
+        "ESACA1A",
+        "unit.dyr:2: ESACA1A: exfit has no exciter of that name; did you mean ESAC1A?",
+    ),
+    "a machine that exfit lacks": (
+        "GENROU",
+        "GENTPJ1",
+        "unit.dyr:1: GENTPJ1: exfit has no machine of that name",
+    ),
+    "a classical machine": (
+        "GENROU",
+        "GENCLS",
+        "unit.dyr:1: GENCLS is a constant voltage behind a reactance: no unit to verify",
+    ),
+    "a second exciter": (
+        "1 ESAC1A",
+        "1 ESAC1A 1 0 /\n1 ESAC1A",
+        "unit.dyr:3: ESAC1A: a second exciter; ESAC1A is on line 2",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_names_its_line_the_value_and_the_limit(fault):
+    old, new, words = FAULTS[fault]
+    assert words in "\n".join(fault_of(replaced(old, new)))
+
+
+def test_a_unit_without_an_exciter_is_reported_with_those_that_could_be_read():
+    (fault,) = fault_of(SOUND.splitlines()[0] + "\n1 IEEEG1 1 2 3 /")
+    assert fault.startswith("unit.dyr:1: bus 1, id 1: has no exciter; known: ")
+    assert "ESAC1A" in fault
+
+
+def test_all_faults_of_a_unit_are_reported_at_once_in_the_order_of_their_lines():
+    text = replaced(" 766 ", " x ", replaced(" 1.3 ", " -1 ", replaced(" .12 ", " -1 ")))
+    assert [fault.split(": ")[:3] for fault in fault_of(text)] == [
+        ["unit.dyr:1", "GENROU", "S10"],
+        ["unit.dyr:2", "ESAC1A", "KA"],
+        ["unit.dyr:3", "ESAC1A", "TE"],
+    ]
+
+
+def test_a_derivative_without_a_lag_is_warned_of():
+    record = "1 ESAC8B 1 .02 40 5 10 0 1 0 10 -10 1 1 3 .1 4 .4 /\n"
+    unit = read_unit(SOUND.splitlines()[0] + "\n" + record, "unit.dyr")
+    assert unit.exciter.values["TD"] == 0.0
+    assert "ESAC8B: KD: 10 has no effect, since TD is 0" in [text for _, text in unit.warnings]
+
+
+def test_names_and_ids_may_be_quoted_and_a_bus_needs_its_number():
+    text = SOUND.replace("GENROU 1", '"GENROU" "1 "').replace("ESAC1A 1", "'ESAC1A' '1 ' @")
+    text = f"@! of release 35, it's\n{text.replace(' @', '')}"
+    assert read_unit(text, "unit.dyr").machine.values == read_unit(SOUND, "unit.dyr").machine.values
+    with pytest.raises(
+        DynamicsError, match=r"'NORTH 21\.6' is not the number of a bus; write the n"
+    ):
+        read_unit(text.replace('1 "GENROU"', "'NORTH 21.6' 'GENROU'"), "unit.dyr")
+
+
+def test_no_saturation_may_be_written_as_four_zeros():
+    """The voltages then say nothing; a zero beside a saturation is a fault."""
+    values = read_unit(replaced("3.14 .03 4.18 .1", "0 0 0 0"), "unit.dyr").exciter.values
+    assert {values[name] for name in ("E1", "SE1", "E2", "SE2")} == {0.0}
+    (fault,) = fault_of(replaced("3.14 .03 4.18 .1", "0 0 4.18 .1"))
+    assert "E1: 0 is no point of a saturation curve" in fault
+
+
+@pytest.mark.parametrize(
+    ("given", "lines"),
+    [
+        ((), ["3 units; choose by --bus and --id", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2"]),
+        ((1,), ["2 units; choose", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2: GENROU, ESAC1A"]),
+        ((None, "1"), ["2 units; choose", "bus 1, id 1", "bus 9, id 1"]),
+        ((8,), ["no record of bus 8", "bus 1, id 1", "bus 1, id 2", "bus 9, id 1"]),
+        ((9, "2"), ["no record of bus 9, id '2'", "bus 1, id 1"]),
+    ],
+)
+def test_a_unit_among_several_must_be_chosen(given, lines):
+    faults = fault_of(THREE, *given)
+    for words, fault in zip(lines, faults, strict=False):
+        assert words in fault
+
+
+def test_a_chosen_unit_is_the_one_that_is_read():
+    assert read_unit(THREE, "unit.dyr", 1, "2").machine.line == 5
+    assert read_unit(THREE, "unit.dyr", 9).bus == 9
+
+
+def test_a_record_that_multiplies_by_the_speed_makes_a_case_that_does():
+    """EXDC2 alone, by public implementations; a record of another exciter says nothing of it."""
+    values = " ".join(
+        "0" if symbol == "Switch" else f"{typical(MODELS['EXDC2'].sheet)[symbol]:g}"
+        for symbol in definition_of("EXDC2").record.cons
+    )
+    machine, _, exciter = SOUND.partition("\n")
+    texts = f"{machine}\n1 EXDC2 1 {values} /\n", f"{machine}\n{exciter}"
+    cases = [yaml.safe_load(case_text(read_unit(text, "u.dyr"), "u.dyr")) for text in texts]
+    assert [case.get("efd_times_speed") for case in cases] == [True, None]
+
+
+def test_a_long_list_of_units_is_cut():
+    many = "".join(f"{bus} IEELBL 1 0 /\n" for bus in range(1, 101))
+    faults = fault_of(many)
+    assert len(faults) == 22
+    assert "80 more" in faults[-1]
+
+
+def test_what_other_units_and_devices_hold_is_no_fault():
+    others = (
+        "'VSC 1' 'VSCDCT' 1 2 3*0. /\n200 'DISTR1', 300, '1 ', 1,, 2 /\n"
+        "Line 'Toggler' Line_1 1.0 /\n300 'ESST99' 1 x y z /\n"
+        " / a line of comment\n\n400 'IEELBL' '*' 2*1.0 /\n"
+    )
+    unit = read_unit(others + SOUND, "unit.dyr", 1)
+    assert unit.exciter.values["KA"] == 766.0
+    assert unit.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        ("1 IEEEG2 1 0 0 /", "governor IEEEG2 is left out"),
+        ("1 'MAXEX2' 1 0 0 /", "excitation limiter MAXEX2 is left out"),
+        ("1 'UEL1' 1 0 0 /", "excitation limiter UEL1 is left out: give it under limiters"),
+        (
+            "1 'OEL2C' 1 0 0 /",
+            "excitation limiter OEL2C is left out: give it under limiters, FIXEDRU and FIXEDRD "
+            "exchanged",
+        ),
+        ("1 'XYZ' 1 0 0 /", "XYZ is left out: not a known model"),
+        ("1 'USRMDL' 1 'MYGOV' 5 0 0 /", "USRMDL MYGOV is left out: not a known model"),
+    ],
+)
+def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
+    unit = read_unit(SOUND + record, "unit.dyr")
+    assert unit.warnings == ((5, words),)
+    remarks = " ".join(case_text(unit, "unit.dyr").split("model:")[0].replace("#", "").split())
+    assert f"Line 5: {' '.join(words.split())}." in remarks
+
+
+@pytest.mark.parametrize(
+    ("exciter", "flags", "limiter", "place"),
+    [
+        ("AC1C", {"OEL": 2.0}, "OEL2C", ", place: takeover (AC1C has OEL = 2)"),
+        ("AC7C", {"OEL": 1.0, "UEL": 3.0}, "UEL2C", ", place: takeover-output (AC7C has UEL = 3)"),
+        # 4 is a gate behind the PI, 0 no place; OEL3C has no gate; ESAC1A and ST6C say nothing
+        ("AC7C", {"OEL": 4.0}, "OEL2C", ""),
+        ("AC1C", {"OEL": 0.0}, "OEL2C", ""),
+        ("AC1C", {"OEL": 2.0}, "OEL3C", ""),
+        ("ESAC1A", {}, "OEL2C", ""),
+        ("ST6C", {"OEL": 2.0}, "OEL2C", ""),
+    ],
+)
+def test_the_place_of_a_limiter_left_out_is_that_of_its_exciter_s_flag(
+    exciter, flags, limiter, place
+):
+    parts = ((GENROU, {}), (definition_of(exciter), flags))
+    records = [
+        record_text(part, typical(part.model.sheet) | changes, 7, "1") for part, changes in parts
+    ]
+    unit = read_unit("\n".join([*records, f"7 '{limiter}' 1 0 0 /"]), "unit.dyr")
+    (text,) = (warning.text for warning in unit.warnings if "limiter" in warning.text)
+    exchanged = ", FIXEDRU and FIXEDRD exchanged" if limiter == "OEL2C" else ""
+    how = f"give it under limiters{place}{exchanged}"
+    assert text == f"excitation limiter {limiter} is left out: {how}"
+
+
+def test_a_governor_that_cannot_be_simulated_is_left_out_with_the_reason():
+    for text, reason in (
+        ("1 TGOV1 1 0.05 0.5 1 0 3 10 /", "TGOV1: 6 values after the id"),
+        ("1 TGOV1 1 0 0.5 1 0 3 10 0 /", "TGOV1: R: 0 lies outside 0.001 ... 10 pu"),
+        ("1 HYGOV 1 .05 .3 5 .05 .5 .2 0 1 1 1.2 .5 .1 /", "HYGOV: GMIN: 1 is not below GMAX = 0"),
+    ):
+        unit = read_unit(SOUND + text, "unit.dyr")
+        assert unit.governor is None
+        (warning,) = unit.warnings
+        assert warning.line == 5
+        assert warning.text.startswith(f"governor {text.split()[1]} is left out: {reason}")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-8", "utf-16"])
+def test_a_file_is_read_in_any_usual_encoding_and_with_any_ends_of_line(encoding):
+    for end in ("\n", "\r\n", "\r"):
+        text = ("// Müller GmbH\n" + SOUND + "/ naïve\n\x1a").replace("\n", end)
+        unit = read_unit(text_of(text.encode(encoding), "unit.dyr"), "unit.dyr")
+        assert unit.exciter.line == 3
+
+
+def test_what_a_record_cannot_say_of_a_model_is_warned_of():
+    """Integers, symbols that the model lacks, and a doubt about the order."""
+    for definition in DEFINITIONS.values():
+        record = definition.record
+        own = typical(definition.model.sheet)
+        values = {**own, **dict.fromkeys(record.ignored, 7.5), **dict(record.absent)}
+        taken = {*own, *record.ignored}
+        icons = [(name, value) for name, value in record.icons if name not in taken]
+        # a code that no signal stands for: the slope of the voltage
+        of_icons = {name: value + ((name, value) in icons) for name, value in record.icons}
+        of_icons |= dict.fromkeys(definition.codes, 6)
+        given = [*of_icons.values()]
+        absent = dict(record.absent)
+        given += [values[name] + (1 if name in absent else 0) for name in record.cons]
+        text = f"1 {record.name} 1 " + " ".join(map(repr, given)) + " /"
+        read = read_back(definition, text)
+        told = "\n".join(warning.text for warning in read.warnings)
+        for name, value in (*icons, *record.absent):
+            other = of_icons.get(name, value + 1)
+            assert f"{record.name}: {name}: {other:g} is not modelled; {value:g} is" in told
+        assert record.doubt in told
+        listed = (*definition.names, *dict(record.held))
+        for row in definition.model.sheet:
+            assert (row.symbol in listed) != (f"{row.symbol}: not in the record" in told)
+        assert read.values == {**own, **dict(record.held)}

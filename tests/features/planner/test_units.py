@@ -1,0 +1,103 @@
+"""All units of a dynamics file at once: each as it is read alone, whatever is wrong with others."""
+
+import numpy as np
+import pytest
+from dynamics import SOUND, garbage, replaced
+from tiers import few_of
+
+from exfit.errors import DynamicsError
+from exfit.features.planner.fields import text_of
+from exfit.features.planner.psse.free_format import sound_records
+from exfit.features.planner.unit import read_unit
+from exfit.features.planner.units import read_units
+
+BUSES = range(101, 109)
+
+
+def at_bus(bus, text=SOUND):
+    """Return the records of the sound unit at another bus."""
+    return text.replace("1 GENROU", f"{bus} GENROU").replace("1 ESAC1A", f"{bus} ESAC1A")
+
+
+def test_every_unit_is_read_as_it_is_alone():
+    text = "".join(at_bus(bus) for bus in BUSES)
+    units = read_units(text, "f")
+    assert [unit.bus for unit in units.units] == [*BUSES]
+    assert (units.refused, units.faults) == ((), ())
+    assert units.units == tuple(read_unit(text, "unit.dyr", bus) for bus in BUSES)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (" 766 ", " x ", "ESAC1A: KA: 'x' is not a number"),
+        (" 766 ", " -1 ", "ESAC1A: KA: -1 lies outside"),
+        (" 766 ", " ", "ESAC1A: 18 values after the id"),
+        (".4 /", ".4 / \n103 GENSAL 1 /", "GENSAL: a second machine; GENROU is on line"),
+    ],
+)
+def test_a_fault_of_one_unit_leaves_the_others(old, new, words):
+    text = at_bus(102) + at_bus(103, replaced(old, new)) + at_bus(104)
+    units = read_units(text, "f")
+    assert [unit.bus for unit in units.units] == [102, 104]
+    (refused,) = units.refused
+    assert (refused.bus, refused.modelled) == (103, True)
+    assert words in "\n".join(fault.text for fault in refused.faults)
+    assert {fault.line for fault in refused.faults} <= {5, 6, 7, 8, 9}
+
+
+@pytest.mark.parametrize("damaged", ["-14.5 /", ".4 /"])
+def test_a_record_without_an_end_leaves_the_other_units(damaged):
+    whole = at_bus(103)
+    text = at_bus(102) + replaced(damaged, damaged[:-1], whole) + at_bus(104)
+    units = read_units(text, "f")
+    assert [unit.bus for unit in units.units] == [102, 104]
+    assert "has no '/' before the next one" in units.faults[0].text
+
+
+def test_a_unit_without_a_model_is_named_with_its_records():
+    text = SOUND + "8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
+    no_model = {unit.bus: unit for unit in read_units(text, "f").refused}
+    assert [unit.modelled for unit in no_model.values()] == [False] * 2
+    assert "no exciter of the catalogue: GENROU, IEEEG1" in no_model[8].faults[0].text + (
+        no_model[8].faults[1].text
+    )
+    assert no_model[9].faults[1].text == "ESACA1A: did you mean ESAC1A?"
+
+
+def test_a_classical_machine_without_an_exciter_is_no_unit():
+    text = (
+        "6 GENCLS 1 3 0 /\n"
+        + SOUND
+        + "7 GENCLS 1 99999 0 /\n8 GENCLS 1 3 0 /\n8 SEXS 1 .1 10 100 .1 0 5 /\n"
+    )
+    units = read_units(text, "f")
+    assert (len(units.units), units.classical) == (1, 2)
+    assert read_unit(text[: text.index("8 GENCLS")], "unit.dyr") == units.units[0]
+    (refused,) = units.refused
+    assert "GENCLS is a constant voltage behind a reactance" in refused.faults[0].text
+    with pytest.raises(DynamicsError, match="GENCLS is a constant voltage behind a reactance"):
+        read_unit(text, "unit.dyr", 7)
+
+
+@pytest.mark.parametrize("seed", few_of(range(100), 25))
+def test_damage_to_a_file_of_units_is_reported_or_harmless(seed):
+    random = np.random.default_rng(seed)
+    sound = "".join(at_bus(bus) for bus in BUSES)
+    try:
+        text = text_of(garbage(sound.encode(), random), "unit.dyr")
+    except DynamicsError:
+        return
+    units = read_units(text, "f")
+    whole = [unit for unit in units.units if unit.bus in BUSES]
+    # a damage hurts a record, or joins it to the next; only what is cut off takes more with it
+    assert len(whole) >= len(BUSES) - 2 or len(text) < len(sound)
+    reported = units.refused or units.faults
+    assert reported or len(units.units) == len(BUSES) or len(text) < len(sound)
+
+
+def test_a_field_stands_where_it_says():
+    text = "// naïve\r\n1 'ESAC1A'\t\"1 \" 0,0 ,1 // x\r2 GENROU 1 /\n"
+    for record in sound_records(text).records:
+        for field in record.fields:
+            assert text[field.start : field.end].strip("'\"").strip() == field.text

@@ -1,0 +1,88 @@
+"""Steady tests of a programme: points from a file or in place, in the units of a test sheet."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exfit.case.schema import SteadyTest
+from exfit.errors import RecordError
+from exfit.features.programme.steady.field_on_load import field_on_load
+from exfit.features.programme.steady.points import points_of
+from exfit.features.programme.steady.steady_test import steady
+from exfit.models.machines import MACHINES
+from exfit.models.sheet import typical
+
+SALIENT = MACHINES["GENSAL"]
+DATA = typical(SALIENT.sheet) | {"S10": 0.1, "S12": 0.4}
+MVA, KV, AMPERES = 120.0, 13.8, 640.0
+P = np.repeat([0.1, 0.5, 0.9], 4)
+Q = np.tile([-0.3, 0.0, 0.2, 0.45], 3)
+VT = 1.0 + 0.04 * Q
+IFD = field_on_load(SALIENT, DATA, P, Q, VT)
+COLUMNS = {
+    "p": {"column": "P", "unit": "MW", "base": MVA},
+    "q": {"column": "Q", "unit": "Mvar", "base": MVA},
+    "vt": {"column": "U", "unit": "kV", "base": KV},
+    "ifd": {"column": "If", "unit": "A", "base": AMPERES},
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    rows = np.column_stack([P * MVA, Q * MVA, VT * KV, IFD * AMPERES])
+    lines = [";".join(f"{number:.4f}".replace(".", ",") for number in row) for row in rows]
+    text = "\n".join(["P (MW);Q (Mvar);U (kV);If (A)", *lines])
+    (tmp_path / "vcurve.csv").write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def section_of(**changes):
+    section = {"kind": "steady", "name": "v-curve", "file": "vcurve.csv"}
+    names = {"p": "P (MW)", "q": "Q (Mvar)", "vt": "U (kV)", "ifd": "If (A)"}
+    columns = {signal: {**COLUMNS[signal], "column": name} for signal, name in names.items()}
+    return SteadyTest.model_validate({**section, "columns": columns, **changes})
+
+
+def test_a_file_and_the_same_points_in_place_are_alike(folder):
+    rows = np.column_stack([P, Q, VT, IFD]).round(6).tolist()
+    in_place = SteadyTest.model_validate({"kind": "steady", "name": "v", "points": rows})
+    test = section_of()
+    by_file = steady(test, points_of(test, folder), SALIENT, DATA)
+    by_numbers = steady(in_place, points_of(in_place, folder), SALIENT, DATA)
+    for curve in (by_file, by_numbers):
+        assert curve.verdict.verdict == "good"
+        assert curve.readings["ifd"].rms < 1e-5
+    assert by_file.p == pytest.approx(by_numbers.p, abs=1e-6)
+
+
+def test_a_base_that_is_not_known_is_found(folder):
+    column = {**COLUMNS["ifd"], "column": "If (A)", "base": {"start": "auto"}}
+    columns = {**section_of().model_dump(exclude_unset=True)["columns"], "ifd": column}
+    test = section_of(columns=columns)
+    curve = steady(test, points_of(test, folder), SALIENT, DATA)
+    assert curve.parameters["ifd.base"].value == pytest.approx(AMPERES, rel=1e-5)
+    assert curve.parameters["ifd.base"].unit == "A"
+
+
+def test_numbers_of_a_unit_need_a_base(folder):
+    columns = {
+        **section_of().model_dump(exclude_unset=True)["columns"],
+        "ifd": {"column": "If (A)"},
+    }
+    test = section_of(columns=columns)
+    with pytest.raises(RecordError, match=r"ifd: base: is missing: what is 1 pu in A\?"):
+        steady(test, points_of(test, folder), SALIENT, DATA)
+
+
+def test_a_column_in_another_unit_than_the_file_says_is_refused(folder):
+    columns = dict(section_of().model_dump(exclude_unset=True)["columns"])
+    columns["vt"] = {**columns["vt"], "unit": "V", "base": 13800.0}
+    test = section_of(columns=columns)
+    with pytest.raises(RecordError, match="in kV as the file says, not in V"):
+        points_of(test, folder)
+
+
+def test_the_file_is_that_of_the_programme(folder):
+    with pytest.raises(RecordError, match="cannot be read"):
+        points_of(section_of(), Path("nowhere"))

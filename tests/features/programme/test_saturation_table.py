@@ -1,0 +1,26 @@
+"""A saturation test on the terminal."""
+
+import numpy as np
+from rich.console import Console
+
+from exfit.features.programme.steady.saturation import saturation_curve
+from exfit.features.programme.terminal_saturation import saturation
+
+
+def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    vt = np.concatenate([np.linspace(0.2, 1.1, 9), np.linspace(1.0, 0.2, 7), [0.01]])
+    ifd = 800.0 * (vt + np.maximum(vt - 0.8, 0.0) ** 2) * (vt > 0.1)
+    ifd += 1.5 * np.cos(np.arange(17.0)) * (vt > 0.1)
+    console = Console(width=80, record=True)
+    saturation(console, saturation_curve(vt, ifd, efd=0.2 * ifd))
+    lines = console.export_text().splitlines()
+    assert max(map(len, lines)) <= 80
+    first_words = {line.split("  ")[0] for line in lines}
+    assert {
+        "base of ifd, 1 pu on the air-gap line",
+        "base of efd",
+        "S(1.0)",
+        "S(1.2)",
+    } <= first_words
+    assert {"quadratic", "exponential", "exponential-se"} <= first_words

@@ -1,0 +1,67 @@
+"""Instants of steps in records of a signal that jumps: one minimum between each two samples."""
+
+import numpy as np
+import pytest
+from coverage_cases import HARD_CASES, noisy, truth_of
+
+from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.results.intervals.instants import (
+    decided_by_few_samples,
+    intervals_near,
+    minima_between_samples,
+)
+from exfit.workflows.case_search import SearchTask, search_outcome
+
+NAME, INSTANT = "st6b_instant", "vref.at"
+
+
+@pytest.fixture(scope="module")
+def record():
+    """A record of ST6B whose step lies just before a sample, 5 ms apart."""
+    return noisy(NAME, np.random.default_rng([1, 0]))
+
+
+def test_the_intervals_between_samples_about_an_instant_are_tried():
+    samples = np.arange(10.0)
+    near = [*intervals_near(samples, 4.5)]
+    middles = [round(0.5 * (first + last), 6) for first, last in near]
+    assert middles == [1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]
+    assert len([*intervals_near(samples, 0.5)]) == 4
+
+
+@pytest.mark.long
+def test_beside_an_instant_between_the_wrong_samples_a_lower_minimum_is_found(record):
+    _, _, problem = record
+    truth = truth_of(NAME, problem)
+    place = [parameter.name for parameter in problem.residuals.free].index(INSTANT)
+    parameter = problem.residuals.free[place]
+    aside = truth.copy()
+    aside[place] = parameter.scaled(0.9975)  # two intervals off
+    minima = minima_between_samples(problem, aside)
+    lowest = min(minima, key=lambda minimum: minimum.cost)
+    # the step lies 0.1 ms before a sample, which noise may move to the other side of it
+    assert 1.0 < parameter.value(lowest.x[place]) < 1.0051
+    assert lowest.cost < problem.compressed.costs([truth])[0]
+
+
+@pytest.mark.long
+def test_an_instant_that_one_sample_decides_is_said_to_be_so_and_has_no_interval(record):
+    case, setups, problem = record
+    options = case.estimate
+    task = SearchTask(case, setups, (), options.strategy, options, SimulationCounter())
+    outcome = search_outcome(task, problem, lambda _: None, lambda _: None)
+    parameters = outcome.determined.uncertainty.confidence.parameters
+    reason = "has no interval: one sample decides it, between those at 1 and 1.005 s"
+    assert parameters[INSTANT].interval is None
+    assert parameters[INSTANT].why == reason
+    assert f"{INSTANT} {reason}" in outcome.determined.uncertainty.sentences
+    others = HARD_CASES[NAME].truth.keys() - {INSTANT}
+    assert all(parameters[name].interval is not None for name in others)
+    # the search alone ends between the wrong samples, at a cost that no noise explains
+    fitted = outcome.problem.residuals.values(outcome.found.best.x)
+    assert 1.0 < fitted[INSTANT] < 1.005
+
+
+def test_where_no_channel_jumps_no_sample_decides():
+    _, _, problem = noisy("linear", np.random.default_rng(1))
+    assert decided_by_few_samples(problem, truth_of("linear", problem)) == {}
