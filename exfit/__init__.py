@@ -7,7 +7,8 @@
 Everything here is imported when it is first used: ``import exfit`` alone loads nothing heavy.
 """
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from exfit.errors import (
     CaseError,
@@ -18,7 +19,6 @@ from exfit.errors import (
     RecordError,
     SimulationError,
 )
-from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
@@ -83,28 +83,27 @@ _MODULES = {
     "Case": "exfit.case.case",
     "FitResult": "exfit.results.model",
     "Record": "exfit.records.record",
-    "batch": "exfit.features.fleet.batch",
-    "cases_of_table": "exfit.features.planner.table_cases",
     "check": "exfit.workflows",
-    "design_test": "exfit.features.design.design",
     "fit": "exfit.workflows",
     "fit_all": "exfit.runs.fits",
     "identify": "exfit.workflows",
     "load_case": "exfit.workflows",
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",
-    "rank": "exfit.features.rank.ranked_cases",
-    "read_fleet": "exfit.features.fleet.folder",
     "read_record": "exfit.workflows",
-    "run": "exfit.features.programme.run",
-    "saturation_curve": "exfit.features.programme.steady.saturation",
     "simulate": "exfit.workflows",
-    "translate": "exfit.features.translate.translate",
     "validate": "exfit.workflows",
 }
 
 
-__getattr__ = names_of(__name__, _MODULES)
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return getattr(import_module(_MODULES[name]), name)
+    if name in __all__:
+        from exfit.registry import parts
+
+        return parts("PUBLIC")[name].load()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -13,6 +13,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
+from commands import COMMANDS
 from matplotlib.figure import Figure
 from places import REFERENCE, ROOT
 from test_layers import MAY_IMPORT
@@ -171,7 +172,7 @@ def options_of(command: click.Command) -> set[str]:
 
 
 def test_every_option_that_a_page_names_is_one_of_a_command():
-    commands = [main, *main.commands.values()]
+    commands = [main, *COMMANDS.values()]
     options = {name for command in commands for name in options_of(command)}
     for name, page in PAGES.items():
         words = set(re.findall(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*", page))
@@ -180,17 +181,17 @@ def test_every_option_that_a_page_names_is_one_of_a_command():
 
 def test_every_command_that_a_page_names_is_one_of_exfit():
     for name, page in PAGES.items():
-        assert set(re.findall(r"(?:`|^\$ |&& )exfit ([a-z]+)", page)) <= set(main.commands), name
+        assert set(re.findall(r"(?:`|^\$ |&& )exfit ([a-z]+)", page)) <= set(COMMANDS), name
 
 
 def test_the_table_of_commands_names_every_command_and_no_other():
     cells = first_column(README, "## Commands")
-    assert sorted(re.match(r"`exfit (\w+)", cell)[1] for cell in cells) == sorted(main.commands)
+    assert sorted(re.match(r"`exfit (\w+)", cell)[1] for cell in cells) == sorted(COMMANDS)
 
 
 def test_the_options_in_common_are_those_of_a_fit():
     cells = first_column(PAGES["docs/commands.md"], "## Options")
-    assert {cell.strip("`").split()[0] for cell in cells} <= options_of(main.commands["fit"])
+    assert {cell.strip("`").split()[0] for cell in cells} <= options_of(COMMANDS["fit"])
 
 
 # ---- cases and models
@@ -336,7 +337,7 @@ def test_the_tables_of_keys_are_those_of_the_schema():
 
 def test_the_strategies_of_the_page_are_those_of_a_case():
     cells = first_column(PAGES["docs/case_file.md"], "## Strategies")
-    (option,) = (it for it in main.commands["fit"].params if it.name == "strategies")
+    (option,) = (it for it in COMMANDS["fit"].params if it.name == "strategies")
     assert sorted(cell.strip("`") for cell in cells) == sorted(option.type.choices)
 
 

@@ -10,51 +10,42 @@ from pathlib import Path
 import pytest
 from sources import MODULES, ROOT, nodes_of, tree_of, trees
 
-BASE = {"util", "errors"}  # what every package may import
-MAY_IMPORT = {
-    "errors": set(),
-    "signals": set(),
-    "util": set(),
-    "dsp": set(),
-    "estimate": set(),
-    "inference": set(),
-    "engine": set(),
-    "external": set(),
-    "models": {"engine"},
-    "plants": {"models", "engine", "signals"},
-    "simulation": {"plants", "models", "engine"},
-    "records": {"dsp", "signals"},
-    "case": {"models", "plants", "records", "signals"},
-    "fitting": {
-        "case", "simulation", "plants", "models", "engine", "records", "dsp", "estimate",
-        "inference", "signals", "external",
-    },
-    "results": {"fitting", "simulation", "dsp", "signals", "inference"},
-}  # fmt: skip
-MAY_IMPORT["analysis"] = {*MAY_IMPORT} - {"errors", "util"}
-MAY_IMPORT["exchange"] = {"results", "case", "models"}
-MAY_IMPORT["workflows"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
-MAY_IMPORT["fleet"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
-MAY_IMPORT["programme"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
-MAY_IMPORT["output"] = {*MAY_IMPORT} - {"errors", "util"}
-MAY_IMPORT["cli"] = {*MAY_IMPORT} - {"errors", "util"}
-MAY_IMPORT["__main__"] = {"cli"}
+BASE = {"util", "errors", "registry"}  # what every package may import
+IN_ORDER = (  # each of the core may import those above it, the leaves nothing
+    "signals", "dsp", "estimate", "inference", "engine", "models", "plants", "simulation",
+    "records",
+    "case", "fitting", "results", "verdict", "workflows", "runs", "show", "cli", "__main__",
+)  # fmt: skip
+LEAVES = {"signals", "dsp", "estimate", "inference", "engine"}
+# beside the core, and another feature only as here
+OTHER_FEATURES = {
+    "fleet": {"planner", "report", "start"},
+    "planner": {"start", "fleet"},
+    "programme": {"report"},
+    "rank": set(),
+    "report": {"drawings", "external", "planner", "programme"},
+    "start": {"planner"},
+    "translate": {"planner"},
+}
 # a result draws itself: inside the call, so that nothing is imported before
 EXCEPTIONS = {("exfit.results.model", "exfit.show.notebook")}
 
 ONLY_IN = {  # where a library may be imported, inside functions too
     "yaml": {"case"},
-    "pydantic": {"case"},
-    "matplotlib": {"output"},
-    "rich": {"output", "cli"},
-    "jinja2": {"output"},
-    "weasyprint": {"output"},
-    "click": {"cli"},
+    "pydantic": {"case", "programme"},
+    "matplotlib": {"show", "compare", "design", "programme", "rank", "translate"},
+    "rich": {"show", "cli", "compare", "design", "fleet", "programme", "rank", "translate"},
+    "jinja2": {"report", "drawings"},
+    "weasyprint": {"report"},
+    "click": {
+        "cli", "compare", "design", "fleet", "planner", "programme", "rank", "report", "start",
+        "translate",
+    },
     "llvmlite": {"engine"},
     "distributed": {"fleet"},
     "dask": {"fleet"},
     "fmpy": {"external"},
-}
+}  # fmt: skip
 AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml"}
 
 # what costs a short fit much of its time: NumPy's own parts among them
@@ -70,8 +61,13 @@ NOT_OF_A_FIT = {
 
 
 def package(name):
-    """Return the room of a module: what follows exfit in its name, "" for exfit itself."""
-    return ([*name.split("."), ""])[1]
+    """Return the room of a module: a package of the core, or a feature; "" for exfit itself."""
+    parts = [*name.split("."), "", ""]
+    return parts[2] if parts[1] == "features" else parts[1]
+
+
+def is_of_feature(name):
+    return name.startswith("exfit.features.")
 
 
 def imports(name, everywhere=True):
@@ -94,18 +90,40 @@ def at_the_top(tree):
             yield from ast.walk(node)
 
 
-def test_every_package_has_a_row_in_the_table():
-    assert {package(name) for name in MODULES} - {""} <= {*MAY_IMPORT}
+def may_import(name):
+    """Return the rooms that a module may import from, beside its own."""
+    if is_of_feature(name):
+        return {*IN_ORDER} | OTHER_FEATURES.get(package(name), set())
+    if package(name) in {*BASE, *LEAVES}:
+        return BASE if package(name) in LEAVES else {"util", "errors"}
+    return BASE | {*IN_ORDER[: IN_ORDER.index(package(name))]}
 
 
-def test_a_package_imports_only_what_its_row_allows():
+def test_every_package_has_its_place_in_the_order():
+    rooms = {package(name) for name in MODULES if not is_of_feature(name)}
+    assert rooms - {"", "features"} == {*IN_ORDER, *BASE}
+
+
+def test_a_package_imports_only_what_its_place_allows():
     faults = [
         f"{name} imports {target}"
         for name in MODULES
         for target in imports(name)
         if package(name) and target.split(".")[0] == "exfit" and package(target)
-        if package(target) not in MAY_IMPORT[package(name)] | BASE | {package(name)}
+        if not (is_of_feature(target) and not is_of_feature(name))
+        if package(target) not in may_import(name) | BASE | {package(name)}
         if (name, target) not in EXCEPTIONS
+    ]
+    assert faults == []
+
+
+def test_the_core_imports_no_feature():
+    faults = [
+        f"{name} imports {target}"
+        for name in MODULES
+        for target in imports(name)
+        if is_of_feature(target) and not is_of_feature(name)
+        if name != "exfit"  # for type checkers only
     ]
     assert faults == []
 

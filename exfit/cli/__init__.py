@@ -10,22 +10,11 @@ from typing import Any
 
 import click
 
-from exfit.cli.catalogue import models, schema
-from exfit.cli.fitting import check, fit
 from exfit.cli.options import Interruption, Refusal
-from exfit.cli.records import inspect_
-from exfit.cli.responses import simulate, validate
 from exfit.cli.streams import unfailing_output
-from exfit.cli.uncertainty import identify, profile
 from exfit.errors import ExfitError
-from exfit.features.compare.command import compare
-from exfit.features.fleet.command import batch
-from exfit.features.planner.commands import export, import_
-from exfit.features.programme.command import run
-from exfit.features.rank.command import rank
-from exfit.features.report.command import report
-from exfit.features.start.command import new
-from exfit.features.translate.command import translate
+from exfit.registry import LazyCommand, LazyPart
+from exfit.registry import commands as of_features
 from exfit.util.interrupts import SIGNALLED, endings_as_interruptions
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
@@ -38,8 +27,52 @@ gc.set_threshold(100_000)
 atexit.register(gc.freeze)
 
 
+GROUPS = ("start", "fit", "examine", "hand over", "reference")
+
+
+def _command(group: str, text: str, place: str) -> LazyCommand:
+    return LazyCommand(group, text, LazyPart(f"exfit.cli.{place}"))
+
+
+OF_CORE = {
+    "inspect": _command("start", "Show the content of a recorder's file.", "records:inspect_"),
+    "fit": _command("fit", "Fit the free parameters of each CASE to its records.", "fitting:fit"),
+    "simulate": _command("examine", "Simulate CASE at its start values.", "responses:simulate"),
+    "validate": _command(
+        "examine", "Compare fitted values with records that were not fitted.", "responses:validate"
+    ),
+    "check": _command("examine", "Check a case before its fit.", "fitting:check"),
+    "profile": _command(
+        "examine",
+        "Find the intervals of parameters by their profile likelihood.",
+        "profiling:profile",
+    ),
+    "models": _command("reference", "List the models, or describe one.", "catalogue:models"),
+    "schema": _command("reference", "Print the JSON Schema of a case file.", "catalogue:schema"),
+}
+
+
 class Commands(click.Group):
-    """The commands; what they refuse is reported without a traceback."""
+    """The commands, each imported when it is called; what they refuse is reported in a line."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """List the names of all commands, in the order of their groups."""
+        known = {**OF_CORE, **of_features()}
+        return sorted(known, key=lambda name: GROUPS.index(known[name].group))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command; None where there is none of that name."""
+        known = OF_CORE.get(cmd_name) or of_features().get(cmd_name)
+        command: click.Command | None = None if known is None else known.part.load()
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by their groups, from what is known without importing them."""
+        known = {**OF_CORE, **of_features()}
+        for group in GROUPS:
+            rows = [(name, each.help) for name, each in known.items() if each.group == group]
+            with formatter.section(group.capitalize()):
+                formatter.write_dl(rows, col_spacing=max(2, 12 - max(len(row[0]) for row in rows)))
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
         """Run as a program: no output that fails keeps a command from its files."""
@@ -78,11 +111,3 @@ def _of_system(fault: OSError) -> str:
 @click.version_option(package_name="exfit")
 def main() -> None:
     """Identify the parameters of a generator's excitation system from a recorded bump test."""
-
-
-OF_RECORDS = (inspect_, new)
-OF_CASES = (fit, batch, run, rank, simulate, validate, check, profile, identify)
-OF_RESULTS = (report, compare, translate, import_, export)
-COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
-for command in COMMANDS:
-    main.add_command(command)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from exfit.features.drawings import block_diagram, diagram_and_remarks, document
+from exfit.features.drawings.diagram import block_diagram, document
+from exfit.features.drawings.letters import diagram_and_remarks
 from exfit.models import GOVERNORS
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, typical

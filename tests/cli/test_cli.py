@@ -17,12 +17,14 @@ import numpy as np
 import pytest
 import yaml
 from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH, with_local_search
-from commands import Ran
+from commands import COMMANDS, Ran
+from new_process import NothingLoaded
 from places import ROOT
 from rich.console import Console
 from tiers import few_of
 
-from exfit import cli, workflows
+from exfit import workflows
+from exfit.engine import kernel as engine
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.results.model import Iteration
@@ -33,7 +35,7 @@ from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel
 from exfit.util import files
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
-COMMANDS = ("fit", "simulate", "validate", "check")
+OF_CASES = ("fit", "simulate", "validate", "check")
 WIDTH = 80
 
 # k/(s + a) with k = 4 and a = 2, a unit step at 0.5 s from rest
@@ -205,7 +207,7 @@ def is_refused(ran, words, before, folder):
     assert listing(folder) == before
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", OF_CASES)
 @pytest.mark.parametrize("fault", CASE_FAULTS)
 def test_a_fault_of_the_case_is_reported_and_nothing_is_written(run, workplace, fault, command):
     base, changes, words = CASE_FAULTS[fault]
@@ -216,7 +218,7 @@ def test_a_fault_of_the_case_is_reported_and_nothing_is_written(run, workplace, 
     is_refused(run(*arguments(command, case)), words, before, workplace)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", OF_CASES)
 @pytest.mark.parametrize("fault", RECORD_FAULTS)
 def test_a_fault_of_the_record_is_reported_and_nothing_is_written(run, workplace, fault, command):
     text, words = RECORD_FAULTS[fault]
@@ -235,7 +237,7 @@ def test_a_fault_of_a_validation_is_reported_before_anything_is_written(run, wor
     is_refused(run(*arguments(command, case)), ["down.csv", "No such file"], before, workplace)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", OF_CASES)
 def test_a_case_that_does_not_exist_is_reported(run, workplace, command):
     before = listing(workplace)
     is_refused(run(*arguments(command, "none.yaml")), ["none.yaml", "No such"], before, workplace)
@@ -317,6 +319,7 @@ def test_an_output_that_cannot_be_a_folder_is_reported_before_the_work(
 )
 def test_a_damaged_cache_is_rebuilt_in_silence(run, tmp_path, monkeypatch, damage):
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(engine, "_loaded", NothingLoaded())
     case = case_file()
     for of_this_process in (kernel, tangent_kernel, linear_kernel):
         of_this_process.cache_clear()
@@ -955,7 +958,7 @@ def test_a_broken_model_of_the_user_s_own_is_reported(run, workplace, monkeypatc
     is_refused(ran, words, before, workplace)
 
 
-@pytest.mark.parametrize("command", [None, *cli.main.commands])
+@pytest.mark.parametrize("command", [None, *COMMANDS])
 @pytest.mark.parametrize("flag", ["-h", "--help"])
 def test_every_command_has_help_that_fits_80_columns(run, command, flag):
     ran = run(*([] if command is None else [command]), flag)
@@ -965,9 +968,9 @@ def test_every_command_has_help_that_fits_80_columns(run, command, flag):
     assert "..." not in ran.out.replace("]...", "")
 
 
-@pytest.mark.parametrize("command", cli.main.commands)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_is_explained(command):
-    for one in cli.main.commands[command].params:
+    for one in COMMANDS[command].params:
         if isinstance(one, click.Option):
             assert one.help, one.name
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
-from exfit.features.report import html
+from exfit.features.report.page import html
 from exfit.results.io import load_result
 
 CASE = {**FIRST_ORDER, "record": {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}}

@@ -4,12 +4,12 @@ import os
 import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from typing import ClassVar
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from new_process import NothingLoaded
 from oracle import drawn_values, float_run, levels, system_of, tangent_run, vector
 
 from exfit.engine import emit
@@ -497,19 +497,6 @@ def square(x):
 
 def nine():
     return apply(square, np.array([3.0]), lanes=1)[0]
-
-
-class NothingLoaded(dict):
-    """Stands for the code that a process has loaded, none of which is found again."""
-
-    kept: ClassVar = []  # it must outlive what calls it
-
-    def __contains__(self, key):
-        return False
-
-    def __setitem__(self, key, value):
-        self.kept.append(value)
-        super().__setitem__(key, value)
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from tiers import few_of
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.planner.export import export
-from exfit.features.report import html
+from exfit.features.report.page import html
 from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter

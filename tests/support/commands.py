@@ -1,6 +1,10 @@
-"""What a command leaves when it is run as the shell does."""
+"""The commands, and what one leaves when it is run as the shell does."""
 
 from typing import NamedTuple
+
+from exfit.cli import main
+
+COMMANDS = {name: main.get_command(None, name) for name in main.list_commands(None)}
 
 
 class Ran(NamedTuple):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from exfit.features.report import PAGE, PRINT
+from exfit.features.report.writing import PAGE, PRINT
 from exfit.results.io import WHOLE_PROGRAMME
 from exfit.show import run_folder
 from exfit.util.file_names import OWN_NAMES, files_named_after, taken_names, unusable

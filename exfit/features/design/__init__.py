@@ -1,1 +1,11 @@
 """Tests that are yet to be made: what they would show, and which would show most."""
+
+COMMANDS = {
+    "identify": (
+        "examine",
+        "Predict how well a planned test determines the parameters.",
+        "command:identify",
+    )
+}
+
+PUBLIC = {"design_test": "design:design_test"}

@@ -1,1 +1,11 @@
 """Grid events: a unit played back, the noise that drives it, PMU channels, causes of a misfit."""
+
+CAUSES_AT_REST = {"record of the event": "record_causes:wrong_event"}
+CAUSES_OF_EVENTS = {
+    "equation of the speed": "unit_causes:other_swing",
+    "governor": "unit_causes:missing_governor",
+    "stabiliser": "unit_causes:missing_stabiliser",
+    "controls out of service": "unit_causes:idle_control",
+    "inertia and damping": "unit_causes:other_motion",
+    "transformer": "unit_causes:other_transformer",
+}

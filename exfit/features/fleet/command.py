@@ -207,7 +207,7 @@ def _write_missing_reports(fleet: "Fleet") -> bool:
     folders = [fleet.folder_of(case) for case in fleet.of_run]
     missing = [folder for folder in folders if folder and not (folder / REPORT).is_file()]
     for folder in dict.fromkeys(missing):
-        from exfit.features.report import write_report
+        from exfit.features.report.writing import write_report
 
         write_report(folder)
     return bool(missing)

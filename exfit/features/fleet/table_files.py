@@ -26,6 +26,6 @@ def write_tables(fleet: Fleet) -> None:
 
 def report_file(result: FitResult, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the report of a fit that will lie in a folder."""
-    from exfit.features.report import html
+    from exfit.features.report.page import html
 
     yield REPORT, html(result, folder)

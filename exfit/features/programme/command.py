@@ -96,7 +96,7 @@ def _shown(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResul
 def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
     """Write what all tests came to and their report, show it, and draw the figures."""
     from exfit.features.programme import folder as programme_folder
-    from exfit.features.report import write_report
+    from exfit.features.report.writing import write_report
 
     try:
         programme_folder.write_programme(result, folder)

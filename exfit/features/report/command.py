@@ -34,6 +34,6 @@ def report(result: Path, output: Path | None, pdf: bool, against: Path | None, f
     only with --force. With --pdf it is a PDF, which needs the package WeasyPrint:
     pip install 'exfit[pdf]'.
     """
-    from exfit.features.report import write_report
+    from exfit.features.report.writing import write_report
 
     echo(f"written to {write_report(result, output, force, pdf, against)}")

@@ -11,15 +11,7 @@ from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
 from exfit.case.case import Case
-from exfit.features.events.record_causes import wrong_event
-from exfit.features.events.unit_causes import (
-    idle_control,
-    missing_governor,
-    missing_stabiliser,
-    other_motion,
-    other_swing,
-    other_transformer,
-)
+from exfit.registry import parts
 from exfit.results.verdict import Cause
 from exfit.verdict.causes.channels import clipped_channel, wrong_offset, wrong_scale, wrong_start
 from exfit.verdict.causes.evidence import Evidence, FittedRecord
@@ -40,77 +32,37 @@ from exfit.verdict.causes.unit import (
 
 __all__ = ["Evidence", "FittedRecord", "Pace", "Recogniser", "Suspicion", "causes_of"]
 
-ALWAYS: tuple[Recogniser, ...] = (
-    wrong_voltage,
-    wrong_event,
-    unsteady_record,
-    wrong_levels,
-    typical_values,
-)
-WITHOUT_TRIAL: tuple[Recogniser, ...] = (
-    not_ended,
-    other_clock,
-    spiky_channel,
-    ripple,
-    drift,
-    wrong_voltage,
-    wrong_event,
-    unsteady_record,
-    typical_values,
-)
-BY_TRIAL: tuple[Recogniser, ...] = (
-    wrong_sign,
-    wrong_size,
-    wrong_instant,
-    wrong_scale,
-    wrong_offset,
-    wrong_start,
-    clipped_channel,
-    narrow_bound,
-    machine_data,
-    fixed_values,
-    wrong_limit,
-    further_step,
-)
-OF_EVENT: tuple[Recogniser, ...] = (
-    other_swing,
-    missing_governor,
-    missing_stabiliser,
-    idle_control,
-    other_motion,
-    other_transformer,
-)
-WORDS: Mapping[Recogniser, str] = {
-    wrong_voltage: "level of vt",
-    wrong_event: "record of the event",
-    unsteady_record: "rest before the step",
-    wrong_levels: "levels at rest",
-    typical_values: "typical values",
-    not_ended: "iterations",
-    other_clock: "unit of the time",
-    spiky_channel: "spikes",
-    ripple: "ripple",
-    drift: "drift",
-    other_swing: "equation of the speed",
-    missing_governor: "governor",
-    missing_stabiliser: "stabiliser",
-    idle_control: "controls out of service",
-    other_motion: "inertia and damping",
-    other_transformer: "transformer",
-    wrong_sign: "sign of the step",
-    wrong_size: "size of the step",
-    wrong_instant: "instant of the step",
-    wrong_scale: "base of a channel",
-    wrong_offset: "zero of a channel",
-    wrong_start: "vt0",
-    clipped_channel: "clipped channel",
-    narrow_bound: "bounds",
-    machine_data: "machine data",
-    fixed_values: "other fixed values",
-    wrong_limit: "limits",
-    further_step: "further step",
-    averaging: "recorder that averages",
-}  # of a cause that was not tried
+ALWAYS: Mapping[str, Recogniser] = {
+    "level of vt": wrong_voltage,
+    "rest before the step": unsteady_record,
+    "levels at rest": wrong_levels,
+    "typical values": typical_values,
+}
+WITHOUT_TRIAL: Mapping[str, Recogniser] = {
+    "iterations": not_ended,
+    "unit of the time": other_clock,
+    "spikes": spiky_channel,
+    "ripple": ripple,
+    "drift": drift,
+    "level of vt": wrong_voltage,
+    "rest before the step": unsteady_record,
+    "typical values": typical_values,
+}
+BY_TRIAL: Mapping[str, Recogniser] = {
+    "sign of the step": wrong_sign,
+    "size of the step": wrong_size,
+    "instant of the step": wrong_instant,
+    "base of a channel": wrong_scale,
+    "zero of a channel": wrong_offset,
+    "vt0": wrong_start,
+    "clipped channel": clipped_channel,
+    "bounds": narrow_bound,
+    "machine data": machine_data,
+    "other fixed values": fixed_values,
+    "limits": wrong_limit,
+    "further step": further_step,
+}
+LAST: Mapping[str, Recogniser] = {"recorder that averages": averaging}
 FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
 
 
@@ -121,16 +73,24 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     Where an interruption or its pace ends the search for them, they are those found by then.
     """
     nothing_to_explain = matched or evidence.interrupted
-    found = _found(evidence, ALWAYS if nothing_to_explain else recognisers_of(evidence.case))
+    recognisers = recognisers_of(evidence.case)
+    if nothing_to_explain:
+        recognisers = {**ALWAYS, **_of_features("CAUSES_AT_REST")}
+    found = _found(evidence, recognisers)
     suspicions = sorted(_credible(evidence, found), key=lambda each: -each.likelihood)
     if not nothing_to_explain:
         suspicions = likely(with_model(evidence, suspicions))
     return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
 
 
-def recognisers_of(case: Case) -> tuple[Recogniser, ...]:
-    """Return what looks for the causes of a misfit in turn, the recorder's last."""
-    return *WITHOUT_TRIAL, *(OF_EVENT if case.kind.finds_rest else ()), *BY_TRIAL, averaging
+def recognisers_of(case: Case) -> Mapping[str, Recogniser]:
+    """List what looks for the causes of a misfit in turn, the recorder's last."""
+    of_events = _of_features("CAUSES_OF_EVENTS") if case.kind.finds_rest else {}
+    return {**WITHOUT_TRIAL, **_of_features("CAUSES_AT_REST"), **of_events, **BY_TRIAL, **LAST}
+
+
+def _of_features(plug: str) -> Mapping[str, Recogniser]:
+    return {words: part.load() for words, part in parts(plug).items()}
 
 
 def _credible(
@@ -158,18 +118,18 @@ def likely(suspicions: Sequence[Suspicion]) -> list[Suspicion]:
 
 
 def _found(
-    evidence: Evidence, recognisers: Sequence[Recogniser]
+    evidence: Evidence, recognisers: Mapping[str, Recogniser]
 ) -> dict[Recogniser, list[Suspicion]]:
     """Return what each recogniser finds, until an interruption or the pace ends it."""
     pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
     try:
-        for done, recognise in enumerate(recognisers):
+        for done, recognise in enumerate(recognisers.values()):
             found[recognise] = []
             pace.counts(done, len(recognisers), evidence.cost)
             for suspicion in recognise(evidence):
                 found[recognise].append(suspicion)
         pace.ended()
     except (KeyboardInterrupt, OutOfTime) as ending:
-        left = recognisers[max(len(found) - 1, 0) :]
-        pace.stopped(tuple(WORDS[each] for each in left), isinstance(ending, KeyboardInterrupt))
+        left = (*recognisers,)[max(len(found) - 1, 0) :]
+        pace.stopped(left, isinstance(ending, KeyboardInterrupt))
     return found

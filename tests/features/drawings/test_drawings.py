@@ -9,10 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from exfit.features.drawings import block_diagram, diagram_and_remarks, document
+from exfit.features.drawings.diagram import block_diagram, document
 from exfit.features.drawings.formulas import SIZE
 from exfit.features.drawings.layout import picture
-from exfit.features.drawings.letters import SIDES, read
+from exfit.features.drawings.letters import SIDES, diagram_and_remarks, read
 from exfit.features.drawings.parts import CLIP
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES

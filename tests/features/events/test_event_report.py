@@ -8,7 +8,7 @@ import yaml
 from grid_events import event_case, recorded
 from pages import Page
 
-from exfit.features.report import html
+from exfit.features.report.page import html
 from exfit.features.report.sections.usability import usability
 from exfit.results.io import load_result, result_text
 from exfit.show.terminal import comparisons

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
+from commands import COMMANDS
 from dynamics import SAMPLE, SOUND, THREE, garbage, replaced
 from places import ROOT
 from tiers import few_of
@@ -562,7 +563,7 @@ def test_a_fit_of_a_user_s_own_model_has_no_record(run):
 
 def test_every_option_of_both_commands_is_explained_and_the_names_are_found():
     for command in ("import", "export"):
-        for one in cli.main.commands[command].params:
+        for one in COMMANDS[command].params:
             if isinstance(one, click.Option):
                 assert one.help, one.name
     assert definition_of("GENROU") is not None

@@ -11,7 +11,7 @@ from records import config
 from exfit import workflows
 from exfit.case.load import load_case
 from exfit.features.drawings import block_diagram
-from exfit.features.report import html
+from exfit.features.report.page import html
 from exfit.results.io import load_result, result_text
 from exfit.show import terminal
 from exfit.show.notebook import fit_html

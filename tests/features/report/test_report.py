@@ -25,8 +25,8 @@ from exfit import cli, workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.planner.export import export
-from exfit.features.report import html, write_report
 from exfit.features.report.charts import Axis, Chart, Panel, Series, drawing, ticks
+from exfit.features.report.page import html, write_report
 from exfit.features.report.sections.matches import fitted_matches, live_data
 from exfit.features.report.verdict import headline
 from exfit.models import from_file

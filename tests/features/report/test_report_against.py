@@ -6,7 +6,7 @@ from pages import Page
 from records import TEST, TIME, case_of, one, synthetic
 
 from exfit import cli, workflows
-from exfit.features.report import html
+from exfit.features.report.page import html
 from exfit.features.report.sections.against import against
 from exfit.show import run_folder
 

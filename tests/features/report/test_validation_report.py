@@ -10,7 +10,7 @@ from pages import Page
 
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
-from exfit.features.report import write_report
+from exfit.features.report.writing import write_report
 from exfit.results.io import load_validation
 from exfit.show.run_folder import write_validation
 from exfit.workflows import validation_result

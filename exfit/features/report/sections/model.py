@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, log
 
-from exfit.features.drawings import block_diagram, diagram_and_remarks
+from exfit.features.drawings.diagram import block_diagram
+from exfit.features.drawings.letters import diagram_and_remarks
 from exfit.features.report.sections.other_program import has_no_equations, other_program
 from exfit.results.description import PartDescription
 from exfit.results.validation_result import Reported

@@ -1,0 +1,64 @@
+"""The command profile."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli import completion
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    Output,
+    case_argument,
+    load,
+    output_options,
+    print_json,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command(short_help="Find the intervals of parameters by their profile likelihood.")
+@case_argument
+@click.argument(
+    "parameters",
+    nargs=-1,
+    metavar="[PARAM]...",
+    shell_complete=completion.free_parameters,
+)
+@output_options
+def profile(
+    case: Path,
+    parameters: tuple[str, ...],
+    output: Output,
+) -> None:
+    """Fit CASE, then find the 95 % interval of each PARAM from its profile likelihood.
+
+    A parameter is moved away from its fitted value and the others are fitted again, until the cost
+    shows that the record excludes it. Use it where the linear theory of `exfit fit` does not apply.
+    Without PARAM all free parameters are profiled. Writes profile.json, profile.csv and profile.png
+    to runs/CASE-profile, or to DIR. Ctrl-C keeps the profiles found so far.
+    """
+    from exfit import workflows
+    from exfit.show import run_folder
+
+    loaded = load(case)
+    folder = output.folder_of(loaded, "profile")
+    if not output.shown:
+        profiles = workflows.profile(loaded, parameters)
+    else:
+        from exfit.show import terminal
+
+        console = terminal.console()
+        with terminal.ProgressBar(console).running() as progress:
+            profiles = workflows.profile(loaded, parameters, progress)
+    figures = run_folder.write_profiles(profiles, folder)
+    if output.as_json:
+        print_json(profiles.as_json())
+    elif output.shown:
+        terminal.profiles(console, profiles)
+        terminal.written(console, folder)
+    output.draw(figures)
+    if profiles.interrupted:
+        raise SystemExit(NOT_CONVERGED)

@@ -1,0 +1,72 @@
+"""The features: each a folder of `exfit.features`, whose ``__init__`` says which plugs it fills.
+
+A plug is a table from names to texts ``module:name`` within the folder, so that nothing of a
+feature is imported before it is used:
+
+    COMMANDS  commands of the shell: (group, short help, "command:rank")
+    PUBLIC    names of `exfit` itself
+    CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of a misfit, by what it looks at
+
+The core asks for plugs here and names no feature.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Any
+
+PLACE = "exfit.features"
+
+
+@dataclass(frozen=True)
+class LazyPart:
+    """Something of a feature, imported when it is loaded: ``path`` is "package.module:name"."""
+
+    path: str
+
+    def load(self) -> Any:
+        """Import the module and return what has the name there."""
+        module, _, name = self.path.partition(":")
+        return getattr(import_module(module), name)
+
+
+@dataclass(frozen=True)
+class LazyCommand:
+    """A command of the shell, known without being imported: its group and its short help."""
+
+    group: str
+    help: str
+    part: LazyPart
+
+
+@cache
+def features() -> Mapping[str, ModuleType]:
+    """List the features by name: packages that name their plugs and import nothing."""
+    spec = find_spec(PLACE)
+    places = None if spec is None else spec.submodule_search_locations
+    names = sorted(each.name for each in iter_modules(places) if each.ispkg) if places else []
+    return {name: import_module(f"{PLACE}.{name}") for name in names}
+
+
+@cache
+def parts(plug: str) -> Mapping[str, LazyPart]:
+    """Collect what all features fill a plug with, by name."""
+    return {
+        name: LazyPart(f"{PLACE}.{feature}.{path}")
+        for feature, module in features().items()
+        for name, path in getattr(module, plug, {}).items()
+    }
+
+
+@cache
+def commands() -> Mapping[str, LazyCommand]:
+    """Collect the commands of all features by name."""
+    return {
+        name: LazyCommand(group, text, LazyPart(f"{PLACE}.{feature}.{path}"))
+        for feature, module in features().items()
+        for name, (group, text, path) in getattr(module, "COMMANDS", {}).items()
+    }
