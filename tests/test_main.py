@@ -20,7 +20,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("module", ["click", "exfit.cli", "exfit.cli.uncertainty"])
+@pytest.mark.parametrize("module", ["click", "exfit.cli", "exfit.cli.streams"])
 def test_ctrl_c_while_the_program_is_imported_ends_it_without_a_traceback(module):
     code = INTERRUPTED_IMPORT.format(module=module)
     ran = subprocess.run(

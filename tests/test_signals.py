@@ -8,7 +8,7 @@ from sources import ROOT, nodes
 
 from exfit.case.schema import RecordFile
 from exfit.cli.completion import noises
-from exfit.features.events import grid_playback
+from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import (

@@ -11,7 +11,7 @@ import pytest
 from places import REFERENCE
 from references import MACHINE_NAMES
 
-from exfit.features.events import grid_playback
+from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical

@@ -2,6 +2,14 @@
 
 from typing import TYPE_CHECKING
 
+from exfit.show.figures.fit_series import fit_series
+from exfit.show.figures.iterations import iterations
+from exfit.show.figures.overlays import overlay, overlays
+from exfit.show.figures.records import inspection
+from exfit.show.figures.responses import overview, response
+from exfit.show.figures.search import convergence, trajectories, waterfall
+from exfit.show.figures.style import drawn, encoded, png
+from exfit.show.figures.uncertainty import correlation, profiles, sensitivity
 from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
@@ -11,14 +19,6 @@ if TYPE_CHECKING:
     from exfit.features.programme.figure_v_curve import v_curve
     from exfit.features.rank.figure import ranking
     from exfit.features.translate.figure import translation
-    from exfit.show.figures.fit_series import fit_series
-    from exfit.show.figures.iterations import iterations
-    from exfit.show.figures.overlays import overlay, overlays
-    from exfit.show.figures.records import inspection
-    from exfit.show.figures.responses import overview, response
-    from exfit.show.figures.search import convergence, trajectories, waterfall
-    from exfit.show.figures.style import drawn, encoded, png
-    from exfit.show.figures.uncertainty import correlation, profiles, sensitivity
 
 __all__ = [
     "agreement",
@@ -52,22 +52,6 @@ _MODULES = {
     "v_curve": "exfit.features.programme.figure_v_curve",
     "ranking": "exfit.features.rank.figure",
     "translation": "exfit.features.translate.figure",
-    "fit_series": "exfit.show.figures.fit_series",
-    "iterations": "exfit.show.figures.iterations",
-    "overlay": "exfit.show.figures.overlays",
-    "overlays": "exfit.show.figures.overlays",
-    "inspection": "exfit.show.figures.records",
-    "overview": "exfit.show.figures.responses",
-    "response": "exfit.show.figures.responses",
-    "convergence": "exfit.show.figures.search",
-    "trajectories": "exfit.show.figures.search",
-    "waterfall": "exfit.show.figures.search",
-    "drawn": "exfit.show.figures.style",
-    "encoded": "exfit.show.figures.style",
-    "png": "exfit.show.figures.style",
-    "correlation": "exfit.show.figures.uncertainty",
-    "profiles": "exfit.show.figures.uncertainty",
-    "sensitivity": "exfit.show.figures.uncertainty",
 }
 
 __getattr__ = names_of(__name__, _MODULES)

@@ -11,7 +11,7 @@ from places import REFERENCE
 from scipy.interpolate import CubicSpline
 
 from exfit.engine.trace import larger, sqrt, where
-from exfit.features.events import grid_playback
+from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.blocks import field_demand, pi_rest
 from exfit.models.exciters import ac8b

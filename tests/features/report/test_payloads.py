@@ -10,7 +10,7 @@ from records import config
 
 from exfit import workflows
 from exfit.case.load import load_case
-from exfit.features.drawings import block_diagram
+from exfit.features.drawings.diagram import block_diagram
 from exfit.features.report.page import html
 from exfit.results.io import load_result, result_text
 from exfit.show import terminal

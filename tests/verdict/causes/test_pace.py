@@ -11,7 +11,7 @@ from exfit.case.case import Case
 from exfit.records.record import Record
 from exfit.results.verdict import MATCHES, MISSES, NOT_CONVERGED
 from exfit.verdict import rule, verdict_of
-from exfit.verdict.causes import WITHOUT_TRIAL, WORDS, Pace, recognisers_of
+from exfit.verdict.causes import WITHOUT_TRIAL, Pace, recognisers_of
 from exfit.verdict.causes.pace import LEAST_TIME, TIMES_SEARCH, OutOfTime, time_for_causes
 from exfit.workflows import fit_run
 
@@ -76,10 +76,10 @@ def test_where_the_time_is_over_the_rest_is_said_to_be_untried(evidence, seconds
     whole = with_pace(evidence, Pace())
     pace = Pace(seconds, clock=itertools.count().__next__)
     verdict = with_pace(evidence, pace)
-    order = [WORDS[each] for each in recognisers_of(evidence.case)]
+    order = [*recognisers_of(evidence.case)]
     assert pace.untried
     assert order[-len(pace.untried) :] == [*pace.untried]
-    assert not {WORDS[each] for each in WITHOUT_TRIAL} & {*pace.untried}
+    assert not {*WITHOUT_TRIAL} & {*pace.untried}
     assert not pace.interrupted
     assert f"estimate.causes, {seconds} s" in pace.sentence
     assert (verdict.verdict, verdict.reason) == (whole.verdict, whole.reason)
@@ -94,7 +94,7 @@ def test_with_time_enough_nothing_is_untried(evidence):
 def test_an_interruption_at_any_announcement_leaves_the_verdict_and_the_causes_until_then(evidence):
     heard = Announcements()
     whole = with_pace(evidence, Pace(watch=heard))
-    untried, found = len(WORDS), 0
+    untried, found = len(recognisers_of(evidence.case)), 0
     for last in range(1, heard.count + 1, max(1, heard.count // 20)):
         pace = Pace(watch=Announcements(last))
         verdict = with_pace(evidence, pace)
@@ -114,13 +114,12 @@ def test_each_recogniser_may_be_interrupted(evidence, monkeypatch):
         yield
 
     recognisers = recognisers_of(evidence.case)
-    for place, recognise in enumerate(recognisers):
-        others = (*recognisers[:place], interrupted, *recognisers[place + 1 :])
+    for place, words in enumerate(recognisers):
+        others = {**recognisers, words: interrupted}
         monkeypatch.setattr(causes, "recognisers_of", lambda _, others=others: others)
-        monkeypatch.setattr(causes, "WORDS", {**WORDS, interrupted: WORDS[recognise]})
         pace = Pace()
         assert with_pace(evidence, pace).verdict == MISSES
-        assert pace.untried == tuple(WORDS[each] for each in recognisers[place:])
+        assert pace.untried == (*recognisers,)[place:]
         assert pace.interrupted
 
 
