@@ -16,7 +16,7 @@ import yaml
 from commands import COMMANDS
 from matplotlib.figure import Figure
 from places import REFERENCE, ROOT
-from test_layers import MAY_IMPORT
+from test_layers import IN_ORDER
 
 import exfit
 from exfit import workflows
@@ -370,22 +370,20 @@ def test_the_python_of_the_page_gives_the_values_that_it_says(page, monkeypatch)
 # ---- architecture
 
 
-def test_the_tree_of_the_architecture_has_every_package():
+def test_the_tree_of_the_architecture_has_every_package_and_every_feature():
     tree = block("architecture.md", "text", 1)
-    entries = [path for path in Path(exfit.__file__).parent.iterdir() if path.suffix != ".typed"]
-    names = {f"{path.name}/" if path.is_dir() else path.name for path in entries}
-    assert set(re.findall(r"^  (\w\S+)", tree, re.MULTILINE)) == names - {"__pycache__/"}
+    place = Path(exfit.__file__).parent
+    for folder, indent in ((place, "  "), (place / "features", "    ")):
+        entries = [path for path in folder.iterdir() if path.suffix != ".typed"]
+        names = {f"{path.name}/" if path.is_dir() else path.name for path in entries}
+        names -= {"__pycache__/"} | ({"__init__.py"} if folder != place else set())
+        assert set(re.findall(rf"^{indent}(\w\S+)", tree, re.MULTILINE)) == names
 
 
-def test_the_layers_of_the_architecture_are_those_that_are_tested():
-    rows = re.findall(
-        r"^\| ([a-z_, ]+) \| ([a-z, ]+) \|$", PAGES["docs/architecture.md"], re.MULTILINE
-    )
-    named = {row: cell for names, cell in rows for row in names.split(", ") if row in MAY_IMPORT}
-    assert set(named) == set(MAY_IMPORT) - {"util", "errors", "signals"} | {"util"}
-    for package, cell in named.items():
-        if set(cell.split(", ")) <= set(MAY_IMPORT):
-            assert set(cell.split(", ")) == MAY_IMPORT[package], package
+def test_the_order_of_the_architecture_is_that_which_is_tested():
+    page = PAGES["docs/architecture.md"]
+    (order,) = re.findall(r"each may import those before it:\n\n((?:`\w+`\s)+)", page)
+    assert tuple(re.findall(r"`(\w+)`", order)) == IN_ORDER
 
 
 # ---- links

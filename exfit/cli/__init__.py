@@ -28,6 +28,7 @@ atexit.register(gc.freeze)
 
 
 GROUPS = ("start", "fit", "examine", "hand over", "reference")
+COMMAND_WIDTH = 9  # characters: the groups align
 
 
 def _command(group: str, text: str, place: str) -> LazyCommand:
@@ -71,28 +72,9 @@ class Commands(click.Group):
         known = {**OF_CORE, **of_features()}
         for group in GROUPS:
             rows = [(name, each.help) for name, each in known.items() if each.group == group]
-            with formatter.section(group.capitalize()):
-                formatter.write_dl(rows, col_spacing=max(2, 12 - max(len(row[0]) for row in rows)))
-
-    def main(self, *arguments: Any, **settings: Any) -> Any:
-        """Run as a program: no output that fails keeps a command from its files."""
-        with unfailing_output() as exit_code, endings_as_interruptions() as signals:
-            try:
-                return super().main(*arguments, **settings)
-            except SystemExit as ended:
-                code = exit_code(ended.code)
-                raise SystemExit(SIGNALLED + signals[0] if signals else code) from None
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run a command, and turn what is wrong with its input into a message."""
-        try:
-            return super().invoke(ctx)
-        except ExfitError as fault:
-            raise Refusal(str(fault)) from fault
-        except OSError as fault:
-            raise Refusal(_of_system(fault)) from fault
-        except KeyboardInterrupt as interruption:
-            raise Interruption(str(interruption)) from None
+            if rows:
+                with formatter.section(group.capitalize()):
+                    formatter.write_dl([(name.ljust(COMMAND_WIDTH), text) for name, text in rows])
 
 
 def _of_system(fault: OSError) -> str:
