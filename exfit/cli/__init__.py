@@ -76,6 +76,26 @@ class Commands(click.Group):
                 with formatter.section(group.capitalize()):
                     formatter.write_dl([(name.ljust(COMMAND_WIDTH), text) for name, text in rows])
 
+    def main(self, *arguments: Any, **settings: Any) -> Any:
+        """Run as a program: no output that fails keeps a command from its files."""
+        with unfailing_output() as exit_code, endings_as_interruptions() as signals:
+            try:
+                return super().main(*arguments, **settings)
+            except SystemExit as ended:
+                code = exit_code(ended.code)
+                raise SystemExit(SIGNALLED + signals[0] if signals else code) from None
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command, and turn what is wrong with its input into a message."""
+        try:
+            return super().invoke(ctx)
+        except ExfitError as fault:
+            raise Refusal(str(fault)) from fault
+        except OSError as fault:
+            raise Refusal(_of_system(fault)) from fault
+        except KeyboardInterrupt as interruption:
+            raise Interruption(str(interruption)) from None
+
 
 def _of_system(fault: OSError) -> str:
     """Return what the system refuses: a name that is too long, a folder that may not be read.
