@@ -19,11 +19,11 @@ from exfit.cli.options import (
 )
 from exfit.cli.several_fits import fit_several
 from exfit.cli.streams import echo
+from exfit.registry import parts
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.features.programme.case import Programme
     from exfit.results.model import FitResult
 
 
@@ -139,27 +139,16 @@ def check(case: Path) -> None:
     they give.
     """
     from exfit import workflows
-    from exfit.features.programme.case import load_programme
+    from exfit.case.peek import keys_of
     from exfit.show import terminal
 
-    programme = load_programme(case)
-    if programme.single is None:
-        _check_programme(programme)
-        return
-    result = workflows.check(programme.single)
+    keys = keys_of(case)
+    for key, checked in parts("CHECKS").items():
+        if key in keys:
+            if not checked.load()(case):
+                raise SystemExit(NOT_CONVERGED)
+            return
+    result = workflows.check(case)
     terminal.check(terminal.console(), result)
     if not (result.agrees and result.flat):
-        raise SystemExit(NOT_CONVERGED)
-
-
-def _check_programme(programme: "Programme") -> None:
-    """Check each test of a programme; raises SystemExit where something speaks against one."""
-    from exfit.features.programme.checking import check_programme
-    from exfit.show import terminal
-
-    sound = True
-    for checked in check_programme(programme):
-        terminal.checked_step(terminal.console(), checked)
-        sound = sound and checked.sound
-    if not sound:
         raise SystemExit(NOT_CONVERGED)

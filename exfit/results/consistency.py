@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.features.programme.saturation_result import SaturationResult
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.saturation_result import SaturationResult
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.description import Behaviour

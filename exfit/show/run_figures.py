@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from exfit.features.compare.agreement import Agreement
     from exfit.features.design.designed_test import DesignedTest
     from exfit.features.design.experiment_design import Design
-    from exfit.features.programme.saturation_result import SaturationResult
-    from exfit.features.programme.v_curve_result import VCurve
+    from exfit.features.programme.steady.saturation_result import SaturationResult
+    from exfit.features.programme.steady.v_curve_result import VCurve
     from exfit.features.rank.ranked_cases import Ranking
     from exfit.features.translate.result import Translation
     from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -96,7 +96,7 @@ def of_phase_ends(result: "FitResult") -> PlannedFigures:
 
 def of_steady_test(result: "SaturationResult | VCurve", name: str) -> PlannedFigures:
     """Return the figure of a test at rest."""
-    from exfit.features.programme.v_curve_result import VCurve
+    from exfit.features.programme.steady.v_curve_result import VCurve
     from exfit.show import figures as plots
 
     if isinstance(result, VCurve):

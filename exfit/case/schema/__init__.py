@@ -45,9 +45,17 @@ from exfit.case.schema.tests import (
     Switch,
 )
 from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
-from exfit.features.programme.schema import RecordedBump, RecordedRejection, TestOfProgramme
-from exfit.features.programme.schema_saturation import CurveColumn, SaturationTest
-from exfit.features.programme.schema_steady import PointColumn, SteadyTest
+from exfit.features.programme.case.programme_schema import (
+    RecordedBump,
+    RecordedRejection,
+    TestOfProgramme,
+)
+from exfit.features.programme.case.schema_at_rest import (
+    CurveColumn,
+    PointColumn,
+    SaturationTest,
+    SteadyTest,
+)
 
 __all__ = [
     "MOST_ROWS",

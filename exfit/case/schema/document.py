@@ -10,7 +10,7 @@ from exfit.case.schema.records import RecordFile, Recording
 from exfit.case.schema.report import AsFoundSection, ReportRequest
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Fact, Frozen, Section, Text, nothing
-from exfit.features.programme.schema import TestOfProgramme
+from exfit.features.programme.case.programme_schema import TestOfProgramme
 
 ABOUT = Field(
     default_factory=nothing,

@@ -3,3 +3,5 @@
 COMMANDS = {"run": ("fit", "Run all tests of a unit, each feeding the later ones.", "command:run")}
 
 PUBLIC = {"run": "run:run", "saturation_curve": "steady.saturation:saturation_curve"}
+
+CHECKS = {"tests": "command:check"}

@@ -17,7 +17,7 @@ from exfit.cli.options import (
 from exfit.errors import FileError
 
 if TYPE_CHECKING:
-    from exfit.features.programme.case import Programme
+    from exfit.features.programme.case.programme import Programme
     from exfit.features.programme.result import ProgrammeResult
 
 
@@ -40,7 +40,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
     Exit code 0: every test is matched; 1: bad input, or a test that failed; 3: a test that is not
     matched, a validation that is not accepted, or not all tests are run.
     """
-    from exfit.features.programme.case import load_programme
+    from exfit.features.programme.case.programme import load_programme
 
     loaded = load_programme(programme)
     folder = _folder_of(loaded, output)
@@ -57,7 +57,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
 def _folder_of(programme: "Programme", output: Output) -> Path:
     """Return the folder of a programme; raises ExfitError where a result would replace an input."""
     from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.steps import steps_of
+    from exfit.features.programme.case.programme import steps_of
 
     folder = output.folder(f"{programme.path.stem}-run")
     names = [step.name for step in steps_of(programme)]
@@ -77,8 +77,8 @@ def _quiet(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResul
 def _shown(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResult":
     """Run a programme, write the numbers of its tests, and show how far it is."""
     from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme.case.programme import steps_of
     from exfit.features.programme.run import run
-    from exfit.features.programme.steps import steps_of
     from exfit.show import terminal
 
     shown = terminal.ProgrammeProgress(terminal.console(), steps_of(programme))
@@ -129,3 +129,16 @@ def _draw(result: "ProgrammeResult", folder: Path, output: Output) -> None:
         warn(figures.draw())
         if output.shown:
             terminal.figures_of_fit(terminal.console(), name)
+
+
+def check(path: Path) -> bool:
+    """Check each test of a programme and show what comes of it; False: something speaks against."""
+    from exfit.features.programme.case.programme import load_programme
+    from exfit.features.programme.checked_programme import check_programme
+    from exfit.show import terminal
+
+    sound = True
+    for checked in check_programme(load_programme(path)):
+        terminal.checked_step(terminal.console(), checked)
+        sound = sound and checked.sound
+    return sound

@@ -8,8 +8,8 @@ import numpy as np
 
 from exfit.features.programme.kept import summary_text, text_of
 from exfit.features.programme.result import FinishedTest, ProgrammeResult
-from exfit.features.programme.saturation_result import SaturationResult
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.saturation_result import SaturationResult
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.results.model import FitResult
 from exfit.results.tables import table

@@ -9,11 +9,10 @@ from typing import Any
 
 from exfit import __version__
 from exfit.errors import ExfitError
-from exfit.features.programme.case import Programme
+from exfit.features.programme.case.programme import Programme, ProgrammeStep
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
-from exfit.features.programme.saturation_result import SaturationResult
-from exfit.features.programme.steps import ProgrammeStep
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.saturation_result import SaturationResult
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.records.reading import file_hash
 from exfit.results.consistency import steady_contradictions
 from exfit.results.description import UnitDescription

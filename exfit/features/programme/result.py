@@ -6,8 +6,8 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from exfit.features.programme.saturation_result import SaturationResult
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.saturation_result import SaturationResult
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of

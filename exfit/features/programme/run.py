@@ -11,13 +11,18 @@ from exfit import estimate, workflows
 from exfit.case.case import Case
 from exfit.case.schema import SaturationTest, SteadyTest
 from exfit.errors import CaseError, ExfitError
-from exfit.features.programme.case import FIT, Programme, load_programme
+from exfit.features.programme.case.programme import (
+    FIT,
+    Programme,
+    ProgrammeStep,
+    load_programme,
+    steps_of,
+)
 from exfit.features.programme.kept import KEY, Keep, keep, key_of, result_kept
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
 from exfit.features.programme.steady.points import points_of
 from exfit.features.programme.steady.saturation_test import saturation
 from exfit.features.programme.steady.steady_test import steady
-from exfit.features.programme.steps import ProgrammeStep, steps_of
 from exfit.features.programme.values import bases_of, errors_of_bases, values_given, with_values
 from exfit.fitting.recordings import record_of
 from exfit.plants import MACHINE

@@ -11,11 +11,11 @@ from dataclasses import replace
 from typing import Any
 
 from exfit.case.case import Case
-from exfit.features.programme.case import Programme
+from exfit.features.programme.case.programme import Programme
 from exfit.features.programme.result import EnteredValue, FinishedTest
-from exfit.features.programme.saturation_result import MeasuredValue, SaturationResult
+from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
 from exfit.features.programme.steady.saturation_test import channel_bases, machine_values
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.overrides import with_given_values
 from exfit.plants import MACHINE
 from exfit.records.units import alike

@@ -15,8 +15,7 @@ from exfit.util.lazy import names_of
 if TYPE_CHECKING:
     from exfit.features.compare.figure import agreement
     from exfit.features.design.figure import designed_test
-    from exfit.features.programme.figure_saturation import saturation
-    from exfit.features.programme.figure_v_curve import v_curve
+    from exfit.features.programme.show.programme_figures import saturation, v_curve
     from exfit.features.rank.figure import ranking
     from exfit.features.translate.figure import translation
 
@@ -48,8 +47,8 @@ __all__ = [
 _MODULES = {
     "agreement": "exfit.features.compare.figure",
     "designed_test": "exfit.features.design.figure",
-    "saturation": "exfit.features.programme.figure_saturation",
-    "v_curve": "exfit.features.programme.figure_v_curve",
+    "saturation": "exfit.features.programme.show.programme_figures",
+    "v_curve": "exfit.features.programme.show.programme_figures",
     "ranking": "exfit.features.rank.figure",
     "translation": "exfit.features.translate.figure",
 }

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from exfit.features.compare.terminal import agreement
     from exfit.features.design.terminal import designed_test
     from exfit.features.fleet.terminal import BatchProgress, batch
-    from exfit.features.programme.terminal import ProgrammeProgress, checked_step, programme
+    from exfit.features.programme.show.programme_terminal import (
+        ProgrammeProgress,
+        checked_step,
+        programme,
+    )
     from exfit.features.rank.terminal import ranking
     from exfit.features.translate.terminal import translation
     from exfit.show.terminal.checks import check
@@ -70,9 +74,9 @@ _MODULES = {
     "designed_test": "exfit.features.design.terminal",
     "BatchProgress": "exfit.features.fleet.terminal",
     "batch": "exfit.features.fleet.terminal",
-    "ProgrammeProgress": "exfit.features.programme.terminal",
-    "checked_step": "exfit.features.programme.terminal",
-    "programme": "exfit.features.programme.terminal",
+    "ProgrammeProgress": "exfit.features.programme.show.programme_terminal",
+    "checked_step": "exfit.features.programme.show.programme_terminal",
+    "programme": "exfit.features.programme.show.programme_terminal",
     "ranking": "exfit.features.rank.terminal",
     "translation": "exfit.features.translate.terminal",
     "check": "exfit.show.terminal.checks",

@@ -13,9 +13,8 @@ import exfit
 from exfit import workflows
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme import run as running
-from exfit.features.programme.case import load_programme
+from exfit.features.programme.case.programme import ProgrammeStep, load_programme
 from exfit.features.programme.kept import load_summary, result_kept, summary_text
-from exfit.features.programme.steps import ProgrammeStep
 from exfit.results.verdict import NOT_CONVERGED
 from exfit.util.files import write
 

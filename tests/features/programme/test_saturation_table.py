@@ -3,8 +3,8 @@
 import numpy as np
 from rich.console import Console
 
+from exfit.features.programme.show.programme_terminal import saturation
 from exfit.features.programme.steady.saturation import saturation_curve
-from exfit.features.programme.terminal_saturation import saturation
 
 
 def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):

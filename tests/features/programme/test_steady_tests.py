@@ -4,7 +4,7 @@ import pytest
 
 from exfit.case.checks.node import ContentNode
 from exfit.case.schema import SteadyTest
-from exfit.features.programme.checks_steady import steady_test_faults
+from exfit.features.programme.case.programme_checks import steady_test_faults
 
 COLUMNS = {
     "p": {"column": "MW", "unit": "MW", "base": 120.0},

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from exfit.features.programme.show.programme_terminal import v_curve as show
 from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad
 from exfit.features.programme.steady.v_curve import v_curve
-from exfit.features.programme.terminal_v_curve import v_curve as show
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical

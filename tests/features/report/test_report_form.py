@@ -8,7 +8,7 @@ from records import TEST, TIME, case_of, config, one, synthetic
 
 import exfit
 from exfit import workflows
-from exfit.features.programme.page import programme_page
+from exfit.features.programme.show.programme_page import programme_page
 from exfit.features.report.page import html
 from exfit.features.report.sections import SECTIONS
 from exfit.features.report.sections.as_found import as_found

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from exfit.case.schema import SaturationTest, SteadyTest
-from exfit.features.programme.schema_saturation import CURVE_SIGNALS
-from exfit.features.programme.schema_steady import POINT_SIGNALS
+from exfit.features.programme.case.schema_at_rest import CURVE_SIGNALS, POINT_SIGNALS
 from exfit.records.points import Points, given_points, read_points
 
 

@@ -14,13 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exfit.errors import ExfitError
-from exfit.features.programme.saturation_result import (
-    Array,
-    FittedCurve,
-    MeasuredValue,
-    SaturationForm,
-    SaturationResult,
-)
 from exfit.features.programme.steady.saturation_forms import (
     AT_10,
     AT_12,
@@ -33,6 +26,13 @@ from exfit.features.programme.steady.saturation_forms import (
     fitted,
 )
 from exfit.features.programme.steady.saturation_notes import notes
+from exfit.features.programme.steady.saturation_result import (
+    Array,
+    FittedCurve,
+    MeasuredValue,
+    SaturationForm,
+    SaturationResult,
+)
 from exfit.inference.quantiles import student_quantile
 
 WITHOUT_CURRENT = 0.01  # of the largest field current: a point of remanence

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.estimate import OneByOne, ProfileEnd, half_square, least_squares, profiles
-from exfit.features.programme.saturation_result import Array, MeasuredValue, SaturationForm
+from exfit.features.programme.steady.saturation_result import Array, MeasuredValue, SaturationForm
 from exfit.inference.confidence import LEVEL, Interval
 from exfit.inference.quantiles import student_quantile
 from exfit.models.blocks import exponential_se

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from exfit.features.programme.saturation_result import FittedCurve, SaturationResult
+from exfit.features.programme.steady.saturation_result import FittedCurve, SaturationResult
 from exfit.inference.wording import listed
 
 AIR_GAP_END = 0.6  # pu: below it hardly any machine saturates

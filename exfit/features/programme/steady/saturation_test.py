@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from exfit.errors import RecordError
-from exfit.features.programme.saturation_result import MeasuredValue, SaturationResult
-from exfit.features.programme.schema_saturation import CURVE_SIGNALS, SaturationTest
+from exfit.features.programme.case.schema_at_rest import CURVE_SIGNALS, SaturationTest
 from exfit.features.programme.steady.saturation import FieldWinding, saturation_curve
+from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
 from exfit.models.machines import Machine
 from exfit.records.points import Points
 from exfit.records.units import needs_base

@@ -12,7 +12,7 @@ from exfit.errors import CaseError, RecordError
 from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad, base_of
 from exfit.features.programme.steady.v_curve import v_curve
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
 from exfit.records.points import Points

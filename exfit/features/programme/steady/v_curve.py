@@ -17,7 +17,7 @@ from exfit.features.programme.steady.fields_on_load import (
 from exfit.features.programme.steady.point_errors import allowing_for_errors
 from exfit.features.programme.steady.point_fit import FittedPoints
 from exfit.features.programme.steady.v_curve_causes import causes_of
-from exfit.features.programme.v_curve_result import FieldReading, PowerLevel, VCurve
+from exfit.features.programme.steady.v_curve_result import FieldReading, PowerLevel, VCurve
 from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import Machine
 from exfit.results.model import FittedParameter

@@ -6,7 +6,7 @@ import pytest
 from exfit.case.checks.node import ContentNode
 from exfit.case.schema import SaturationTest
 from exfit.errors import RecordError
-from exfit.features.programme.checks_saturation import saturation_test_faults
+from exfit.features.programme.case.programme_checks import saturation_test_faults
 from exfit.features.programme.steady.points import points_of
 from exfit.features.programme.steady.saturation_test import (
     channel_bases,

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WrapSerializer
 
 from exfit.case.messages import FILE_NAME
 from exfit.case.schema.estimate import Limit
+from exfit.case.schema.plants import SaturationName
 from exfit.case.schema.values import (
     Findable,
     FreeSection,
@@ -105,4 +106,99 @@ class SteadyTest(Section):
         default=None,
         description="Limit of the rms difference of each field signal, pu; beyond it the points "
         "are not matched. Default: 2 % of its rms, or 3 times its noise where that is larger.",
+    )
+
+
+CURVE_SIGNALS = ("vt", *FIELDS)
+
+if TYPE_CHECKING:
+    CurveSignal = str
+else:
+    CurveSignal = Literal[CURVE_SIGNALS]
+
+
+class CurveColumn(Section):
+    """A column of the points of a saturation curve."""
+
+    column: Text | None = Field(
+        default=None, description="Name of the column; none with points in place of a file."
+    )
+    unit: Text | None = Field(
+        default=None,
+        description="Unit of the column, such as kV, A, V; default: that of the file, else pu for "
+        "vt, A for ifd, V for efd.",
+    )
+    base: Positive | None = Field(
+        default=None,
+        description="Value of 1 pu of vt in that unit, the rated voltage; ifd and efd have none: "
+        "the test measures it.",
+    )
+
+
+class FieldWindingSection(Section):
+    """The resistance of the field winding, from which the base of efd follows."""
+
+    resistance: Positive | None = Field(
+        default=None,
+        description="Resistance, ohm; default: the slope of efd over ifd, where efd is a column.",
+    )
+    temperature: Number | None = Field(
+        default=None, gt=-100.0, description="Its temperature there, or during the test, degrees C."
+    )
+    hot: Number | None = Field(
+        default=None,
+        gt=-100.0,
+        description="Temperature in operation, degrees C, to which the resistance is converted as "
+        "that of copper; default: not converted.",
+    )
+
+
+class SaturationTest(Section):
+    """The open-circuit saturation curve: terminal voltage over field current at rated speed."""
+
+    kind: Literal["saturation"] = Field(description="Kind of test.")
+    name: str = Field(
+        pattern=FILE_NAME,
+        max_length=LONGEST_NAME,
+        description="Name of letters, digits, - _ and .; files are named after it.",
+    )
+    file: Text | None = Field(
+        default=None,
+        description="File of the points, in any format of a record, in the order in which they "
+        "were taken.",
+    )
+    sheet: Text | None = Field(
+        default=None, description="Sheet of a workbook; default: the only one with a table."
+    )
+    points: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MOST_POINTS)] | None = Field(
+        default=None,
+        description="In place of a file: [vt, ifd] or [vt, ifd, efd] of each point, in the order "
+        "in which they were taken.",
+    )
+    columns: Annotated[
+        Mapping[
+            CurveSignal,
+            Annotated[
+                CurveColumn, BeforeValidator(_column, json_schema_input_type=Text | CurveColumn)
+            ],
+        ],
+        AfterValidator(MappingProxyType),
+        WrapSerializer(thawed),
+    ] = Field(
+        default_factory=nothing,
+        description="Columns of vt, ifd and, where it was measured, efd: a name, or a mapping.",
+    )
+    form: SaturationName | None = Field(
+        default=None,
+        description="Form of the curve that is used: quadratic (GENROU, GENSAL), exponential (as "
+        "of GENROE, GENSAE: a power of the voltage), exponential-se; default: that of the machine.",
+    )
+    brushless: bool = Field(
+        default=False,
+        description="Whether ifd is the field current of a brushless exciter: the curve is then "
+        "that of exciter and machine together, and gives the machine no values.",
+    )
+    winding: FieldWindingSection = Field(
+        default_factory=FieldWindingSection,
+        description="Resistance and temperature of the field winding, for the base of efd.",
     )

@@ -1,4 +1,4 @@
-"""A programme: all tests of a unit in one file, checked like a case; and its cases."""
+"""A programme: all tests of a unit in one file, checked like a case; its steps and its cases."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from exfit.case.schema import (
 )
 from exfit.case.yaml import Fault, read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.features.programme.case_content import (
+from exfit.features.programme.case.case_content import (
     IN_PLACE_OF_TESTS,
     TESTS,
     CaseContent,
@@ -33,9 +33,17 @@ from exfit.features.programme.case_content import (
     tests_of_kind,
     with_bases,
 )
-from exfit.features.programme.checks_saturation import saturation_test_faults
-from exfit.features.programme.checks_steady import steady_test_faults
-from exfit.features.programme.schema import BUMP, REJECTION, SATURATION, STEADY
+from exfit.features.programme.case.programme_checks import (
+    saturation_test_faults,
+    steady_test_faults,
+)
+from exfit.features.programme.case.programme_schema import (
+    BUMP,
+    ORDER,
+    REJECTION,
+    SATURATION,
+    STEADY,
+)
 from exfit.plants import PlantKind
 from exfit.util.text import dotted
 
@@ -205,3 +213,32 @@ def _faults_of_case(inner: CaseContent, folder: Path) -> Iterator[Fault]:
         placed = inner.in_file(fault)
         if placed is not None:
             yield placed
+
+
+@dataclass(frozen=True)
+class ProgrammeStep:
+    """A test that is run by itself, or all bump tests, which are fitted together.
+
+    ``name`` is that of its folder, ``tests`` are the names of its tests.
+    """
+
+    name: str
+    kind: str
+    tests: tuple[str, ...]
+
+
+def steps_of(programme: Programme) -> tuple[ProgrammeStep, ...]:
+    """Return what a programme runs, in this order; within a kind in that of the file."""
+    case = programme.single
+    if case is not None:
+        names = (recording.name for recording in (*case.recordings, *case.validations))
+        return (ProgrammeStep(FIT, BUMP, tuple(names)),)
+    alone = [
+        ProgrammeStep(test.name, kind, (test.name,))
+        for kind in ORDER
+        if kind != BUMP
+        for test in programme.tests
+        if test.kind == kind
+    ]
+    bumps = tuple(test.name for test in programme.bumps)
+    return (*alone, *([ProgrammeStep(FIT, BUMP, bumps)] if bumps else []))

@@ -5,8 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exfit.features.programme.saturation_result import FittedCurve, MeasuredValue, SaturationResult
-from exfit.features.programme.v_curve_result import FieldReading, VCurve
+from exfit.features.programme.steady.saturation_result import (
+    FittedCurve,
+    MeasuredValue,
+    SaturationResult,
+)
+from exfit.features.programme.steady.v_curve_result import FieldReading, VCurve
 from exfit.features.report.charts import Chart, Panel, Series
 from exfit.features.report.layout import COLOURS, TALL
 from exfit.results.model import FittedParameter

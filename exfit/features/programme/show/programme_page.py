@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from exfit.features.programme.page_steady import saturation_view, v_curve_view
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
-from exfit.features.programme.saturation_result import SaturationResult
-from exfit.features.programme.v_curve_result import VCurve
+from exfit.features.programme.show.at_rest_page import saturation_view, v_curve_view
+from exfit.features.programme.steady.saturation_result import SaturationResult
+from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.features.report.page import Page, fit_page
 from exfit.features.report.sections import FORM, ReportSection
 from exfit.features.report.sections.findings import findings

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 from exfit import workflows
 from exfit.errors import ExfitError
-from exfit.features.programme.case import Programme
+from exfit.features.programme.case.programme import Programme, ProgrammeStep, steps_of
 from exfit.features.programme.kept import RESULTS
 from exfit.features.programme.result import EnteredValue, FinishedTest
 from exfit.features.programme.run import case_of, finished_test, refuse_unreadable
-from exfit.features.programme.steps import ProgrammeStep, steps_of
 from exfit.features.programme.values import bases_of, values_given, with_values
 from exfit.workflows.model_check import Check
 

@@ -6,8 +6,7 @@ from pydantic import Discriminator, Field, Tag
 
 from exfit.case.schema.records import Recording
 from exfit.case.schema.values import FreeSection, Frozen
-from exfit.features.programme.schema_saturation import SaturationTest
-from exfit.features.programme.schema_steady import SteadyTest
+from exfit.features.programme.case.schema_at_rest import SaturationTest, SteadyTest
 
 SATURATION: Final = "saturation"
 STEADY: Final = "steady"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from exfit.case.yaml import Fault
-from exfit.features.programme.schema import BUMP, REJECTION, STEADY
+from exfit.features.programme.case.programme_schema import BUMP, REJECTION, STEADY
 from exfit.records.units import alike, needs_base
 from exfit.util.text import Place
 
