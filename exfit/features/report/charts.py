@@ -11,11 +11,12 @@ from math import ceil, floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.show.blocks import Chart, Panel, Range, Rule, Series
+
 Array = NDArray[np.float64]
-Range = tuple[float, float]
 
 LEFT, RIGHT, TOP, BOTTOM = 74.0, 16.0, 30.0, 48.0  # room around the panels for their labels
-WIDE, SMALL = 560.0, 300.0  # units of a drawing: few, so that its text is read on a telephone
+SMALL = 300.0  # units of a drawing: a chart beside another one
 ROOM = 0.06  # of the range, above and below the lines
 NARROW = 0.05  # of its level: the range of a signal that rests
 RESTS = 1e-6  # of its level: a signal that moves by less would fill its axis with rounding errors
@@ -24,64 +25,6 @@ LEAST_SPAN = 1e-250  # of a smaller range no tick could be computed
 LEAST_LEVEL = 0.1  # pu: the level of a signal that rests at zero
 PER_TICK = (80.0, 22.0)  # of an axis, across and upward: closer labels would touch
 UNIT_STEPS = (1.0, 2.0, 5.0, 10.0)  # of ticks, times a power of ten
-
-
-@dataclass(frozen=True)
-class Series:
-    """A line of a chart, or dots: ``style`` is a class of the style sheet."""
-
-    label: str
-    x: Array
-    y: Array
-    style: str
-    dots: bool = False
-
-
-@dataclass(frozen=True)
-class Rule:
-    """A straight line across a panel at a level of y, or of x, and what it says."""
-
-    at: float
-    label: str = ""
-    upright: bool = False
-    style: str = "rule"
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A panel of a chart: what its y axis shows, its lines, its height."""
-
-    title: str
-    series: tuple[Series, ...]
-    height: float
-    logarithmic: bool = False
-    rules: tuple[Rule, ...] = ()
-
-
-@dataclass(frozen=True)
-class Chart:
-    """Panels above each other on one x axis; ``text`` says what a reader would see there.
-
-    ``key`` begins the ids of the drawing; it must be its alone on a page.
-    """
-
-    key: str
-    title: str
-    text: str
-    x_title: str
-    panels: tuple[Panel, ...]
-    logarithmic: bool = False
-    width: float = WIDE
-    x_range: Range | None = None
-    whole: bool = False
-
-    @property
-    def legend(self) -> tuple[Series, ...]:
-        """A line of each kind, where there is more than one."""
-        kinds = {
-            series.label: series for panel in self.panels for series in panel.series if series.label
-        }
-        return tuple(kinds.values()) if len(kinds) > 1 else ()
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What the charts of a report share: sizes, how finely lines are drawn, the titles of axes."""
 
-from exfit.features.report.charts import Rule
+from exfit.show.blocks import Rule
 
 MILLI = 1e3
 TALL, HALF, LOW = 170.0, 120.0, 72.0  # of panels: of signals, of gain and phase, of errors

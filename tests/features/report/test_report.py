@@ -25,7 +25,7 @@ from exfit import cli, workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.planner.export import export
-from exfit.features.report.charts import Axis, Chart, Panel, Series, drawing, ticks
+from exfit.features.report.charts import Axis, drawing, ticks
 from exfit.features.report.page import html, write_report
 from exfit.features.report.sections.matches import fitted_matches, live_data
 from exfit.features.report.verdict import headline
@@ -33,6 +33,7 @@ from exfit.models import from_file
 from exfit.results.io import load_result, result_file
 from exfit.results.other_values import AsFound
 from exfit.show import run_folder
+from exfit.show.blocks import Chart, Panel, Series
 from exfit.util.text import rounded, rounded_value
 
 MOST = 3_000_000  # bytes of a page

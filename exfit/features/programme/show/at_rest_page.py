@@ -11,9 +11,9 @@ from exfit.features.programme.steady.saturation_result import (
     SaturationResult,
 )
 from exfit.features.programme.steady.v_curve_result import FieldReading, VCurve
-from exfit.features.report.charts import Chart, Panel, Series
 from exfit.features.report.layout import COLOURS, TALL
 from exfit.results.model import FittedParameter
+from exfit.show.blocks import Chart, Panel, Series
 
 HIGHEST_LINE = 1.05  # pu: as far as the air-gap line is drawn
 MILLI = 1e3

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from exfit.dsp.decimation import envelope
-from exfit.features.report.charts import Chart, Panel, Series
 from exfit.features.report.layout import BINS, TALL, TIME
 from exfit.results.comparisons import Comparison
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.facts import PLANT, REVISION, UNIT, stated
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import ParameterValue, outcome_of, parameters_beside
+from exfit.show.blocks import Chart, Panel, Series
 from exfit.signals import label_of
 
 NONE = "–"

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from exfit.dsp.decimation import envelope
-from exfit.features.report.charts import Chart, Panel, Series
 from exfit.features.report.layout import BINS, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.results.comparisons import Comparison
 from exfit.results.other_values import AsFound
 from exfit.results.validation_result import Reported, ValidationResult
+from exfit.show.blocks import Chart, Panel, Series
 from exfit.signals import label_of
 
 UNCHANGED = "unchanged"

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from exfit.dsp.decimation import envelope
-from exfit.features.report.charts import Chart, Panel, Series
 from exfit.features.report.layout import BINS, LEVEL, MILLI, TALL, TIME, line_style
 from exfit.fitting.uncertainty import Sensitivity
 from exfit.inference import Correlation, ParameterEffect
 from exfit.results.model import FitResult
 from exfit.results.typical_values import by_weight
+from exfit.show.blocks import Chart, Panel, Series
 
 PERCENT = 1e-2
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import envelope, kept_rows
-from exfit.features.report.charts import Chart, Panel, Series
 from exfit.features.report.layout import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.results.played_records import LeftOut
 from exfit.results.tables import clock_digits
 from exfit.results.validation_result import Reported
+from exfit.show.blocks import Chart, Panel, Series
 from exfit.signals import label_of
 from exfit.util.text import show
 

@@ -7,12 +7,13 @@ from math import isfinite
 import numpy as np
 
 from exfit.dsp.decimation import envelope
-from exfit.features.report.charts import SMALL, Chart, Panel, Rule, Series
+from exfit.features.report.charts import SMALL
 from exfit.features.report.layout import BINS, HALF, LOW, TALL, TIME
 from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult, FittedParameter, Iteration, Minima, Minimum
 from exfit.results.search_summary import search_summary
 from exfit.results.thinning import drawn_responses
+from exfit.show.blocks import Chart, Panel, Rule, Series
 from exfit.signals import label_of
 from exfit.util.strategies import HISTORY_PHASES
 from exfit.util.text import show

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exfit.features.report.charts import Chart, Panel, Rule, Series
 from exfit.features.report.layout import HALF, LEVEL
 from exfit.results.description import SmallSignalView
 from exfit.results.validation_result import Reported
+from exfit.show.blocks import Chart, Panel, Rule, Series
 from exfit.simulation.small_signal import Bode, Margins, SmallSignal
 
 Rules = tuple[Rule, ...]
