@@ -37,7 +37,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A column of a table.
 
     number      aligned to the right
@@ -71,7 +71,7 @@ class Cell(NamedTuple):
 class Table:
     """Rows of cells; of a wide one that is shown in parts each begins with ``leading`` columns."""
 
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     rows: tuple[tuple[Cell, ...], ...]
     title: str = ""
     leading: int = 1
@@ -157,20 +157,20 @@ class Chart:
 
 
 @dataclass(frozen=True)
-class Picture:
+class NamedPicture:
     """A picture that has a name: the block diagram of a model."""
 
     name: str
     text: str = ""
 
 
-Block = Heading | Facts | Table | Note | Verbatim | Chart | Picture
+Block = Heading | Facts | Table | Note | Verbatim | Chart | NamedPicture
 
 
-def columns(*titles: str, numbers: Iterable[str] = ()) -> tuple[Column, ...]:
+def columns(*titles: str, numbers: Iterable[str] = ()) -> tuple[TableColumn, ...]:
     """Make columns by their titles; those named in ``numbers`` are aligned to the right."""
     right = {*numbers}
-    return tuple(Column(title, title in right) for title in titles)
+    return tuple(TableColumn(title, title in right) for title in titles)
 
 
 def row(*texts: str, mark: Mark = "") -> tuple[Cell, ...]:

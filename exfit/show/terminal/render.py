@@ -8,7 +8,7 @@ from rich.segment import Segment, Segments
 from rich.table import Table as Grid
 from rich.text import Text
 
-from exfit.show.blocks import Block, Column, Facts, Heading, Mark, Note, Table, Verbatim
+from exfit.show.blocks import Block, Facts, Heading, Mark, Note, Table, TableColumn, Verbatim
 from exfit.show.terminal.terminal import (
     BETWEEN_COLUMNS,
     NO_BREAK,
@@ -105,7 +105,7 @@ def _shorter(table: Table) -> Iterator[Table]:
     """Yield a table, then narrower ones: headings in more lines, without expendable columns."""
     yield table
     folded = [
-        Column(_a_word_a_line(column.heading), column.number, folds=column.folds)
+        TableColumn(_a_word_a_line(column.heading), column.number, folds=column.folds)
         if cell_len(column.heading) > max((cell_len(row[k].text) for row in table.rows), default=0)
         else column
         for k, column in enumerate(table.columns)
