@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -14,9 +14,10 @@ from exfit.case.parts import Parts, parts_of, ties_of
 from exfit.case.schema import CaseDocument
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
+from exfit.registry import parts
 from exfit.util.text import Place
 
-PROGRAMME = "makes this a programme of several tests, not a case: exfit run runs it"
+Document = TypeVar("Document", bound=CaseDocument)
 
 
 @dataclass(frozen=True)
@@ -36,26 +37,31 @@ def check_content(
     The files that it names are relative to ``folder``; ``faults`` holds those found before. A
     user's own model is run only if its file has the hash given, where one is.
     """
-    if "tests" in content:
-        faults.append(Fault(("tests",), PROGRAMME))
-        return None
+    for key, section in parts("SECTIONS").items():
+        if key in content:
+            faults.append(Fault((key,), section.load().not_of_a_case))
+            return None
     still_open = [Fault(place, TO_BE_FILLED_IN) for place in open_places(content)]
-    parts = parts_of(content, folder, faults, model_sha256)
-    ties = ties_of(content, parts, faults)
+    models = parts_of(content, folder, faults, model_sha256)
+    ties = ties_of(content, models, faults)
     places = {fault.place for fault in still_open}
     faults[:] = [*still_open, *(fault for fault in faults if fault.place not in places)]
-    document = validated_document(content, faults)
+    document = validated_document(content, faults, CaseDocument)
     places = {fault.place for fault in faults}
-    faults += [fault for fault in contradictions(content, parts, ties) if fault.place not in places]
+    faults += [
+        fault for fault in contradictions(content, models, ties) if fault.place not in places
+    ]
     if faults or document is None:
         return None
-    return CheckedContent(document, parts, ties)
+    return CheckedContent(document, models, ties)
 
 
-def validated_document(content: dict[str, Any], faults: list[Fault]) -> CaseDocument | None:
-    """Return the sections if all have the right form; add a fault for each that has not."""
+def validated_document(
+    content: dict[str, Any], faults: list[Fault], form: type[Document]
+) -> Document | None:
+    """Read the sections if all have the right form; add a fault for each that has not."""
     try:
-        return CaseDocument.model_validate(content)
+        return form.model_validate(content)
     except ValidationError as error:
         from exfit.case.json_schema import json_schema
         from exfit.case.messages import form_faults

@@ -14,6 +14,7 @@ from exfit.case.schema import (
     SINGLE,
     AsFoundSection,
     BumpTest,
+    CaseDocument,
     Estimate,
     ExternalPlant,
     FmuPlant,
@@ -102,8 +103,8 @@ class Case:
     @classmethod
     def of(cls, checked: CheckedContent, path: Path, from_file: bool = True) -> "Case":
         """Return the case of checked content that is, or would be, in the file ``path``."""
-        sections: dict[str, Any] = dict(checked.document)
-        del sections["programme"]  # of one that is a programme there is a case for each fit
+        document = checked.document
+        sections = {name: getattr(document, name) for name in CaseDocument.model_fields}
         external = sections["plant"]
         if isinstance(external, ExternalPlant | FmuPlant):
             sections.update(plant=external.plant, external=external)

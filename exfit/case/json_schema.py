@@ -5,13 +5,15 @@ from functools import cache
 from typing import Any
 
 from exfit.case.schema import CaseDocument
+from exfit.registry import parts
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 @cache
 def json_schema() -> Mapping[str, Any]:
-    """Return the JSON Schema of the case file."""
+    """Make the JSON Schema of the case file, with the sections that features add to it."""
+    from pydantic import create_model
     from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 
     class NoNulls(GenerateJsonSchema):
@@ -24,7 +26,9 @@ def json_schema() -> Mapping[str, Any]:
             inner = super().default_schema(schema)
             return _without(inner, "default") if inner.get("default", 0) is None else inner
 
-    schema = CaseDocument.model_json_schema(by_alias=True, schema_generator=NoNulls)
+    bases = (*(section.load() for section in parts("SECTIONS").values()), CaseDocument)
+    whole = create_model("CaseDocument", __base__=bases, __doc__=CaseDocument.__doc__)
+    schema = whole.model_json_schema(by_alias=True, schema_generator=NoNulls)
     return {"$schema": DIALECT, **schema, "title": "exfit case"}
 
 

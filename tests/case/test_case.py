@@ -291,9 +291,7 @@ def test_a_case_can_be_written_out_again():
 def test_a_case_has_every_section_of_the_document():
     own = {"path", "from_file", "parts", "ties", "external"}
     own |= {"given_records", "given_values", "given_sources", "given_std_errors"}
-    assert {field.name for field in fields(Case)} - own == {*CaseDocument.model_fields} - {
-        "programme"
-    }
+    assert {field.name for field in fields(Case)} - own == {*CaseDocument.model_fields}
 
 
 def test_a_case_made_in_python_is_that_of_the_file(case_file):

@@ -45,17 +45,6 @@ from exfit.case.schema.tests import (
     Switch,
 )
 from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
-from exfit.features.programme.case.programme_schema import (
-    RecordedBump,
-    RecordedRejection,
-    TestOfProgramme,
-)
-from exfit.features.programme.case.schema_at_rest import (
-    CurveColumn,
-    PointColumn,
-    SaturationTest,
-    SteadyTest,
-)
 
 __all__ = [
     "MOST_ROWS",
@@ -68,7 +57,6 @@ __all__ = [
     "ChannelSection",
     "CriteriaSection",
     "CurrentPhasor",
-    "CurveColumn",
     "Estimate",
     "ExternalPlant",
     "Filter",
@@ -85,25 +73,19 @@ __all__ = [
     "PhasesSection",
     "PhasorsSection",
     "Plant",
-    "PointColumn",
     "RecordFile",
-    "RecordedBump",
-    "RecordedRejection",
     "Recording",
     "Reference",
     "ReferenceFile",
     "ReferenceTable",
     "ReportRequest",
     "SaturationName",
-    "SaturationTest",
     "SimulationSection",
     "SineSection",
     "Stabiliser",
     "StatusSection",
-    "SteadyTest",
     "StepSection",
     "Switch",
-    "TestOfProgramme",
     "Time",
     "TimeColumn",
     "Unknown",

@@ -10,7 +10,6 @@ from exfit.case.schema.records import RecordFile, Recording
 from exfit.case.schema.report import AsFoundSection, ReportRequest
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Fact, Frozen, Section, Text, nothing
-from exfit.features.programme.case.programme_schema import TestOfProgramme
 
 ABOUT = Field(
     default_factory=nothing,
@@ -65,13 +64,6 @@ class CaseDocument(Section):
         default=(),
         min_length=1,
         description="In place of test and record: several tests with their records, in one fit.",
-    )
-    programme: tuple[TestOfProgramme, ...] = Field(
-        default=(),
-        alias="tests",
-        min_length=1,
-        description="In place of test, record, records and validate: the tests of a programme, "
-        "of which each feeds the later ones.",
     )
     parameters: Parameters = Field(
         default_factory=Parameters, description="Fixed and free parameters of the exciter."

@@ -5,3 +5,5 @@ COMMANDS = {"run": ("fit", "Run all tests of a unit, each feeding the later ones
 PUBLIC = {"run": "run:run", "saturation_curve": "steady.saturation:saturation_curve"}
 
 CHECKS = {"tests": "command:check"}
+
+SECTIONS = {"tests": "case.programme_schema:ProgrammeSection"}

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from exfit import estimate, workflows
 from exfit.case.case import Case
-from exfit.case.schema import SaturationTest, SteadyTest
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme.case.programme import (
     FIT,
@@ -18,6 +17,7 @@ from exfit.features.programme.case.programme import (
     load_programme,
     steps_of,
 )
+from exfit.features.programme.case.schema_at_rest import SaturationTest, SteadyTest
 from exfit.features.programme.kept import KEY, Keep, keep, key_of, result_kept
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
 from exfit.features.programme.steady.points import points_of

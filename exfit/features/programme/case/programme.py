@@ -13,13 +13,7 @@ from exfit.case.checks.record import name_faults
 from exfit.case.load import faults_with_lines, parse_case
 from exfit.case.parts import kind_of, parts_of, ties_of
 from exfit.case.peek import files_in
-from exfit.case.schema import (
-    CaseDocument,
-    RecordedBump,
-    Recording,
-    SteadyTest,
-    TestOfProgramme,
-)
+from exfit.case.schema import Recording
 from exfit.case.yaml import Fault, read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.features.programme.case.case_content import (
@@ -43,7 +37,11 @@ from exfit.features.programme.case.programme_schema import (
     REJECTION,
     SATURATION,
     STEADY,
+    ProgrammeDocument,
+    RecordedBump,
+    TestOfProgramme,
 )
+from exfit.features.programme.case.schema_at_rest import SteadyTest
 from exfit.plants import PlantKind
 from exfit.util.text import dotted
 
@@ -133,9 +131,9 @@ class Programme:
         ties = ties_of(content, parts, faults)
         return Case.of(CheckedContent(self._document(content), parts, ties), self.path)
 
-    def _document(self, content: Content) -> CaseDocument:
+    def _document(self, content: Content) -> ProgrammeDocument:
         faults: list[Fault] = []
-        document = validated_document(content, faults)
+        document = validated_document(content, faults, ProgrammeDocument)
         if document is None:
             raise CaseError(f"{self.path}: {dotted(fault.place)}: {fault.text}" for fault in faults)
         return document
@@ -151,7 +149,7 @@ def load_programme(path: Path) -> Programme:
     if TESTS not in top.value:
         case = parse_case(text, path)
         return Programme(path=path, text=text, content=top.value, about=case.about, single=case)
-    document = validated_document(top.value, faults)
+    document = validated_document(top.value, faults, ProgrammeDocument)
     places = {fault.place for fault in faults}
     for fault in programme_faults(top.value, path.parent):
         if fault.place not in places:

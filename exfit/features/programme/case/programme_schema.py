@@ -1,11 +1,11 @@
 """The sections of a programme: all tests of a unit, of which each feeds the later ones."""
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from exfit.case.schema.records import Recording
-from exfit.case.schema.values import FreeSection, Frozen
+from exfit.case.schema import CaseDocument, FreeSection, Recording
+from exfit.case.schema.values import Frozen, Section
 from exfit.features.programme.case.schema_at_rest import SaturationTest, SteadyTest
 
 SATURATION: Final = "saturation"
@@ -47,3 +47,22 @@ TestOfProgramme = Annotated[
     | Annotated[RecordedBump, Tag(f"[{BUMP}]")],
     Discriminator(_kind_of_test),
 ]
+
+
+class ProgrammeSection(Section):
+    """The section that makes a case file a programme."""
+
+    not_of_a_case: ClassVar[str] = (
+        "makes this a programme of several tests, not a case: exfit run runs it"
+    )
+    programme: tuple[TestOfProgramme, ...] = Field(
+        default=(),
+        alias="tests",
+        min_length=1,
+        description="In place of test, record, records and validate: the tests of a programme, "
+        "of which each feeds the later ones.",
+    )
+
+
+class ProgrammeDocument(CaseDocument, ProgrammeSection):
+    """The file of a programme: what its tests share, as in a case, and the tests."""

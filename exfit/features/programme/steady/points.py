@@ -2,8 +2,12 @@
 
 from pathlib import Path
 
-from exfit.case.schema import SaturationTest, SteadyTest
-from exfit.features.programme.case.schema_at_rest import CURVE_SIGNALS, POINT_SIGNALS
+from exfit.features.programme.case.schema_at_rest import (
+    CURVE_SIGNALS,
+    POINT_SIGNALS,
+    SaturationTest,
+    SteadyTest,
+)
 from exfit.records.points import Points, given_points, read_points
 
 

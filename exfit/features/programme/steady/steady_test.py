@@ -7,8 +7,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.schema import PointColumn, SteadyTest, Unknown
+from exfit.case.schema import Unknown
 from exfit.errors import CaseError, RecordError
+from exfit.features.programme.case.schema_at_rest import PointColumn, SteadyTest
 from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad, base_of
 from exfit.features.programme.steady.v_curve import v_curve

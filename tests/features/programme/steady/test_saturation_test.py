@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from exfit.case.checks.node import ContentNode
-from exfit.case.schema import SaturationTest
 from exfit.errors import RecordError
 from exfit.features.programme.case.programme_checks import saturation_test_faults
+from exfit.features.programme.case.schema_at_rest import SaturationTest
 from exfit.features.programme.steady.points import points_of
 from exfit.features.programme.steady.saturation_test import (
     channel_bases,

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exfit.case.schema import SteadyTest
 from exfit.errors import RecordError
+from exfit.features.programme.case.schema_at_rest import SteadyTest
 from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.points import points_of
 from exfit.features.programme.steady.steady_test import steady
