@@ -7,6 +7,7 @@ feature is imported before it is used:
     PUBLIC    names of `exfit` itself
     CHECKS    what `exfit check` does with a file that has this key, given its path; False: unsound
     SECTIONS  keys of a case file that other commands read: a class of fields, and why not a case
+    PLANTS    kinds of plant, by the names that a case gives them
     CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of a misfit, by what it looks at
 
 The core asks for plugs here and names no feature.

@@ -1,5 +1,6 @@
 """Grid events: a unit played back, the noise that drives it, PMU channels, causes of a misfit."""
 
+PLANTS = {"grid-playback": "grid_playback:GRID_PLAYBACK"}
 CAUSES_AT_REST = {"record of the event": "record_causes:wrong_event"}
 CAUSES_OF_EVENTS = {
     "equation of the speed": "unit_causes:other_swing",
