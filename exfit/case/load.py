@@ -1,5 +1,6 @@
 """A case file read and checked: every fault at once, each with its line."""
 
+from os import PathLike
 from pathlib import Path
 
 from exfit.case.assembly import check_content
@@ -7,6 +8,8 @@ from exfit.case.case import Case
 from exfit.case.yaml import Fault, YamlNode, read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.util.text import Place, dotted
+
+CaseOrPath = Case | str | PathLike[str]
 
 
 def load_case(path: Path, model_sha256: str = "") -> Case:

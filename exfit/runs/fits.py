@@ -16,7 +16,7 @@ from exfit.runs.names import distinct_names, numbered
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import outcome_of
 from exfit.util.typed import plain
-from exfit.workflows import CaseOrPath
+from exfit.case.load import CaseOrPath
 
 Progress = Iteration | estimate.Progress
 

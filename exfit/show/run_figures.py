@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from exfit.results.comparisons import Comparison
     from exfit.results.model import FitResult
     from exfit.runs.fits import FitSeries
-    from exfit.workflows import SimulationResult
     from exfit.workflows.profiles import Profiles
+    from exfit.workflows.simulation import SimulationResult
 
 
 @dataclass(frozen=True)

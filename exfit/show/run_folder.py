@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from exfit.records.inspection import Inspection
     from exfit.results.validation_result import ValidationResult
     from exfit.runs.fits import FitSeries
-    from exfit.workflows import SimulationResult
     from exfit.workflows.profiles import Profiles
+    from exfit.workflows.simulation import SimulationResult
 
 Array = NDArray[np.float64]
 

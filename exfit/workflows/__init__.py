@@ -1,50 +1,29 @@
-"""What can be done with a case: the functions behind the commands and behind ``import exfit``."""
+"""What can be done with a case: the functions behind the commands and behind ``import exfit``.
+
+Each imports what it needs when it is called: a simulation loads nothing of a fit.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from exfit import estimate
 from exfit.case import load
 from exfit.case.case import Case
-from exfit.features.external.program import ExternalProgram
-from exfit.features.external.program_files import refuse_changed_program
-from exfit.features.external.setups import (
-    external_simulator,
-    program_of,
-    refuse_without_equations,
-    simulated_by,
-    simulation_by_twin_notes,
-)
-from exfit.fitting.build import build_experiment, plain_simulator
-from exfit.fitting.recordings import read_section
-from exfit.fitting.search import checked_strategy, search_options
-from exfit.fitting.setup import with_enough_substeps
-from exfit.fitting.system import values_of
-from exfit.records.record import Record
-from exfit.results.compare_with_record import compare_with_record
-from exfit.results.comparisons import Comparison
-from exfit.results.model import FitResult, Iteration
-from exfit.simulation.simulator import Response
-from exfit.util.versions import versions
-from exfit.verdict.diagnostics import rest_notes, simulation_notes
-from exfit.workflows.fit_run import FitRequest, fit_result
-from exfit.workflows.given_values import ValuesOrResult, changes_of, with_values
-from exfit.workflows.iteration_responses import LiveResponse
+from exfit.case.load import CaseOrPath
 
 if TYPE_CHECKING:
+    from exfit import estimate
     from exfit.features.design.experiment_design import Design
+    from exfit.records.record import Record
+    from exfit.results.comparisons import Comparison
+    from exfit.results.model import FitResult, Iteration
     from exfit.results.validation_result import ValidationResult
+    from exfit.workflows.given_values import ValuesOrResult
+    from exfit.workflows.iteration_responses import LiveResponse
     from exfit.workflows.model_check import Check
     from exfit.workflows.profiles import Profiles
-
-Array = NDArray[np.float64]
-CaseOrPath = Case | str | PathLike[str]
+    from exfit.workflows.simulation import SimulationResult
 
 
 def _ignore(_: object) -> None:
@@ -54,12 +33,12 @@ def _ignore(_: object) -> None:
 def fit(
     case: CaseOrPath,
     strategy: str | None = None,
-    progress: Callable[[Iteration], None] = _ignore,
-    search_progress: Callable[[estimate.Progress], None] = _ignore,
-    live: Callable[[LiveResponse], None] | None = None,
-    values: ValuesOrResult | None = None,
+    progress: "Callable[[Iteration], None]" = _ignore,
+    search_progress: "Callable[[estimate.Progress], None]" = _ignore,
+    live: "Callable[[LiveResponse], None] | None" = None,
+    values: "ValuesOrResult | None" = None,
     search: str | None = None,
-) -> FitResult:
+) -> "FitResult":
     """Fit the free parameters of a case to its records, and validate the result on its others.
 
     Args:
@@ -81,6 +60,11 @@ def fit(
         >>> result = exfit.fit("case.yaml", progress=lambda iteration: print(iteration.cost))
         >>> result.parameters["KA"].value
     """
+    from exfit.features.external.setups import program_of
+    from exfit.fitting.search import checked_strategy, search_options
+    from exfit.workflows.fit_run import FitRequest, fit_result
+    from exfit.workflows.given_values import with_values
+
     case = with_values(loaded(case, values), values)
     method = checked_strategy(strategy or case.estimate.strategy)
     options = search_options(case, search)
@@ -106,7 +90,7 @@ def read_record(
     sheet: str | None = None,
     resample: float | None = None,
     memory: float | None = None,
-) -> Record:
+) -> "Record":
     """Return the record of a recorder's file of any supported format, per unit.
 
     Args:
@@ -127,6 +111,7 @@ def read_record(
         >>> record = exfit.read_record("bump.csv", ["Date", "Time"], {"vt": volts})
     """
     from exfit.case.record_section import record_section
+    from exfit.fitting.recordings import read_section
 
     file = {"file": Path(path), "sheet": sheet, "memory": memory, "resample": resample}
     gaps = "skip" if missing else "refuse"
@@ -135,28 +120,21 @@ def read_record(
     return read_section(record_section(given), Path(), per_unit=True)
 
 
-def loaded(case: CaseOrPath, values: ValuesOrResult | None = None) -> Case:
+def loaded(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> Case:
     """Return a case, read from its file where it is a path, whose own model is that of a fit.
 
     So is the program that simulates it.
     """
-    hashes = values.inputs if isinstance(values, FitResult) else {}
+    from exfit.features.external.program_files import refuse_changed_program
+
+    hashes = getattr(values, "inputs", {})
     if not isinstance(case, Case):
         case = load.load_case(Path(case), hashes.get("model", ""))
     refuse_changed_program(case, hashes.get("program", ""))
     return case
 
 
-@dataclass(frozen=True)
-class SimulationResult:
-    """A response of a case, with the record beside it where there is one."""
-
-    response: Response
-    comparison: Comparison | None
-    notes: tuple[str, ...]
-
-
-def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> SimulationResult:
+def simulate(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> "SimulationResult":
     """Simulate a case, with the test of its first record where it has several.
 
     Args:
@@ -169,46 +147,23 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     Example:
         >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
+    from exfit.features.external.setups import program_of
+    from exfit.fitting.system import values_of
+    from exfit.workflows import simulation
+    from exfit.workflows.given_values import changes_of
+
     case = loaded(case, values)
     with program_of(case) as program:
-        return _simulated(case, values_of(case, changes_of(case, values)), program)
-
-
-def _simulated(
-    case: Case, values: Mapping[str, float], program: ExternalProgram | None
-) -> SimulationResult:
-    """Return a response of a case to values, simulated by a program where one is given."""
-    if case.recordings:
-        setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
-        if program is not None:
-            (setup,) = simulated_by(program, case, [setup])
-        response = setup.response(values)
-        comparison = compare_with_record(setup, "record", values) if setup.channels else None
-        notes = [] if comparison is None else rest_notes(setup, comparison)
-        at = setup.experiment.parameters(setup.with_start_values(values))
-        simulator = setup.experiment.with_inputs(setup.with_start_values(values))
-        simulated = simulation_notes(case, simulator, at, response)
-        by_twin = simulation_by_twin_notes(case, simulator, response.signals)
-        left_out = setup.record.notes
-        return SimulationResult(response, comparison, (*left_out, *simulated, *notes, *by_twin))
-    simulator, levels = plain_simulator(case, values)
-    at = {**values, **levels}
-    simulator = with_enough_substeps(simulator, at, case.path)
-    if program is not None:
-        simulator = external_simulator(program, case, simulator)
-    response = simulator.response(at)
-    notes = simulation_notes(case, simulator, at, response)
-    by_twin = simulation_by_twin_notes(case, simulator, response.signals)
-    return SimulationResult(response, None, (*notes, *by_twin))
+        return simulation.simulate(case, values_of(case, changes_of(case, values)), program)
 
 
 def validate(
     case: CaseOrPath,
-    values: ValuesOrResult,
-    record: Record | Path | str | None = None,
+    values: "ValuesOrResult",
+    record: "Record | Path | str | None" = None,
     step: float | Sequence[float] = (),
     at: float | Sequence[float] = (),
-) -> list[Comparison]:
+) -> "list[Comparison]":
     """Compare a case with its records: the fitted ones first, then those that no fit saw.
 
     Those that no fit saw are judged: ``accepted``, or the ``reason`` why not.
@@ -229,6 +184,7 @@ def validate(
         >>> [match.rmse for match in exfit.validate("case.yaml", result)]
         >>> exfit.validate("case.yaml", result, "down.csv")[-1].accepted
     """
+    from exfit.features.external.setups import program_of
     from exfit.workflows import validation
 
     case = loaded(case, values)
@@ -238,8 +194,8 @@ def validate(
 
 def validation_result(
     case: CaseOrPath,
-    values: ValuesOrResult | None,
-    record: Record | Path | str | None = None,
+    values: "ValuesOrResult | None",
+    record: "Record | Path | str | None" = None,
     step: float | Sequence[float] = (),
     at: float | Sequence[float] = (),
     sources: Mapping[str, str] | None = None,
@@ -249,6 +205,9 @@ def validation_result(
     Without ``values`` they are those of the model as found, or else the start values: no record was
     fitted then. ``sources`` says where values come from that are given by name.
     """
+    from exfit.features.external.setups import program_of
+    from exfit.results.model import FitResult
+    from exfit.util.versions import versions
     from exfit.workflows import validation
     from exfit.workflows.descriptions.validation_description import validation_result
 
@@ -263,7 +222,7 @@ def validation_result(
 def profile(
     case: CaseOrPath,
     names: str | Iterable[str] = (),
-    progress: Callable[[estimate.Progress], None] = _ignore,
+    progress: "Callable[[estimate.Progress], None]" = _ignore,
 ) -> "Profiles":
     """Fit a case and find the 95 % intervals of its parameters from their profile likelihood.
 
@@ -279,6 +238,7 @@ def profile(
         >>> for profile in exfit.profile("case.yaml", ["KA"]).profiles:
         ...     print(profile.name, profile.low, profile.high)
     """
+    from exfit.features.external.setups import program_of
     from exfit.workflows import profiles
 
     names = [names] if isinstance(names, str) else names
@@ -301,6 +261,7 @@ def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Des
         >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
     """
     from exfit.features.design import experiment_design
+    from exfit.features.external.setups import refuse_without_equations
 
     case = loaded(case)
     refuse_without_equations(case, "identify")

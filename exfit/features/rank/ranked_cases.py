@@ -6,6 +6,7 @@ from typing import Any
 
 from exfit.case.case import Case
 from exfit.case.draft.starting_case import ALONE
+from exfit.case.load import CaseOrPath
 from exfit.case.other_model import with_exciter
 from exfit.errors import CaseError
 from exfit.features.rank.ranking import RankedModel, ranked, ranking_sentences
@@ -16,7 +17,7 @@ from exfit.results.intervals.typical_values import typical_values_used
 from exfit.results.model import FitResult
 from exfit.runs.fits import FitRun, FitSeries, PlannedFit, Progress, run_all
 from exfit.util.typed import plain
-from exfit.workflows import CaseOrPath, loaded
+from exfit.workflows import loaded
 
 ALL = "all"  # in place of names: the catalogue, one form of each type
 
