@@ -50,7 +50,9 @@ def fit_several(
         if output.as_json:
             print_json(series.to_dict())
         elif output.shown:
-            _show(series)
+            from exfit.show import terminal
+
+            terminal.fit_series(terminal.console(), series)
     if output.shown:
         from exfit.show import terminal
 
@@ -71,45 +73,27 @@ def run_planned(
 
     Raises Interruption where none is done.
     """
-    series = _shown(plan, folder, figures) if output.shown else _quiet(plan, folder, figures)
-    if not series.runs and series.interrupted:
-        raise Interruption("no fit is done")
-    return series
-
-
-def _quiet(
-    plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]"
-) -> "FitSeries":
-    """Run the fits, write their numbers and collect their figures, without a word."""
     from exfit.runs.fits import run_all
     from exfit.show import run_folder
 
-    def finished(run: "FitRun") -> None:
+    def written(run: "FitRun") -> None:
         figures[run.name] = run_folder.write_fit(run.result, folder / run.name)
 
-    return run_all(plan, finished=finished)
+    if not output.shown:
+        series = run_all(plan, finished=written)
+    else:
+        from exfit.show import terminal
 
+        with terminal.SeriesProgress(terminal.console(), plan).running() as progress:
 
-def _shown(
-    plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]"
-) -> "FitSeries":
-    """Run the fits, write their numbers and collect their figures, and show how far they are."""
-    from exfit.runs.fits import run_all
-    from exfit.show import run_folder, terminal
+            def finished(run: "FitRun") -> None:
+                progress.finished(run)
+                written(run)
 
-    with terminal.SeriesProgress(terminal.console(), plan).running() as progress:
-
-        def finished(run: "FitRun") -> None:
-            progress.finished(run)
-            figures[run.name] = run_folder.write_fit(run.result, folder / run.name)
-
-        return run_all(plan, progress, finished)
-
-
-def _show(series: "FitSeries") -> None:
-    from exfit.show import terminal
-
-    terminal.fit_series(terminal.console(), series)
+            series = run_all(plan, progress, finished)
+    if not series.runs and series.interrupted:
+        raise Interruption("no fit is done")
+    return series
 
 
 def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:

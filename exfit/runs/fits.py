@@ -12,9 +12,10 @@ from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import checked_search, checked_strategy, fitted
-from exfit.runs.names import distinct_names, numbered
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import outcome_of
+from exfit.runs.names import distinct_names, numbered
+from exfit.runs.runner import run_in_turn
 from exfit.util.typed import plain
 from exfit.case.load import CaseOrPath
 
@@ -43,6 +44,11 @@ class FitRun:
     name: str
     case_name: str
     result: FitResult
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether its result is the best point before an interruption."""
+        return self.result.interrupted
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,19 +99,11 @@ class FitSeries:
         }
 
 
-def _ignore_progress(_: PlannedFit, __: Progress) -> None:
-    """Ignore how far a fit is."""
-
-
-def _ignore_run(_: FitRun) -> None:
-    """Ignore that a fit has ended."""
-
-
 def fit_all(
     cases: Iterable[CaseOrPath],
     strategies: Iterable[str] = (),
-    progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
-    finished: Callable[[FitRun], None] = _ignore_run,
+    progress: Callable[[PlannedFit, Progress], None] = lambda *_: None,
+    finished: Callable[[FitRun], None] = lambda _: None,
     search: str | None = None,
 ) -> FitSeries:
     """Fit every case with every strategy; all cases are checked before the first fit.
@@ -176,32 +174,17 @@ def _how_far(case: Case, strategies: Sequence[str], search: str | None) -> str |
 
 def run_all(
     plan: Sequence[PlannedFit],
-    progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
-    finished: Callable[[FitRun], None] = _ignore_run,
+    progress: Callable[[PlannedFit, Progress], None] = lambda *_: None,
+    finished: Callable[[FitRun], None] = lambda _: None,
 ) -> FitSeries:
     """Run planned fits one after the other; one that fails keeps no other from running."""
-    runs: list[FitRun] = []
-    failed: dict[str, str] = {}
-    interrupted = False
-    try:
-        for fit in plan:
-            shown = partial(progress, fit)
-            try:
-                result = workflows.fit(fit.case, fit.strategy, shown, shown, search=fit.search)
-                runs.append(FitRun(fit.name, fit.case_name, result))
-                finished(runs[-1])
-            except ExfitError as fault:
-                failed[fit.name] = str(fault)
-                continue
-            if result.interrupted:
-                interrupted = True
-                break
-    except KeyboardInterrupt:
-        interrupted = True
-    done = {*failed, *(run.name for run in runs)}
-    return FitSeries(
-        tuple(runs), failed, tuple(fit.name for fit in plan if fit.name not in done), interrupted
-    )
+
+    def run(fit: PlannedFit) -> FitRun:
+        shown = partial(progress, fit)
+        result = workflows.fit(fit.case, fit.strategy, shown, shown, search=fit.search)
+        return FitRun(fit.name, fit.case_name, result)
+
+    return FitSeries(*run_in_turn(plan, run, finished))
 
 
 def _ready(case: Case) -> Case:

@@ -17,7 +17,6 @@ from exfit.cli.options import (
 from exfit.errors import FileError
 
 if TYPE_CHECKING:
-    from exfit.features.programme.case.programme import Programme
     from exfit.features.programme.result import ProgrammeResult
 
 
@@ -40,11 +39,25 @@ def run(programme: Path, again: bool, output: Output) -> None:
     Exit code 0: every test is matched; 1: bad input, or a test that failed; 3: a test that is not
     matched, a validation that is not accepted, or not all tests are run.
     """
-    from exfit.features.programme.case.programme import load_programme
+    from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme.case.programme import load_programme, steps_of
+    from exfit.features.programme.run import run as run_programme
 
     loaded = load_programme(programme)
-    folder = _folder_of(loaded, output)
-    result = _shown(loaded, folder, again) if output.shown else _quiet(loaded, folder, again)
+    steps = steps_of(loaded)
+    folder = output.folder(f"{loaded.path.stem}-run")
+    names = [step.name for step in steps]
+    inputs = [loaded.path, *(file for name in names for file in loaded.files_of(name))]
+    programme_folder.refuse_inputs(inputs, names, folder)
+    if output.shown:
+        from exfit.show import terminal
+
+        with terminal.ProgrammeProgress(terminal.console(), steps).running() as shown:
+            result = run_programme(
+                loaded, folder, again, shown, shown.finished, keep=programme_folder.write_test
+            )
+    else:
+        result = run_programme(loaded, folder, again, keep=programme_folder.write_test)
     if result.interrupted and not result.tests:
         raise Interruption("no test is done")
     _write(result, folder, output)
@@ -54,49 +67,11 @@ def run(programme: Path, again: bool, output: Output) -> None:
         raise SystemExit(NOT_CONVERGED)
 
 
-def _folder_of(programme: "Programme", output: Output) -> Path:
-    """Return the folder of a programme; raises ExfitError where a result would replace an input."""
-    from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.case.programme import steps_of
-
-    folder = output.folder(f"{programme.path.stem}-run")
-    names = [step.name for step in steps_of(programme)]
-    files = [programme.path, *(file for name in names for file in programme.files_of(name))]
-    programme_folder.refuse_inputs(files, names, folder)
-    return folder
-
-
-def _quiet(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResult":
-    """Run a programme and write the numbers of its tests, without a word."""
-    from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.run import run
-
-    return run(programme, folder, again, keep=programme_folder.write_test)
-
-
-def _shown(programme: "Programme", folder: Path, again: bool) -> "ProgrammeResult":
-    """Run a programme, write the numbers of its tests, and show how far it is."""
-    from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.case.programme import steps_of
-    from exfit.features.programme.run import run
-    from exfit.show import terminal
-
-    shown = terminal.ProgrammeProgress(terminal.console(), steps_of(programme))
-    with shown.running():
-        return run(
-            programme,
-            folder,
-            again,
-            shown,
-            shown.finished,
-            keep=programme_folder.write_test,
-        )
-
-
 def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
     """Write what all tests came to and their report, show it, and draw the figures."""
     from exfit.features.programme import folder as programme_folder
     from exfit.features.report.writing import write_report
+    from exfit.show import terminal
 
     try:
         programme_folder.write_programme(result, folder)
@@ -106,25 +81,12 @@ def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
         if output.as_json:
             print_json(result.to_dict())
         elif output.shown:
-            _show(result, folder)
-    if output.figures and not result.interrupted:
-        _draw(result, folder, output)
-
-
-def _show(result: "ProgrammeResult", folder: Path) -> None:
-    from exfit.show import terminal
-
-    console = terminal.console()
-    terminal.programme(console, result)
-    console.print()
-    terminal.written(console, folder)
-
-
-def _draw(result: "ProgrammeResult", folder: Path, output: Output) -> None:
-    """Draw the figures of each test that are missing, with a line for each test."""
-    from exfit.features.programme import folder as programme_folder
-    from exfit.show import terminal
-
+            console = terminal.console()
+            terminal.programme(console, result)
+            console.print()
+            terminal.written(console, folder)
+    if not output.figures or result.interrupted:
+        return
     for name, figures in programme_folder.figures_of(result, folder).items():
         warn(figures.draw())
         if output.shown:

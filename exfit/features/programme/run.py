@@ -1,6 +1,6 @@
 """Programmes run: each test in its turn, with what those before it measured."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -29,26 +29,19 @@ from exfit.plants import MACHINE
 from exfit.records.reading import file_hash
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, Iteration
+from exfit.runs.runner import run_in_turn
 from exfit.workflows.descriptions.case_description import parts_of
 
 Progress = Iteration | estimate.Progress
 Values = tuple[EnteredValue, ...]
 
 
-def _ignore_progress(_: ProgrammeStep, __: Progress | None) -> None:
-    """Ignore how far a test is."""
-
-
-def _ignore_test(_: FinishedTest) -> None:
-    """Ignore that a test has ended."""
-
-
 def run(
     programme: Programme | str | PathLike[str],
     folder: str | PathLike[str] | None = None,
     again: bool = False,
-    progress: Callable[[ProgrammeStep, Progress | None], None] = _ignore_progress,
-    finished: Callable[[FinishedTest], None] = _ignore_test,
+    progress: Callable[[ProgrammeStep, Progress | None], None] = lambda *_: None,
+    finished: Callable[[FinishedTest], None] = lambda _: None,
     keep: Keep = keep,
 ) -> ProgrammeResult:
     """Run the tests of a programme in the order in which one feeds the next.
@@ -79,26 +72,26 @@ def run(
     if not isinstance(programme, Programme):
         programme = load_programme(Path(programme))
     refuse_unreadable(programme)
-    steps, done, values = steps_of(programme), list[FinishedTest](), list[EnteredValue]()
-    failed: dict[str, str] = {}
+    values = list[EnteredValue]()
     place = None if folder is None else Path(folder)
-    turns = _turns(programme, place, again, progress, keep, values, failed)
-    interrupted = False
-    try:
-        for test in turns:
-            done.append(test)
-            finished(test)
-    except KeyboardInterrupt:
-        interrupted = True
-    ended = {*failed, *(test.name for test in done)}
+
+    def finished_step(step: ProgrammeStep) -> FinishedTest:
+        kept = None if again else place
+        test = finished_test(programme, step, tuple(values), kept, progress)
+        if place is not None:
+            keep(test, place)
+        values.extend(values_given(test, programme))
+        return test
+
+    ran = run_in_turn(steps_of(programme), finished_step, finished)
     return ProgrammeResult(
         path=programme.path,
         about=programme.about,
-        tests=tuple(done),
+        tests=ran.runs,
         values=tuple(values),
-        failed=failed,
-        not_run=tuple(step.name for step in steps if step.name not in ended),
-        interrupted=interrupted or any(test.interrupted for test in done),
+        failed=ran.failed,
+        not_run=ran.not_run,
+        interrupted=ran.interrupted,
         unit=_unit_of(programme, tuple(values)),
     )
 
@@ -109,32 +102,6 @@ def _unit_of(programme: Programme, values: Values) -> UnitDescription:
     with suppress(CaseError):  # a fit with these values has failed, which says why
         case = with_values(case, values)
     return UnitDescription(tuple(parts_of(case)), case.values(), case.sources())
-
-
-def _turns(
-    programme: Programme,
-    folder: Path | None,
-    again: bool,
-    progress: Callable[[ProgrammeStep, Progress | None], None],
-    keep: Keep,
-    values: list[EnteredValue],
-    failed: dict[str, str],
-) -> Iterator[FinishedTest]:
-    """Yield each test as it ends; ``values`` and ``failed`` take what it gives, or its error."""
-    for step in steps_of(programme):
-        try:
-            test = finished_test(
-                programme, step, tuple(values), None if again else folder, progress
-            )
-            if folder is not None:
-                keep(test, folder)
-        except ExfitError as fault:
-            failed[step.name] = str(fault)
-            continue
-        values += values_given(test, programme)
-        yield test
-        if test.interrupted:
-            return
 
 
 def refuse_unreadable(programme: Programme) -> None:
@@ -173,7 +140,7 @@ def finished_test(
     step: ProgrammeStep,
     values: Values,
     folder: Path | None,
-    progress: Callable[[ProgrammeStep, Progress | None], None] = _ignore_progress,
+    progress: Callable[[ProgrammeStep, Progress | None], None] = lambda *_: None,
 ) -> FinishedTest:
     """Return a test with its result: the one that is kept in a folder, or else that of a run."""
     programme = programme.with_bases(bases_of(values))
