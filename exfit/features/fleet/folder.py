@@ -16,23 +16,20 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
 from exfit.runs.names import distinct_names
+from exfit.runs.store import read_kept, text_of
 from exfit.util.files import prepare, write, write_quickly, write_together
-from exfit.util.json_files import read_json
-from exfit.util.text import to_json
-from exfit.util.typed import Reader, plain
+from exfit.util.typed import plain
 
 INDEX, CASES = "index", "cases"
 RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
 VERSION = 1  # of a summary; one of another version is made again
 KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
 KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
-
-Content = TypeVar("Content")
 
 
 @dataclass(frozen=True)
@@ -138,18 +135,18 @@ def is_done(folder: Path, key: str) -> bool:
 
 def failure_of(folder: Path, key: str) -> Failure | None:
     """Return why the fit of a key failed; None where it did not, or was not run."""
-    return _read(folder / key / FAILED, Failure)
+    return read_kept(folder / key / FAILED, Failure)
 
 
 def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
     """Write what a case came to under its key; raises ExfitError where that is not possible."""
     if outcome.summary is not None:
-        summary = _summary_text(outcome.summary)
+        summary = text_of(outcome.summary, version=VERSION)
         files = {name: text for name, text in outcome.files.items() if name != RESULT}
         contents = {**files, SUMMARY: summary, RESULT: outcome.files[RESULT]}
         write_together(folder / key, contents, [FAILED])
     elif outcome.failure is not None:
-        write(folder / key / FAILED, to_json(plain(outcome.failure)))
+        write(folder / key / FAILED, text_of(outcome.failure))
 
 
 def prepare_folder(folder: Path) -> None:
@@ -159,7 +156,7 @@ def prepare_folder(folder: Path) -> None:
 
 def write_entry(folder: Path, entry: IndexEntry) -> None:
     """Write an entry of the index; raises ExfitError where that is not possible."""
-    text = to_json(plain(entry))
+    text = text_of(entry)
     with suppress(OSError):
         if (folder / INDEX / entry.file).read_bytes() == text.encode():
             return
@@ -173,7 +170,7 @@ def has_entry(folder: Path, case: str) -> bool:
 
 def entries_of(folder: Path) -> dict[str, IndexEntry]:
     """Return the index by the paths of the cases; a damaged entry is missing until its next run."""
-    entries = (_read(file, IndexEntry) for file in sorted((folder / INDEX).glob("*.json")))
+    entries = (read_kept(file, IndexEntry) for file in sorted((folder / INDEX).glob("*.json")))
     return {entry.case: entry for entry in entries if entry is not None and _is_of_batch(entry)}
 
 
@@ -253,26 +250,10 @@ def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
 
 def _summary(folder: Path, key: str) -> CaseSummary:
     """Return the summary of a fit that is done; raises ExfitError where it cannot be read."""
-    summary = _read(folder / key / SUMMARY, CaseSummary, VERSION)
+    summary = read_kept(folder / key / SUMMARY, CaseSummary, version=VERSION)
     if summary is not None:
         return summary
     from exfit.results.io import load_result
 
     result = load_result(folder / key)
     return summary_of(result, key, result.seconds)
-
-
-def _summary_text(summary: CaseSummary) -> str:
-    return to_json({"version": VERSION, **plain(summary, whole=True)})
-
-
-def _read(file: Path, kind: type[Content], version: int | None = None) -> Content | None:
-    """Return the content of a file, None where there is none of this form and version."""
-    try:
-        data = read_json(file)
-        if version is not None and data.get("version") != version:
-            return None
-        content: Content = Reader().read(kind, data)
-    except (ExfitError, RecursionError):
-        return None
-    return content

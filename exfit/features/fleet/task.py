@@ -1,7 +1,6 @@
 """One case of a batch, from its files to the files of its fit: the same in every worker."""
 
 import hashlib
-import json
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -9,12 +8,12 @@ from pathlib import Path
 from traceback import extract_tb
 from typing import TYPE_CHECKING, NamedTuple
 
-from exfit import __version__
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import KEY_DIGITS, CaseOutcome, Failure
 from exfit.features.fleet.summary import summary_of
-from exfit.util.files import read_regular, regular_size
-from exfit.util.root import on_disk
+from exfit.runs import store
+from exfit.runs.store import digest_of
+from exfit.util.files import read_regular
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
@@ -61,7 +60,8 @@ def key_of(files: Sequence[Path], settings: FitSettings, case: bytes | None = No
     A file that is missing or cannot be read counts as such. ``files`` are the case and those that
     it names, in its order; ``case`` is the content of the first where it has been read already.
     """
-    return _key(_digests(files, case), settings)
+    first = digest_of(files[0]) if case is None else hashlib.sha256(case).hexdigest()
+    return _key([first, *map(digest_of, files[1:])], settings)
 
 
 def run_case(task: CaseTask) -> CaseOutcome:
@@ -118,7 +118,7 @@ def _case_of(task: CaseTask) -> "Case | None":
         data = read_regular(path)
     except OSError:
         return None
-    digests = _digests(task.files, data)
+    digests = [hashlib.sha256(data).hexdigest(), *map(digest_of, task.files[1:])]
     if _key(digests, task.settings) != task.key:
         return None
     code = (digest for file, digest in zip(task.files, digests, strict=True) if file.suffix == CODE)
@@ -126,22 +126,7 @@ def _case_of(task: CaseTask) -> "Case | None":
 
 
 def _key(digests: Sequence[str | None], settings: FitSettings) -> str:
-    content = {"exfit": __version__, "files": digests, **settings._asdict()}
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:KEY_DIGITS]
-
-
-def _digests(files: Sequence[Path], case: bytes | None) -> list[str | None]:
-    first = _digest(files[0]) if case is None else hashlib.sha256(case).hexdigest()
-    return [first, *map(_digest, files[1:])]
-
-
-def _digest(file: Path) -> str | None:
-    try:
-        regular_size(file)
-        with on_disk(file).open("rb") as content:
-            return hashlib.file_digest(content, "sha256").hexdigest()
-    except OSError:
-        return None
+    return store.key_of(digests, **settings._asdict())[:KEY_DIGITS]
 
 
 def _seconds(began: float) -> float:

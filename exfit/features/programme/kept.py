@@ -1,23 +1,21 @@
 """What a programme keeps of each test: its result, under a hash of all that goes into it."""
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from exfit import __version__
 from exfit.errors import ExfitError
 from exfit.features.programme.case.programme import Programme, ProgrammeStep
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
 from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.features.programme.steady.v_curve_result import VCurve
-from exfit.records.reading import file_hash
 from exfit.results.consistency import steady_contradictions
 from exfit.results.description import UnitDescription
 from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME, load_result, result_text
 from exfit.results.model import FitResult
+from exfit.runs import store
+from exfit.runs.store import digest_of
 from exfit.util.files import write
 from exfit.util.json_files import read_json
 from exfit.util.text import show_value, to_json
@@ -61,36 +59,29 @@ Keep = Callable[[FinishedTest, Path], None]
 def key_of(step: ProgrammeStep, programme: Programme, values: tuple[EnteredValue, ...]) -> str:
     """Return the SHA-256 of all that goes into a test: its section, its files, values, exfit.
 
-    ``values`` are those that the tests before gave. Raises ExfitError for a file that is missing.
+    ``values`` are those that the tests before gave.
     """
     entered = {
         value.name: [value.value, value.std_error, value.source]
         for value in values
         if value.entered
     }
-    content = {
-        "exfit": __version__,
-        "content": programme.content_of(step.name),
-        "files": [file_hash(path) for path in programme.files_of(step.name)],
-        "values": entered,
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    files = [digest_of(path) for path in programme.files_of(step.name)]
+    return store.key_of(files, content=programme.content_of(step.name), values=entered)
 
 
 def result_kept(step: ProgrammeStep, key: str, folder: Path) -> StepResult | None:
     """Return the result of an earlier run of a test with the same key; None where there is none."""
     file = folder / step.name / WHOLE_FIT
+    if step.kind in RESULTS:
+        labels = {"version": VERSION, "key": key}
+        result = store.read_kept(file, RESULTS[step.kind], under="result", **labels)
+        return None if result is None or any(steady_contradictions(result)) else result
     try:
-        if step.kind not in RESULTS:
-            fit = load_result(file)
-            return fit if fit.inputs.get(KEY) == key else None
-        content = read_json(file)
-        if content["key"] != key or content["version"] != VERSION:
-            return None
-        result: SaturationResult | VCurve = Reader().read(RESULTS[step.kind], content["result"])
-    except (ExfitError, LookupError):
+        fit = load_result(file)
+    except ExfitError:
         return None  # there is none, or it is not ours
-    return None if any(steady_contradictions(result)) else result
+    return fit if fit.inputs.get(KEY) == key else None
 
 
 def text_of(test: FinishedTest) -> str:
@@ -119,7 +110,7 @@ def summary_text(result: ProgrammeResult) -> str:
         interrupted=result.interrupted,
         unit=result.unit,
     )
-    return to_json({"version": VERSION, **plain(summary, whole=True)})
+    return store.text_of(summary, version=VERSION)
 
 
 def load_summary(folder: Path) -> ProgrammeResult:
