@@ -23,8 +23,11 @@ FEW = (
     "HYGOV", "OEL2C", "UEL1",
 )  # fmt: skip
 
+# folders whose tests are of the models themselves; elsewhere a law takes a model as an example
+OF_MODELS = {"models", "plants", "planner"}
+
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)
-hypothesis.settings.register_profile("all", max_examples=200, deadline=None, derandomize=True)
+hypothesis.settings.register_profile("all", max_examples=100, deadline=None, derandomize=True)
 
 
 def pytest_addoption(parser):
@@ -32,8 +35,8 @@ def pytest_addoption(parser):
         "--models",
         choices=("few", "others", "all"),
         default="few",
-        help="run over a few models of each family, or over all models, with what else takes long; "
-        "others: what the few leave out",
+        help="few: one model of each family; others: the laws of models over all the others, and "
+        "what takes long; all: every law over every model",
     )
 
 
@@ -44,6 +47,7 @@ def pytest_configure(config):
     command line has: there are as many workers as processors.
     """
     config.addinivalue_line("markers", "long: does not run over the few models")
+    config.addinivalue_line("markers", "each_model: a law of each model, in whichever folder")
     few = config.getoption("models") == "few"
     hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -84,17 +88,20 @@ def pytest_collection_modifyitems(config, items):
 def _is_selected(item, models):
     """Return whether a test runs over the few models, or adds to what runs over them.
 
-    Drawn inputs are more in number over the other models: such a test adds to both.
+    Over the others run the laws of the models themselves, what takes long, and drawn inputs once
+    more, in greater number.
     """
+    other_model = _is_given_another_model(item)
     if models == "few":
-        return not _is_left_out(item)
-    return _is_left_out(item) or hypothesis.is_hypothesis_test(getattr(item, "obj", None))
+        return not (other_model or item.get_closest_marker("long"))
+    if other_model:
+        return item.get_closest_marker("each_model") or OF_MODELS & {*item.path.parts}
+    is_drawn = hypothesis.is_hypothesis_test(getattr(item, "obj", None))
+    return is_drawn or item.get_closest_marker("long")
 
 
-def _is_left_out(item):
-    """Return whether a test takes long, or is given a model that is not one of the few."""
-    if item.get_closest_marker("long"):
-        return True
+def _is_given_another_model(item):
+    """Return whether a test is given a model that is not one of the few."""
     given = item.callspec.params.values() if hasattr(item, "callspec") else ()
     parts = [part for value in given for part in (value if isinstance(value, tuple) else (value,))]
     names = [name for name in parts if isinstance(name, str) and name in CATALOGUE]

@@ -17,6 +17,7 @@ CASES = sorted(CONFIGS.glob("*.yaml"))
 MANY = 64  # starts, that find the lowest cost
 
 
+@pytest.mark.each_model
 def test_a_model_has_a_case_of_its_typical_data(model):
     """All values stand in the file, so that nobody has to look for them."""
     case = load_case(CONFIGS / "models" / f"{model.lower()}.yaml")

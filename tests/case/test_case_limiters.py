@@ -151,6 +151,7 @@ def fitted(tmp_path_factory):
     return fit(load_case(written(folder, *FREE, more=RECORD)))
 
 
+@pytest.mark.long
 def test_a_fit_finds_the_limiter_that_acts_and_says_which_parameters_nothing_shows(fitted):
     found = fitted.parameters["oel.KPOEL"]
     assert abs(found.value - 20.0) < 4.0 * found.std_error

@@ -992,6 +992,7 @@ def test_the_catalogue_names_every_model_and_machine(run):
     assert {line.split()[0] for line in ran.out.splitlines() if line} >= {*MODELS, *MACHINES}
 
 
+@pytest.mark.each_model
 @pytest.mark.parametrize("name", [None, *MODELS, *MACHINES, "esac1a"])
 def test_models_are_described_in_80_columns_with_nothing_cut_off(run, name):
     ran = run("models", *([] if name is None else [name]))
@@ -1000,6 +1001,7 @@ def test_models_are_described_in_80_columns_with_nothing_cut_off(run, name):
     assert "…" not in ran.out
 
 
+@pytest.mark.each_model
 @pytest.mark.parametrize("name", [*MODELS, *MACHINES])
 def test_a_data_sheet_holds_every_parameter_with_its_meaning(run, name):
     words = set(run("models", name).out.split())

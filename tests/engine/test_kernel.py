@@ -312,6 +312,7 @@ def smooth_bump(system, values):
     return small_bump(linear[0])
 
 
+@pytest.mark.each_model
 def test_tangents_equal_central_differences_for_every_parameter(saturated):
     name, saturation = saturated
     system, outputs = system_of(name, saturation=saturation), ("vt", system_of(name).outputs[-1])

@@ -172,6 +172,7 @@ def test_limits_far_away_change_the_response_as_little_as_no_hit_says(name):
     np.testing.assert_allclose(samples[0], samples[1], rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.each_model
 @pytest.mark.parametrize("name", LIMITED)
 def test_every_limit_of_the_data_sheet_is_known(name):
     """But those that a model says it does not have in its own words."""

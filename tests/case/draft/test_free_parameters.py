@@ -21,6 +21,7 @@ def free_names(model, **values):
     ]
 
 
+@pytest.mark.each_model
 def test_each_parameter_that_is_free_moves_the_voltage(model):
     """With the typical data, in a step of 5 % on open circuit."""
     if model == "FIRST_ORDER":

@@ -85,6 +85,7 @@ def test_no_single_step_of_a_finer_ladder_is_better(design, content):
     assert all(mean_error(share * best) > design.single.criterion for share in (0.5, 0.8, 0.95))
 
 
+@pytest.mark.long
 def test_fits_of_simulated_records_scatter_as_predicted(design, content):
     """The spread of 16 is known to 18 %: the bounds are five times that on either side."""
     truth = {name: content["parameters"]["free"][name]["start"] for name in OF}

@@ -152,6 +152,7 @@ def test_intervals_grow_with_the_noise_of_what_drives_and_own_noise_is_recognise
             assert test.times == pytest.approx(1.0, abs=0.12)
 
 
+@pytest.mark.long
 def test_an_event_that_cannot_be_weighed_says_so(folder, event):
     path = event_case(folder, "event", estimate={"search": "local", "loss": "huber"})
     notes = " ".join(fit(path).notes)

@@ -47,6 +47,7 @@ def test_each_event_starts_from_its_own_operating_point(events):
         assert setup.test.steady == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_events_share_the_parameters_and_a_third_one_is_met(fitted):
     """The noise that drives biases slightly: K by less than 3 %, TE, the least sure, by 10 %."""
     _, result = fitted

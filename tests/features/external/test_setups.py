@@ -96,6 +96,7 @@ def test_a_program_that_always_fails_is_quoted(record):
         exfit.fit(external(record, command=[sys.executable, "-c", code]))
 
 
+@pytest.mark.long
 def test_a_twin_that_differs_leads_to_the_minimum_of_the_program(record, native):
     """Its derivatives are corrected by quotients; those of the twin alone end elsewhere."""
     other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
@@ -189,6 +190,7 @@ def test_without_a_twin_quotients_of_the_programs_runs_lead_to_the_same_minimum(
     assert np.array_equal(start.overlays["vt"].start, exfit.simulate(case).response.signals["vt"])
 
 
+@pytest.mark.long
 def test_without_a_twin_every_third_run_may_fail(record, native):
     """Its period is that of a trial with its quotients: it would reject every trial."""
     case = without_twin(record, arguments=["error"])
@@ -210,6 +212,7 @@ def test_without_a_twin_what_a_record_leaves_open_is_found_by_the_program(record
     assert [*later.of_record.values()] == pytest.approx([1.13], abs=2e-3)
 
 
+@pytest.mark.long
 def test_without_a_twin_profiles_are_the_programs_own(record, native):
     (found,) = profile(without_twin(record), "K").profiles
     interval = native.parameters["K"].interval

@@ -25,6 +25,7 @@ def simulated(run, content, name):
     return np.genfromtxt(Path(name, "response.csv"), delimiter=",", names=True)
 
 
+@pytest.mark.long
 def test_a_play_in_file_drives_what_its_record_drove(run, event):
     """The frequency is the angle's slope, and is integrated again."""
     _, case = event

@@ -48,6 +48,7 @@ def test_where_a_case_speaks_of_averages_no_others_are_asked_about(stated):
     assert "averages" not in {each.interval_method for each in result.parameters.values()}
 
 
+@pytest.mark.long
 def test_an_interval_in_doubt_holds_what_is_fitted_without_averages_and_with_them():
     record = recorded(10.0, 0.1, noise=NOISE, seed=1)
     plain, averaged = (

@@ -99,6 +99,7 @@ def test_what_is_wrong_with_a_test_or_channel_is_found_by_the_line_that_says_so(
             case_of(each, tmp_path)
 
 
+@pytest.mark.long
 def test_the_lines_of_the_causes_of_a_poor_fit_load(tmp_path):
     content = config("ac1a_good")
     del content["validate"]
