@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from places import CONFIGS
-from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.fitting.recordings import measured
@@ -14,6 +13,7 @@ from exfit.models.sheet import typical
 from exfit.workflows import fit, simulate
 
 CASES = sorted(CONFIGS.glob("*.yaml"))
+QUICK = ("ac1a_typical", "first_order")  # of each part of the tests
 MANY = 64  # starts, that find the lowest cost
 
 
@@ -41,7 +41,13 @@ def test_a_case_reads_and_its_records_are_there(path):
         assert measured(case, one.test, one.record).time.size > 100
 
 
-@pytest.mark.parametrize("name", few_of([path.stem for path in CASES], 2))
+@pytest.mark.parametrize(
+    "name",
+    [
+        path.stem if path.stem in QUICK else pytest.param(path.stem, marks=pytest.mark.long)
+        for path in CASES
+    ],
+)
 def test_a_case_is_fitted_well_at_its_lowest_cost_and_its_validations_hold(name):
     case = load_case(CONFIGS / f"{name}.yaml")
     result = fit(case)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from drawn_responses import NAMES, case_of, drawn_response, fit_of, held
 from rich.console import Console
-from tiers import few_of
 
 import exfit
 from exfit.dsp.features import TIMES
@@ -26,7 +25,8 @@ def measured(drawn, **way):
     return fit_of(drawn, **way).comparison.features.measured
 
 
-@pytest.mark.parametrize("way", few_of(WAYS, 1))
+@pytest.mark.long
+@pytest.mark.parametrize("way", WAYS)
 def test_the_intervals_hold_the_truth_in_95_of_100_records_with_and_without_a_ripple(way):
     hits = {name: [] for name in NAMES}
     for seed in range(40):

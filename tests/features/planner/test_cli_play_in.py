@@ -62,6 +62,7 @@ def test_a_play_in_file_is_inspected_as_one_and_makes_no_new_case(run, empty_fol
     assert "a play-in file has no P and Q to fit" in err
 
 
+@pytest.mark.long
 def test_a_file_of_another_name_and_other_options_are_refused(run, event):
     _, case = event
     assert run("fit", case, "-o", "run", "--no-plots", "-q")[0] == 0
