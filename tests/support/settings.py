@@ -24,7 +24,10 @@ SETTINGS: dict[str, dict[str, str]] = {
 }
 SETTINGS["oldest"] = {**SETTINGS["prescott"], **SETTINGS["numpy"], **SETTINGS["x86-64"]}
 
-LINEAR_ALGEBRA = ("simulation", "dsp", "estimate", "inference", "fitting", "analysis")
+LINEAR_ALGEBRA = (
+    *("simulation", "dsp", "estimate", "inference", "fitting", "results/intervals", "verdict"),
+    *("workflows", "features/events", "features/translate"),
+)
 NUMERICAL = ("engine", "models", "plants", *LINEAR_ALGEBRA)
 
 
@@ -53,21 +56,10 @@ def openblas_cores() -> set[str]:
     return {CALLED.get(pool["architecture"], pool["architecture"]) for pool in pools}
 
 
-def another() -> str:
-    """Return the setting of a newer OpenBLAS than the oldest, and not this machine's; "" for none.
-
-    Under this machine's own every other test runs.
-    """
-    own = openblas_cores()
-    newer = [name for name in ("skylakex", "haswell") if name in SETTINGS]
-    return next((name for name in newer if SETTINGS[name][OPENBLAS] not in own), "")
-
-
 def run(name: str, arguments: list[str]) -> None:
     """Become pytest over the folders whose numbers a setting may change."""
     tests = Path(__file__).parents[1]
-    folders = LINEAR_ALGEBRA if SETTINGS[name].keys() == {OPENBLAS} else NUMERICAL
-    paths = [tests / "test_settings.py", *(tests / folder for folder in folders)]
+    paths = [tests / "test_settings.py", *(tests / folder for folder in NUMERICAL)]
     command = [sys.executable, "-m", "pytest", *map(str, paths), *arguments]
     os.execve(sys.executable, command, {**os.environ, **SETTINGS[name]})
 
