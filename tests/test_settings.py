@@ -46,14 +46,6 @@ def test_a_setting_takes_effect(name):
 
 
 @pytest.mark.long
-@pytest.mark.skipif(settings.OPENBLAS in os.environ, reason="this run has such a setting")
-def test_the_other_setting_of_the_gate_is_none_that_the_machine_has_by_itself():
-    other = settings.another()
-    assert other in ("", "skylakex", "haswell")
-    assert other == "" or faults({}, [SETTINGS[other]]) != [[]]
-
-
-@pytest.mark.long
 def test_without_its_setting_no_machine_computes_as_an_old_one():
     names = ["prescott", "x86-64", *(["numpy"] if settings.DISPATCHED else [])]
     assert all(faults({}, [SETTINGS[name] for name in names]))
