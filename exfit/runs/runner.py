@@ -1,0 +1,70 @@
+"""The runner of a plan: one run after the other in this process, whatever becomes of each."""
+
+from collections.abc import Callable, Sequence
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+from exfit.errors import ExfitError
+
+
+class Planned(Protocol):
+    """A part of a plan, by a name that no other has: a fit of a case, a test of a programme."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+
+class Run(Planned, Protocol):
+    """A part of a plan that has been run."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether its result is only the best point before an interruption."""
+
+
+PlannedT = TypeVar("PlannedT", bound=Planned)
+RunT = TypeVar("RunT", bound=Run)
+
+
+class Runs(NamedTuple, Generic[RunT]):
+    """The runs of a plan, in its order.
+
+    ``failed`` holds the error of each that could not be run or written, by its name; ``not_run``
+    names those that an interruption left out.
+    """
+
+    runs: tuple[RunT, ...]
+    failed: dict[str, str]
+    not_run: tuple[str, ...]
+    interrupted: bool
+
+
+def run_in_turn(
+    plan: Sequence[PlannedT],
+    run: Callable[[PlannedT], RunT],
+    finished: Callable[[RunT], None],
+) -> Runs[RunT]:
+    """Run the parts of a plan; one that raises ExfitError keeps no other from running.
+
+    ``finished`` is called with each that has ended, to show it and to write its files. A
+    KeyboardInterrupt ends the plan, and so does a run that was interrupted.
+    """
+    runs: list[RunT] = []
+    failed: dict[str, str] = {}
+    interrupted = False
+    try:
+        for planned in plan:
+            try:
+                runs.append(run(planned))
+                finished(runs[-1])
+            except ExfitError as fault:
+                failed[planned.name] = str(fault)
+                continue
+            if runs[-1].interrupted:
+                interrupted = True
+                break
+    except KeyboardInterrupt:
+        interrupted = True
+    ended = {*failed, *(done.name for done in runs)}
+    left = tuple(planned.name for planned in plan if planned.name not in ended)
+    return Runs(tuple(runs), failed, left, interrupted)
