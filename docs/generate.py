@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import exfit
-from exfit.features.drawings import block_diagram, diagram_and_remarks
+from exfit.features.drawings.diagram import block_diagram
+from exfit.features.drawings.letters import diagram_and_remarks
 
 DOCS = Path(__file__).parent
 CASES = DOCS.parent / "configs" / "models"
