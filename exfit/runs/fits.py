@@ -9,6 +9,7 @@ from typing import Any
 
 from exfit import estimate, workflows
 from exfit.case.case import Case
+from exfit.case.load import CaseOrPath
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import checked_search, checked_strategy, fitted
@@ -17,7 +18,6 @@ from exfit.results.side_by_side import outcome_of
 from exfit.runs.names import distinct_names, numbered
 from exfit.runs.runner import run_in_turn
 from exfit.util.typed import plain
-from exfit.case.load import CaseOrPath
 
 Progress = Iteration | estimate.Progress
 

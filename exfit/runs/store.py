@@ -47,7 +47,8 @@ def read_kept(
 ) -> Content | None:
     """Read what a file of the store holds; None where there is none of this form and these labels.
 
-    ``under`` is its key there, None where it has the labels beside its own. Anyone may have changed the file since: what is not ours is as if it was not there.
+    ``under`` is its key there, None where it has the labels beside its own. Anyone may have changed
+    the file since: what is not ours is as if it was not there.
     """
     try:
         data = read_json(file)

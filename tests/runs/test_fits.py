@@ -10,9 +10,9 @@ from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 
 import exfit
 from exfit.errors import CaseError
+from exfit.results.side_by_side import parameters_beside, results_table
 from exfit.runs.fits import fit_all, planned, run_all
 from exfit.runs.names import distinct_names
-from exfit.results.side_by_side import parameters_beside, results_table
 
 STRATEGIES = ("dgn", "lm")
 STEP = FIRST_ORDER["test"]
