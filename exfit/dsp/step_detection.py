@@ -1,14 +1,15 @@
-"""Detect the steps of a reference that was not recorded in the response to them."""
+"""Find the steps of a reference that was not recorded, in the response to them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import inf, sqrt
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise, spread
-from exfit.dsp.onset import Onset, onset
+from exfit.dsp.sampling import present_samples
 from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
@@ -31,6 +32,26 @@ SHORTEST_PULSE = 1.0  # s: a field voltage stands at its limit for less, and the
 MOST_RETURNS = 3  # moves that leave no lasting change, beside pulses: with more a channel wanders
 SPIKE_LIMIT_OF_RESPONSE = 6.0  # times the noise: the running median replaces what lies farther off
 
+# of the onset: the rise from rest is compared with step responses of chains of lags
+LAGS_IN_CHAIN = (1, 2, 3, 4)  # whose step responses are the shapes that a rise may have
+LAGS = np.geomspace(0.02, 8.0, 14)  # each, of the time that the rise takes
+SHORTEST_LAG = 0.02  # of a sample: with it the rise is a jump
+TRIED_INSTANTS = 120
+SOUGHT_BEFORE = 1.5  # times the rise: how long before its first sample the response may set out
+COMPARED_RISE, LESS_OF_IT = 0.5, 0.5  # of the first move, and of that, until a shape fits
+LEAST_RISE = 6.0  # times the noise: less of a rise shows no shape
+FEWEST_RISING = 3  # samples: fewer show no shape either
+HARDLY_MOVED = 0.2  # of the compared rise: until there the response may rest
+COMPARED_REST = 4.3  # times the rise; a whole number would end at a sample, or by rounding not
+FEWEST_RESTING = 20  # samples of the rest that is compared
+MOST_SAMPLES = 200  # of rest and rise; of more, neighbours are averaged
+FITTED_VALUES = 4  # level, size, instant and lag
+CHI_SQUARE = 3.84  # of one degree of freedom: exceeded by chance in 5 of 100
+FIT_QUANTILE = 1.0  # standard deviations of chi-square: a misfit beyond is one of the shape
+SHAPE_ERROR = 0.15  # of the rise: by so much no shape is that of the response
+CLOCK_ERROR = 0.25  # of a sample
+NOISELESS = 1e-9  # of the rise: the least noise, as numbers are rounded
+
 
 class MovesFromStartError(ValueError):
     """A response without a rest before it moves."""
@@ -41,23 +62,45 @@ class ReturnsError(ValueError):
 
 
 @dataclass(frozen=True)
+class Onset:
+    """The interval (s) that holds the instant at which a response sets out, at 95 %."""
+
+    earliest: float
+    latest: float
+
+    @property
+    def at(self) -> float:
+        """The middle of the interval, s."""
+        return 0.5 * (self.earliest + self.latest)
+
+    @property
+    def error(self) -> float:
+        """Half the interval, s."""
+        return 0.5 * (self.latest - self.earliest)
+
+
+@dataclass(frozen=True)
 class DetectedStep:
-    """A step of the reference as the response shows it.
+    """A step of the reference as one signal shows it.
 
     ``at`` is its instant (s), which lies within ``error`` (s) of it at 95 %, ``size`` the change of
-    the response that lasts, with its sign, and ``level`` where the response stood before, both in
-    its unit. The response moves quickly ``until`` an instant (s).
+    the signal that lasts, with its sign, and ``level`` where it stood before, both in its unit. A
+    response moves quickly ``until`` an instant (s). Where it moves ``from_start``, its first
+    sample, the step was made there or before; a signal that ``jumps`` between levels is no
+    response.
     """
 
     at: float
     error: float
     size: float
     level: float
-    until: float
+    until: float = -inf
+    from_start: bool = False
+    jumps: bool = False
 
 
 def find_step(time: Array, samples: Array) -> DetectedStep:
-    """Return the first step of a reference from its response (M,), which is at rest before it.
+    """Find the first step of a reference in its response (M,), which is at rest before it.
 
     A voltage follows a step of its reference late and smoothly, a field voltage at once: `onset`
     gives when the response sets out, whatever its shape. A step is detected if it is at least a
@@ -76,8 +119,19 @@ def find_step(time: Array, samples: Array) -> DetectedStep:
     return _step(time, samples)[0]
 
 
+def first_step(time: Array, samples: Array) -> DetectedStep | None:
+    """Find the first step as `find_step` does, in the samples (M,) that are not missing (nan).
+
+    It is None where there is none.
+    """
+    try:
+        return find_step(*present_samples(time, samples))
+    except ValueError:
+        return None
+
+
 def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
-    """Return all steps of a reference from its response (M,), which ``find_step`` returns first.
+    """Find all steps of a reference in its response (M,), of which ``find_step`` finds the first.
 
     The next one is looked for where the response to the one before has settled; what is slower than
     a fifth of that one passes for its settling. A pulse, which stands for a while and then returns,
@@ -113,7 +167,7 @@ def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
 
 
 def _distinct(time: Array, smooth: Array, steps: Sequence[DetectedStep]) -> Iterator[DetectedStep]:
-    """Yield the steps that are larger than what the response does elsewhere at rest."""
+    """Select the steps that are larger than what the response does elsewhere at rest."""
     ends = [*(int(np.searchsorted(time, step.at)) for step in steps), len(time) - 1]
     moves, lasts = [], []
     for step, begin, end in zip(steps, ends, ends[1:], strict=False):
@@ -130,7 +184,7 @@ def _distinct(time: Array, smooth: Array, steps: Sequence[DetectedStep]) -> Iter
 
 
 def _wander(rest: Array, lag: int) -> float:
-    """Return the largest move (in ``lag`` samples) of a response at rest (M,), 0 of few samples.
+    """Find the largest move in ``lag`` samples of a response at rest (M,), 0 of few samples.
 
     A rest too short to show it shows less; a random walk goes with the root of the time.
     """
@@ -141,7 +195,7 @@ def _wander(rest: Array, lag: int) -> float:
 
 
 def departure(time: Array, samples: Array) -> Onset:
-    """Return when a response (M,) leaves its rest, whether it stays away or returns.
+    """Find when a response (M,) leaves its rest, whether it stays away or returns.
 
     Raises ValueError like ``find_step``, but for what leaves no lasting change.
     """
@@ -165,7 +219,6 @@ class _LeftRest:
 
 
 def _left_rest(time: Array, samples: Array) -> _LeftRest:
-    """Return where a response leaves its rest; raises ValueError where it does not."""
     if len(samples) < 2 * SAMPLES_AT_REST:
         raise ValueError(
             f"{len(samples)} samples: a step is detected in at least {2 * SAMPLES_AT_REST}"
@@ -178,7 +231,7 @@ def _left_rest(time: Array, samples: Array) -> _LeftRest:
 
 
 def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
-    """Return the first step, and where the response to it has settled."""
+    """Find the first step, and the place where the response to it has settled."""
     rest = _left_rest(time, samples)
     moves_until, start, end = _settled(rest)
     size = float(median(samples[start : end + 1])) - rest.level
@@ -191,7 +244,7 @@ def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
 
 
 def _pulse(time: Array, samples: Array) -> tuple[list[DetectedStep], int]:
-    """Return the two steps of a response that returns, and where it has settled.
+    """Find the two steps of a response that returns, and the place where it has settled.
 
     There is none where it does not stand between them for as long as ``STANDS_FOR`` and
     ``SHORTEST_PULSE`` say.
@@ -216,7 +269,7 @@ def _pulse(time: Array, samples: Array) -> tuple[list[DetectedStep], int]:
 
 
 def _onset(time: Array, samples: Array, rest: _LeftRest, last: int) -> Onset:
-    """Return when a response sets out, by its samples up to the ``last``.
+    """Find when a response sets out, by its samples up to the ``last``.
 
     Raises ValueError where too few of them are before.
     """
@@ -232,7 +285,7 @@ def _onset(time: Array, samples: Array, rest: _LeftRest, last: int) -> Onset:
 
 
 def _first_peak(way: Array, gone: int) -> int:
-    """Return where a way from rest is longest before it becomes much shorter."""
+    """Find where a way from rest is longest before it becomes much shorter."""
     longest = np.maximum.accumulate(way[gone:])
     passed = np.flatnonzero(way[gone:] < (1.0 - PEAK_PASSED) * longest)
     return gone + int(np.argmax(way[gone : gone + int(passed[0])] if len(passed) else way[gone:]))
@@ -245,7 +298,7 @@ def _early(time: Array) -> MovesFromStartError:
 
 
 def _departure(smooth: Array, scatter: float) -> float:
-    """Return how far from its level the response moves; raises ValueError where it does not."""
+    """Distance from its level at which a response moves; raises ValueError where it does not."""
     change = float(np.ptp(smooth))
     if change <= LEAST_CHANGE * scatter:
         raise ValueError(
@@ -255,13 +308,24 @@ def _departure(smooth: Array, scatter: float) -> float:
 
 
 def running_median(samples: Array) -> Array:
-    """Return the running median (M,), mirrored at the ends."""
+    """Running median (M,) of samples, mirrored at the ends."""
     padded = np.pad(samples, MEDIAN_SAMPLES // 2, mode="reflect")
     return np.asarray(median(sliding_window_view(padded, MEDIAN_SAMPLES), axis=-1))
 
 
+def block_medians(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
+    """Mean instants and medians of whole blocks of so many samples (M,)."""
+    if block == 1:
+        return time, samples
+    whole = len(time) // block * block
+    return (
+        np.mean(time[:whole].reshape(-1, block), axis=1),
+        np.median(samples[:whole].reshape(-1, block), axis=1),
+    )
+
+
 def _crossing(time: Array, way: Array, far: float) -> tuple[int, int]:
-    """Return where a way from rest is last near it, and where it is first farther than ``far``.
+    """Find where a way from rest is last near it, and where it is first farther than ``far``.
 
     Raises a ValueError where it is so from the beginning.
     """
@@ -273,7 +337,7 @@ def _crossing(time: Array, way: Array, far: float) -> tuple[int, int]:
 
 
 def _settled(rest: _LeftRest) -> tuple[int, int, int]:
-    """Return until where the response moves quickly, and the first and last place of its rest."""
+    """Find the end of its quick moves, and the first and last place of the rest after them."""
     smooth, left, gone = rest.smooth, rest.left, rest.gone
     lag = gone - left
     patience = REST_TIMES * lag
@@ -286,3 +350,111 @@ def _settled(rest: _LeftRest) -> tuple[int, int, int]:
     end = int(moves[pauses[0] + 1]) if len(pauses) else len(smooth) - 1
     until = int(moves[pauses[0]] if len(pauses) else moves[-1]) + lag if len(moves) else gone
     return min(until, end), max(end - patience, gone), end
+
+
+# ---- the onset
+
+
+def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) -> Onset:
+    """Find the interval in which a response (M,) sets out from its rest.
+
+    The rise is compared with the step responses of chains of one to four equal lags, from a jump
+    to a power of time, up to half of the ``peak`` of the first move, and up to less where no shape
+    fits within the ``scatter`` of the noise. The interval holds the instants whose best shape
+    exceeds the best of all by no more than chi-square does at 95 %, and what such a shape errs by.
+
+    Args:
+        time: (M,), s, increasing.
+        samples: (M,), finite, without spikes.
+        level: where they rest.
+        peak: the sample at which the first move ends.
+        scatter: the standard deviation of the noise.
+    """
+    for rest_end, end in _rises(np.abs(samples[: peak + 1] - level), scatter):
+        rise = float(time[end] - time[rest_end])
+        first = int(np.searchsorted(time, time[rest_end] - COMPARED_REST * rise))
+        window = slice(max(min(first, rest_end - FEWEST_RESTING), 0), end + 1)
+        block = -(-(window.stop - window.start) // MOST_SAMPLES)
+        t, y = _block_means(time[window], block), _block_means(samples[window], block)
+        earliest = time[rest_end] - SOUGHT_BEFORE * rise
+        interval, fits = _compared(t, y, max(float(earliest), t[0]), scatter / sqrt(block))
+        margin = SHAPE_ERROR * rise + CLOCK_ERROR * float(median(np.diff(t)))
+        result = Onset(interval.earliest - margin, interval.latest + margin)
+        if fits:
+            break
+    return result
+
+
+def _rises(way: Array, scatter: float) -> Iterator[tuple[int, int]]:
+    """Yield where less and less of a rise begins and ends, given the ``way`` (M,) from rest."""
+    size = float(np.max(way))
+    far = max(COMPARED_RISE * size, min(LEAST_RISE * scatter, size))
+    while True:
+        end = max(int(np.argmax(way >= far)), 1)
+        near = np.flatnonzero(way[:end] <= max(HARDLY_MOVED * far, scatter))
+        rest_end = int(near[-1]) if len(near) else 0
+        yield rest_end, end
+        far *= LESS_OF_IT
+        if far < LEAST_RISE * scatter or end - rest_end < FEWEST_RISING:
+            return
+
+
+def _block_means(samples: Array, block: int) -> Array:
+    """Means of whole blocks of samples, counted from the end."""
+    if block == 1:
+        return samples
+    return np.asarray(np.mean(samples[len(samples) % block :].reshape(-1, block), axis=1))
+
+
+def _compared(time: Array, samples: Array, low: float, scatter: float) -> tuple[Onset, bool]:
+    """Interval without what shapes err by, and whether the best of them fits."""
+    instants = np.linspace(low, time[-1], TRIED_INSTANTS, endpoint=False)
+    costs = _costs(time, samples, instants)
+    freedom = max(len(samples) - FITTED_VALUES, 1)
+    known = max(scatter, NOISELESS * float(np.ptp(samples))) ** 2
+    left = float(np.min(costs)) / freedom
+    fits = left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom))
+    return interval_below(
+        instants, costs, float(np.min(costs)) + CHI_SQUARE * max(known, left)
+    ), fits
+
+
+def interval_below(instants: Array, costs: Array, limit: float) -> Onset:
+    """Find the first and last instant at which costs (N,) cross a limit, in lines between them.
+
+    Where they are below it at an end, that is the end.
+    """
+    inside = np.flatnonzero(costs <= limit)
+    first, last = int(inside[0]), int(inside[-1])
+
+    def crossing(within: int, beyond: int) -> float:
+        if not 0 <= beyond < len(costs):
+            return float(instants[within])
+        share = (limit - costs[within]) / (costs[beyond] - costs[within])
+        return float(instants[within] + share * (instants[beyond] - instants[within]))
+
+    return Onset(crossing(first, first - 1), crossing(last, last + 1))
+
+
+def _costs(time: Array, samples: Array, instants: Array) -> Array:
+    """Least sums of squares (N,) that any shape from each instant on leaves.
+
+    Level and size are eliminated (Golub and Pereyra 1973).
+    """
+    rise = float(time[-1] - instants[0])
+    lags = np.maximum(LAGS * rise, SHORTEST_LAG * float(median(np.diff(time))))
+    ago = np.maximum(time - instants[:, None], 0.0)[:, None, :] / lags[:, None]
+    y = samples - np.mean(samples)
+    costs = np.full(len(instants), y @ y)
+    # of a chain of n equal lags: 1 - exp(-x) (1 + x + ... + x^(n-1) / (n-1)!)
+    term = np.exp(-ago)
+    shape = 1.0 - term
+    for order in LAGS_IN_CHAIN:
+        if order > 1:
+            term = term * ago / (order - 1)
+            shape = shape - term
+        centred = shape - np.mean(shape, axis=-1, keepdims=True)
+        along, size = centred @ y, np.sum(centred**2, axis=-1)
+        gain = np.divide(along**2, size, out=np.zeros_like(size), where=size > 0.0)
+        costs = np.minimum(costs, y @ y - np.max(gain, axis=1))
+    return costs

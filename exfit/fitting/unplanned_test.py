@@ -22,14 +22,19 @@ from exfit.case.schema import (
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.recorded.detected_steps import SIZE_WITHIN
 from exfit.fitting.recordings import clock_of, read_section
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import REFERENCES
 from exfit.records.formats import open_table
 from exfit.records.inspection import Inspection, inspect
 from exfit.records.record import Record
-from exfit.records.steps import INSTANT_WITHIN, RecordedStep, steps_of_signals, with_sizes
+from exfit.records.steps import (
+    INSTANT_WITHIN,
+    RecordedStep,
+    bounds_about,
+    steps_of_record,
+    with_sizes,
+)
 from exfit.simulation.simulator import Response
 from exfit.util.text import show
 
@@ -164,7 +169,7 @@ def _shown(
         return tuple(RecordedStep(at, 0.0, (), {}, False) for at in given.instants)
     if inspection is not None:
         return inspection.steps
-    return steps_of_signals(record.time, record.signals)[1]
+    return steps_of_record(record.time, record.signals).steps
 
 
 def _lasting(
@@ -260,7 +265,7 @@ def _events(
             # one that is sought farther off would hide a response that is late
             low = max(step.at - step.error, _earliest(record, steps, k))
             at = Unknown(start=step.at, min=low, max=min(step.at + step.error, end))
-        low, high = sorted(((1.0 - SIZE_WITHIN) * size, (1.0 + SIZE_WITHIN) * size))
+        low, high = bounds_about(size)
         found = Unknown(start=size, min=low, max=high)
         events.append(FindableStep(at=at, step=size if given.sizes else found))
     return events

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import UNIFORM_SPREAD
-from exfit.dsp.quality import drift_at_rest, mains_frequency, noise_of, quantum, spikes, stuck
+from exfit.dsp.quality import drift_at_rest, quantum, spikes, stuck
 from exfit.dsp.sampling import present_samples
+from exfit.dsp.step_detection import DetectedStep
 from exfit.records.ripple import Ripple, ripple_at_rest
-from exfit.records.steps import ChannelSteps, LevelChange, RecordedStep, switches
+from exfit.records.steps import ChannelSteps, RecordedStep
 from exfit.signals import POSITIVE_AT_REST
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ class InspectedChannel:
     spikes_at: tuple[float, ...] = ()
     stuck: tuple[tuple[float, float], ...] = ()
     frequency: float | None = None
-    steps: tuple[LevelChange, ...] = ()
+    steps: tuple[DetectedStep, ...] = ()
     remark: str = ""
     drift: float = 0.0
     ripple: Ripple | None = None
@@ -124,6 +125,11 @@ class InspectedChannel:
         """Whether it is negative at rest although its signal is positive there."""
         return self.signal in POSITIVE_AT_REST and self.level < -NEGATIVE * self.noise
 
+    def change_at(self, step: RecordedStep) -> float | None:
+        """Change that lasts at a step, pu or a share of the level at rest; None without one."""
+        base = 1.0 if self.seems_per_unit else self.level
+        return step.sizes[self.name] / base if self.name in step.sizes and base else None
+
     def _spikes_in_words(self) -> str:
         instants = ", ".join(f"{at:.6g}" for at in self.spikes_at)
         more = ", ..." if self.spikes > len(self.spikes_at) else ""
@@ -152,6 +158,10 @@ class InspectedPhases:
         """The name of the voltage that they are."""
         return ", ".join(self.columns)
 
+    def change_at(self, step: RecordedStep) -> float | None:
+        """Change that lasts at a step, as a share of the level at rest; None without one."""
+        return step.sizes[self.name] / self.level if self.name in step.sizes else None
+
 
 def inspect_channel(
     name: str,
@@ -170,8 +180,7 @@ def inspect_channel(
     missing = len(samples) - len(y)
     if not len(y):
         return InspectedChannel(name, *unit, missing=missing, remark=own_steps.remark)
-    frequency = mains_frequency(t, y)
-    noise = 0.0 if frequency or switches(y) else noise_of(y)
+    noise = own_steps.noise
     outlying = spikes(t, y, noise, SPIKE_LIMIT) if noise else np.zeros(0, np.intp)
     rounding = quantum(y)
     # what is rounded more coarsely than its noise stands still most of the time
@@ -191,7 +200,7 @@ def inspect_channel(
         spikes=len(outlying),
         spikes_at=tuple(float(t[row]) for row in outlying[:PLACES_LISTED]),
         stuck=tuple((float(t[first]), float(t[last])) for first, last in still),
-        frequency=frequency,
+        frequency=own_steps.frequency,
         steps=own_steps.changes,
         remark=own_steps.remark,
         drift=_drift(t, y, steps) if noise else 0.0,

@@ -73,12 +73,8 @@ def _too_large(channels: Mapping[str, InspectedChannel], step: RecordedStep) -> 
     """Yield the changes of the voltage and its reference that no test makes."""
     for signal in ("vref", "vt"):
         channel = channels.get(signal)
-        if channel is None or step.from_start or channel.name not in step.sizes:
-            continue
-        # a reference may be recorded as its deviation; a voltage in kV is relative to its level
-        base = 1.0 if channel.seems_per_unit else abs(channel.level)
-        size = step.sizes[channel.name] / base if base else 0.0
-        if abs(size) > LARGEST_STEP:
+        size = None if channel is None or step.from_start else channel.change_at(step)
+        if channel is not None and size is not None and abs(size) > LARGEST_STEP:
             yield f"{channel.name}: changes at {step.at:.4g} s; {size_in_words(size)}"
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.quality import mains_frequency, noise_of
-from exfit.dsp.reference_moves import rest_end
+from exfit.dsp.jumps import rest_end
+from exfit.dsp.quality import mains_frequency
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
 from exfit.features.events.pmu_recognition import PmuContent, pmu_content
@@ -33,12 +33,7 @@ from exfit.records.formats.table import Table, column_error, listed, refuse_unev
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
 from exfit.records.status import Status, bad_rows
-from exfit.records.steps import (
-    SAME_STEP,
-    RecordedStep,
-    steps_of_signals,
-    with_sizes,
-)
+from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
 from exfit.records.units import unit_in, usual
 from exfit.signals import OF_EVENT
 from exfit.util.magnitude import LARGEST
@@ -91,6 +86,13 @@ class Inspection:
         except ValueError:
             return None
         return channel
+
+    def change_of_voltage(self, step: RecordedStep) -> float | None:
+        """Change of the voltage that lasts at a step, pu or a share of its level; None if none."""
+        voltage = self.channel_of("vt")
+        sources = (*(() if voltage is None else (voltage,)), *self.phases)
+        changes = (source.change_at(step) for source in sources)
+        return next((change for change in changes if change is not None), None)
 
     @property
     def plays_in(self) -> bool:
@@ -186,14 +188,12 @@ def inspect(
     plain = samples if pmu is None else pmu.without_phasors(samples)
     groups = tuple(_phase_groups(time, plain, stated))
     signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
-    own_steps, steps = steps_of_signals(time, signals, *_recognised(plain, groups, stated))
-    channels = tuple(
-        inspect_channel(name, units[name], time, column, own_steps[name], steps)
+    found = steps_of_record(time, signals, *_recognised(plain, groups, stated))
+    inspected = [
+        inspect_channel(name, units[name], time, column, found.channels[name], found.steps)
         for name, column in samples.items()
-    )
-    steps = _with_sizes(steps, time, signals, channels)
-    sized = [_with_sizes_of(channel, steps) for channel in channels]
-    channels = identified(sized, steps, groups, {*samples} - {*plain})
+    ]
+    channels = identified(inspected, found.steps, groups, {*samples} - {*plain})
     opening = breaker_opening(time, samples, channels)
     return Inspection(
         table.path,
@@ -203,7 +203,7 @@ def inspect(
         tuple(table.place(row) for row in sampling.backward[:PLACES_LISTED]),
         tuple(replace(channel, rejected_load=opening is not None) for channel in channels),
         groups,
-        steps,
+        found.steps,
         unreadable,
         time,
         samples,
@@ -308,29 +308,6 @@ def _phase_groups(
 def effective_value(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
     """Return the effective value (M,) of three phases, waveforms or effective values each."""
     return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
-
-
-def _with_sizes(
-    steps: Sequence[RecordedStep],
-    time: Array,
-    signals: Mapping[str, Array],
-    channels: Sequence[InspectedChannel],
-) -> tuple[RecordedStep, ...]:
-    """Return the steps with the lasting change of each signal that is no waveform."""
-    noises = {channel.name: channel.noise for channel in channels}
-    noises |= {name: noise_of(samples) for name, samples in signals.items() if name not in noises}
-    waveforms = {channel.name for channel in channels if channel.frequency}
-    moving = {name: samples for name, samples in signals.items() if name not in waveforms}
-    return with_sizes(steps, moving, noises, time)
-
-
-def _with_sizes_of(channel: InspectedChannel, steps: Sequence[RecordedStep]) -> InspectedChannel:
-    """Return a channel whose own steps have their lasting size."""
-    changes = []
-    for change in channel.steps:
-        step = min(steps, key=lambda step: abs(step.at - change.at))
-        changes.append(replace(change, size=step.sizes.get(channel.name, change.size)))
-    return replace(channel, steps=tuple(changes))
 
 
 def _flagged(table: Table, pmu: PmuContent | None) -> str:

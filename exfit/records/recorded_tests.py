@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
-from exfit.dsp.step_detection import running_median
+from exfit.dsp.sampling import present_samples
+from exfit.dsp.step_detection import block_medians, running_median
 from exfit.records.contradictions import sign_disputed_by
 from exfit.records.inspection import Inspection, effective_value
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
@@ -147,15 +148,9 @@ def _settled_at(time: Array, response: Array, start: float, end: float) -> float
 
 def _response(inspection: Inspection) -> tuple[Array, Array]:
     """Return the instants and the smoothed voltage, or what else shows the steps, (M,) each."""
-    time, samples = inspection.time, _voltage(inspection)
-    present = np.isfinite(samples)
-    time, samples = time[present], samples[present]
+    time, samples = present_samples(inspection.time, _voltage(inspection))
     block = max(round(SMOOTHED_OVER / inspection.sampling.step), 1)
-    whole = len(time) // block * block
-    return (
-        np.mean(time[:whole].reshape(-1, block), axis=1),
-        np.median(samples[:whole].reshape(-1, block), axis=1),
-    )
+    return block_medians(time, samples, block)
 
 
 def _voltage(inspection: Inspection) -> Array:
@@ -170,17 +165,10 @@ def _voltage(inspection: Inspection) -> Array:
 
 
 def _change(inspection: Inspection, step: RecordedStep) -> float | None:
-    """Return a step as a share of the level: of the reference, else of the voltage."""
-    for signal in ("vref", "vt"):
-        channel = inspection.channel_of(signal)
-        if channel is not None and channel.name in step.sizes:
-            if signal == "vt" and sign_disputed_by(inspection.channels, inspection.steps, step):
-                return None
-            level = 1.0 if channel.seems_per_unit else channel.level
-            return step.sizes[channel.name] / level if level else None
-    sizes = (
-        step.sizes[group.name] / group.level
-        for group in inspection.phases
-        if group.name in step.sizes
-    )
-    return next(sizes, None)
+    """Change of the reference at a step, else of the voltage where its sign is not disputed."""
+    reference = inspection.channel_of("vref")
+    if reference is not None and reference.name in step.sizes:
+        return reference.change_at(step)
+    if sign_disputed_by(inspection.channels, inspection.steps, step):
+        return None
+    return inspection.change_of_voltage(step)

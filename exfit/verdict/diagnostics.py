@@ -9,7 +9,7 @@ from exfit import estimate
 from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable
-from exfit.dsp.reference_moves import scatter
+from exfit.dsp.jumps import scatter
 from exfit.fitting.experiment import Channel
 from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.recorded.references import is_table

@@ -16,11 +16,12 @@ from tables import read_columns
 from tiers import few_of
 
 from exfit.case.draft.suggestion import bump_section, record_section, weights_section
+from exfit.dsp.step_detection import DetectedStep
 from exfit.errors import RecordError
 from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
-from exfit.records.steps import LevelChange, combined_steps
+from exfit.records.steps import combined_steps
 from exfit.records.units import unit_in
 from exfit.show import figures as plots
 
@@ -499,25 +500,27 @@ def test_the_figure_marks_steps_gaps_and_spikes():
 
 def test_one_step_in_several_channels_is_placed_by_the_sharpest_or_the_first():
     changes = {
-        "a": (LevelChange(1.0, 0.002, 0.1, 0.0),),
-        "b": (LevelChange(1.002, 0.005, 0.2, 0.0),),
+        "a": (DetectedStep(1.0, 0.002, 0.1, 0.0),),
+        "b": (DetectedStep(1.002, 0.005, 0.2, 0.0),),
     }
     (step,) = combined_steps(changes)
     assert (step.at, step.error) == pytest.approx((1.0, 0.002))
-    (step,) = combined_steps({**changes, "c": (LevelChange(0.97, 0.01, 0.1, 0.0),)})
+    (step,) = combined_steps({**changes, "c": (DetectedStep(0.97, 0.01, 0.1, 0.0),)})
     assert (step.at, step.error) == pytest.approx((0.97, 0.01))
-    (alone,) = combined_steps({**changes, "ref": (LevelChange(1.01, 0.005, 0.1, 0.0, jumps=True),)})
+    (alone,) = combined_steps(
+        {**changes, "ref": (DetectedStep(1.01, 0.005, 0.1, 0.0, jumps=True),)}
+    )
     assert (alone.at, alone.error) == pytest.approx((1.01, 0.005))
     assert alone.seen_in == ("a", "b", "ref")
-    far = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0), LevelChange(1.1, 0.001, 0.1, 0.0))}
+    far = {"a": (DetectedStep(1.0, 0.001, 0.1, 0.0), DetectedStep(1.1, 0.001, 0.1, 0.0))}
     assert len(combined_steps(far)) == 2  # of one channel, two are two
 
 
 def test_a_channel_that_returns_while_others_still_move_shows_no_second_step():
-    kick = (LevelChange(1.0, 0.005, 0.8, 1.1, until=1.1), LevelChange(1.35, 0.01, -0.7, 1.9))
-    slow = (LevelChange(1.01, 0.02, 0.05, 1.0, until=2.0),)
+    kick = (DetectedStep(1.0, 0.005, 0.8, 1.1, until=1.1), DetectedStep(1.35, 0.01, -0.7, 1.9))
+    slow = (DetectedStep(1.01, 0.02, 0.05, 1.0, until=2.0),)
     assert len(combined_steps({"efd": kick, "vt": slow})) == 1
-    again = (kick[0], LevelChange(1.35, 0.01, -0.9, 1.9))  # farther than it came
+    again = (kick[0], DetectedStep(1.35, 0.01, -0.9, 1.9))  # farther than it came
     assert len(combined_steps({"efd": again, "vt": slow})) == 2
     assert len(combined_steps({"efd": kick})) == 2
 

@@ -16,7 +16,7 @@ from exfit.records.channel_recognition import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
 from exfit.records.inspection import Inspection
 from exfit.records.rejection import POWERS, BreakerOpening
-from exfit.records.steps import INSTANT_WITHIN, RecordedStep
+from exfit.records.steps import RecordedStep, bounds_of_instant
 from exfit.records.units import unit_of
 from exfit.signals import COMPARED, OF_EVENT, RECORDED, SIGNALS
 from exfit.util.text import yaml_number
@@ -205,25 +205,12 @@ def _step(inspection: Inspection, step: RecordedStep, given: float | None) -> It
         text = "the record moves from its first sample: made then, or before?"
         yield commented(f"    - at: {number_text(step.at)}", text)
     else:
-        low = max(step.at - INSTANT_WITHIN, float(inspection.time[0]))
-        high = min(step.at + INSTANT_WITHIN, float(inspection.time[-1]))
-        yield commented(f"    - at: {_range(step.at, low, high)}", f"+- {step.error:.1g} s")
-    change = _change_of_vt(inspection, step)
+        bounds = bounds_of_instant(step.at, inspection.time)
+        yield commented(f"    - at: {_range(step.at, *bounds)}", f"+- {step.error:.1g} s")
+    share = inspection.change_of_voltage(step)
+    change = "" if share is None else f"; vt changed by {number_text(share)}"
     keyed_in = FILL_IN if given is None else yaml_number(given)
     yield commented(f"      step: {keyed_in}", f"pu, as it was keyed in{change}")
-
-
-def _change_of_vt(inspection: Inspection, step: RecordedStep) -> str:
-    """Return by how much vt changed for good, where that is known."""
-    voltage = inspection.channel_of("vt")
-    if voltage is not None and voltage.name in step.sizes:
-        size = step.sizes[voltage.name]
-        share = size if voltage.seems_per_unit else size / voltage.level
-        return f"; vt changed by {number_text(share)}"
-    for group in inspection.phases:
-        if group.name in step.sizes:
-            return f"; vt changed by {number_text(step.sizes[group.name] / group.level)}"
-    return ""
 
 
 def _phases(inspection: Inspection, group: InspectedPhases, base: Base | None) -> str:

@@ -3,9 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from exfit.dsp.step_detection import DetectedStep, find_step
+from exfit.dsp.step_detection import DetectedStep, first_step
 from exfit.errors import RecordError
 from exfit.features.compare.curves import RECORD, Curve
 from exfit.features.compare.differences import Difference, differences
@@ -68,7 +66,11 @@ class ComparedClocks:
 
 def compared_clocks(curves: Sequence[Curve], signal: str) -> ComparedClocks:
     """Return the clocks of curves as the steps of a signal show them."""
-    steps = {curve.name: _step_of(curve, signal) for curve in curves if signal in curve.signals}
+    steps = {
+        curve.name: first_step(curve.time, curve.signals[signal])
+        for curve in curves
+        if signal in curve.signals
+    }
     name = RECORD if steps.get(RECORD) is not None else curves[0].name
     reference = next(curve for curve in curves if curve.name == name)
     at = steps.get(name)
@@ -91,14 +93,6 @@ def shifted(curves: Sequence[Curve], shifts: Mapping[str, float]) -> list[Curve]
         if name not in names:
             raise RecordError(f"--shift {name}: no curve is called so; known: {', '.join(names)}")
     return [curve.shifted(shifts.get(curve.name, 0.0)) for curve in curves]
-
-
-def _step_of(curve: Curve, signal: str) -> DetectedStep | None:
-    kept = np.isfinite(curve.signals[signal])
-    try:
-        return find_step(curve.time[kept], curve.signals[signal][kept])
-    except ValueError:
-        return None
 
 
 def _matched(reference: Curve, curve: Curve, signal: str, offset: float, within: float) -> float:

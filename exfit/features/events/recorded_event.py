@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.schema import BumpTest, start_value
-from exfit.dsp.reference_moves import FEWEST_SAMPLES, rest_end
+from exfit.dsp.jumps import FEWEST_SAMPLES, rest_end
 from exfit.dsp.sampling import MOST_UNEVEN
 from exfit.errors import RecordError
 from exfit.fitting.levels import deviation, initial_level

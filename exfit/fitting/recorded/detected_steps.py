@@ -16,18 +16,17 @@ from exfit.case.schema import (
     start_value,
 )
 from exfit.dsp.filtering import outliers
-from exfit.dsp.jump import largest_jump
+from exfit.dsp.jumps import largest_jump
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.levels import initial_level
 from exfit.fitting.nuisances.parameters import finds_level, prefix_of
 from exfit.plants import REFERENCES
 from exfit.records.record import Record
-from exfit.records.steps import INSTANT_WITHIN
+from exfit.records.steps import bounds_about, bounds_of_instant
 
 INSIDE_INTERVAL = 1e-6  # of it: a sample at its end would be on the other side of the jump
 LEVEL_WITHIN = 0.02  # of the mean of a record at rest: how far the voltage there may be from it
-SIZE_WITHIN = 0.5  # of the size that a record shows: how far the size may be from it
 
 
 def with_detected_steps(case: Case, recording: Recording, record: Record) -> BumpTest:
@@ -60,8 +59,7 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
 def _level(place: str, given: Unknown, test: BumpTest, record: Record) -> Unknown:
     """Return the voltage at rest that a fit finds, with the numbers that its record gives."""
     level = initial_level(test, record, "vt")
-    low, high = sorted(((1 - LEVEL_WITHIN) * level, (1 + LEVEL_WITHIN) * level))
-    return _with_bounds(place, given, level, low, high)
+    return _with_bounds(place, given, level, *bounds_about(level, LEVEL_WITHIN))
 
 
 def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:
@@ -137,17 +135,9 @@ def _bounded(place: str, step: FindableStep, record: Record, limit: float | None
         detected = find_step(record.time[kept], vt[kept])
     except ValueError as fault:
         raise RecordError(f"{record.source}: {fault}; {place} has start: auto") from fault
-    first, last = float(record.time[0]), float(record.time[-1])
     bounds = {
-        "at": (
-            detected.at,
-            max(first, detected.at - INSTANT_WITHIN),
-            min(last, detected.at + INSTANT_WITHIN),
-        ),
-        "step": (
-            detected.size,
-            *sorted(((1 - SIZE_WITHIN) * detected.size, (1 + SIZE_WITHIN) * detected.size)),
-        ),
+        "at": (detected.at, *bounds_of_instant(detected.at, record.time)),
+        "step": (detected.size, *bounds_about(detected.size)),
     }
     update = {}
     for key in auto:

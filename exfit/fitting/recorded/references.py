@@ -19,7 +19,7 @@ from exfit.case.schema import (
     Unknown,
     start_value,
 )
-from exfit.dsp.reference_moves import LONGEST_JUMP, jumps, rest_end, settled
+from exfit.dsp.jumps import LONGEST_JUMP, jumps, rest_end, settled
 from exfit.errors import RecordError
 from exfit.fitting.channels import filtering_of, without_masked
 from exfit.fitting.recordings import Column, clock_of, record_of, standing_alone

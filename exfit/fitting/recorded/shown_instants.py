@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.onset import CHI_SQUARE, interval_below
-from exfit.dsp.step_detection import MEDIAN_SAMPLES, running_median
+from exfit.dsp.step_detection import CHI_SQUARE, MEDIAN_SAMPLES, interval_below, running_median
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import noise_of
 from exfit.fitting.setup import ExperimentSetup, compared

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import MedianSection, RecordFile, Recording
-from exfit.dsp.switchings import Jump, jumps_while_moving
+from exfit.dsp.jumps import Jump, jumps_while_moving
 from exfit.fitting.channels import with_filter
 from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.nuisances.parameters import prefix_of

@@ -29,7 +29,7 @@ from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
 from exfit.plants.machine_playback import MACHINE_PLAYBACK
 from exfit.records.record import Record, read_only
-from exfit.records.steps import steps_of_signals
+from exfit.records.steps import steps_of_record
 from exfit.results.windows import WindowEstimate, WindowKind, WindowSpread
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ def windows_of(setup: ExperimentSetup) -> Iterator[Window]:
     """Yield the windows of the steps that a record shows."""
     record = setup.record
     signals = {name: record.signals[name] for name in ("vt", "ifd") if name in record.signals}
-    _, steps = steps_of_signals(record.time, signals)
+    steps = steps_of_record(record.time, signals).steps
     instants = [(step.at - step.error, step.at) for step in steps if not step.from_start]
     ends = [*(early for early, _ in instants[1:]), float(record.time[-1])]
     before = -inf

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import NEIGHBOURS, noise
-from exfit.dsp.step_detection import find_step
+from exfit.dsp.step_detection import first_step
 from exfit.fitting.experiment import Channel
 from exfit.fitting.forms.averaged import finds_instant, with_averages
 from exfit.fitting.nuisances.kinds import Nuisance
@@ -246,11 +246,7 @@ def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
         instants = record.setup.test.instants
         if overlay is None or not instants or instants[0] <= 0.0:
             continue
-        kept = np.isfinite(overlay.measured)
-        try:
-            detected = find_step(record.comparison.time[kept], overlay.measured[kept])
-        except ValueError:
-            continue
+        detected = first_step(record.comparison.time, overlay.measured)
         if detected is None:
             continue
         for factor, unit in CLOCKS.items():

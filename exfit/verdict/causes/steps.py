@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.step_detection import DetectedStep, find_step
+from exfit.dsp.step_detection import first_step
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance
@@ -148,16 +148,9 @@ def _detected_delay(record: FittedRecord) -> float:
     overlays, time = record.comparison.overlays, record.comparison.time
     overlay = overlays.get("vt") or next(iter(overlays.values()))
     kept = np.isfinite(overlay.error)
-    measured = _detected(time[kept], overlay.measured[kept])
-    simulated = _detected(time[kept], overlay.simulated[kept])
+    measured = first_step(time[kept], overlay.measured[kept])
+    simulated = first_step(time[kept], overlay.simulated[kept])
     return 0.0 if measured is None or simulated is None else measured.at - simulated.at
-
-
-def _detected(time: Array, samples: Array) -> DetectedStep | None:
-    try:
-        return find_step(time, samples)
-    except ValueError:
-        return None
 
 
 def further_step(evidence: Evidence) -> Iterator[Suspicion]:

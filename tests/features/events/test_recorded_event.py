@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from exfit.case.case import Case
-from exfit.dsp.switchings import jumps_while_moving
+from exfit.dsp.jumps import jumps_while_moving
 from exfit.errors import CaseError, RecordError
 from exfit.features.events.recorded_event import with_even_clock
 from exfit.fitting.build import build_experiment

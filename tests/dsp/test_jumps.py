@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exfit.dsp.reference_moves import jumps, rest_end, scatter, settled
+from exfit.dsp.jumps import jumps, rest_end, scatter, settled
 
 TIME = np.arange(0.0, 10.0, 0.01)
 NOISE = 1e-4

@@ -1,4 +1,4 @@
-"""What a recorded reference shows: until when it is at rest, and where it jumps."""
+"""Jumps of a sampled signal, and its rests: a reference, a breaker, a switching in the grid."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -10,6 +10,7 @@ from exfit.dsp.noise import SECOND_DIFFERENCE, spread
 from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
+Jump = tuple[int, int]  # the samples before and after it
 
 FEWEST_SAMPLES = 10  # at rest, from which the level is taken and before which nothing jumps
 DEPARTURE = (0.1, 6.0)  # of the whole range and times the noise: farther from its level, it moves
@@ -22,10 +23,14 @@ FEWEST_RESTING = 30  # samples at rest: of fewer a slope may pass for noise
 DRIFT = 4.0  # times its standard error: a slope beyond is no rest
 LONGEST_JUMP = 0.1  # s between two samples: what takes longer may be a ramp
 UNEVEN = 1.5  # times the usual spacing: a longer one is a gap
+STANDS_OUT = 3.0  # times the next largest change between two samples: a jump that is alone
+NEIGHBOUR_WHILE_MOVING = 0.25  # of a jump: by less a signal changes as long before and after it
+NOISE_WHILE_MOVING = (10.0, 4.0)  # times the noise: the least jump, and what is added to the share
+LONGEST_SPREAD = 0.04  # s: a jump between two samples that a filter of the recorder makes three
 
 
 def scatter(samples: Array) -> float:
-    """Return the standard deviation of the noise on a reference (M,), which is mostly at rest.
+    """Standard deviation of the noise on a reference (M,), which is mostly at rest.
 
     It is 0 for a reference between whose moves nothing changes.
     """
@@ -33,7 +38,7 @@ def scatter(samples: Array) -> float:
 
 
 def jumps(time: Array, samples: Array) -> NDArray[np.intp]:
-    """Return after which samples a reference (M,) jumps, each time before the next sample.
+    """Find the jumps of a reference (M,): the last sample before each of them.
 
     A jump is complete between two samples: just before and just after it the reference changes by
     less than a fifth as much. What takes two samples or more is a ramp, and so is what happens
@@ -57,7 +62,7 @@ def jumps(time: Array, samples: Array) -> NDArray[np.intp]:
 
 
 def rest_end(samples: Array) -> int:
-    """Return the first sample of a reference (M,) that is not at rest any more.
+    """Find the first sample of a reference (M,) that is not at rest any more.
 
     Raises ValueError where it never moves out of its noise, or moves from its first samples on.
     """
@@ -74,7 +79,7 @@ def rest_end(samples: Array) -> int:
 
 
 def settled(samples: Array, first: int, after: NDArray[np.intp]) -> Array:
-    """Return a reference (M,) with its mean in place of its noise wherever it rests.
+    """Replace the noise of a reference (M,) by its mean wherever it rests.
 
     It rests before its ``first`` move, and wherever the means of ten samples before and after a
     place differ by no more than noise does, if a line through all these samples is level. What
@@ -101,12 +106,59 @@ def _rests(samples: Array, noise: float) -> Iterator[tuple[int, int]]:
     places = np.pad(moved, (WINDOW - 1, WINDOW), mode="edge")
     bounds = np.flatnonzero(np.diff(places, prepend=True, append=True))
     for start, stop in zip(bounds[::2], bounds[1::2], strict=True):
-        if stop - start >= FEWEST_RESTING and _level(samples[start:stop], noise):
+        if stop - start >= FEWEST_RESTING and _is_level(samples[start:stop], noise):
             yield int(start), int(stop)
 
 
-def _level(samples: Array, noise: float) -> bool:
-    """Return whether the slope of a line through samples is none but for their noise."""
+def _is_level(samples: Array, noise: float) -> bool:
     way = np.arange(len(samples)) - 0.5 * (len(samples) - 1)
     slope = way @ samples / (way @ way)
     return bool(abs(slope) <= DRIFT * noise / np.sqrt(way @ way))
+
+
+def largest_jump(samples: Array) -> int:
+    """Find the last sample before the one jump of a signal (M,), which is finite.
+
+    Raises ValueError where no change between two samples is larger than all others.
+    """
+    changes = np.abs(np.diff(samples))
+    if len(changes) < 2:
+        raise ValueError(f"{len(samples)} samples: they show no jump")
+    before = int(np.argmax(changes))
+    others = float(np.delete(changes, before).max())
+    if changes[before] <= STANDS_OUT * others:
+        raise ValueError(
+            f"no jump stands out: the largest change between two samples is {changes[before]:.3g}, "
+            f"another is {others:.3g}"
+        )
+    return before
+
+
+def jumps_while_moving(time: Array, samples: Array, least: float) -> list[Jump]:
+    """Find where a signal (M,) that moves all along jumps by at least so much, in order.
+
+    A jump is complete between two samples or, where the recorder spreads it, three that are within
+    0.04 s: as long before and after it the signal changes by less than a quarter as much.
+
+    Args:
+        time: (M,), s, increasing.
+        samples: (M,), finite.
+        least: in the unit of the signal.
+    """
+    if len(samples) < 3:
+        return []
+    noise, spacing = scatter(samples), float(median(np.diff(time)))
+    times_least, times_beside = NOISE_WHILE_MOVING
+    found: list[Jump] = []
+    for width in (1, 2) if 2.0 * spacing <= LONGEST_SPREAD else (1,):
+        changes = np.abs(samples[width:] - samples[:-width])
+        beside = np.full((2, len(changes)), np.inf)  # at the ends: what lies beyond is not known
+        beside[0, width:] = changes[:-width]
+        beside[1, :-width] = changes[width:]
+        alone = beside.max(axis=0) <= NEIGHBOUR_WHILE_MOVING * changes + times_beside * noise
+        large = changes > max(least, times_least * noise)
+        for first in np.flatnonzero(large & alone).tolist():
+            jump = (first, first + width)
+            if not any(jump[0] <= after and before <= jump[1] for before, after in found):
+                found.append(jump)
+    return sorted(found)
