@@ -81,6 +81,8 @@ def fit(
     --parameters changes, and shows the former values beside the new ones; a case with a fault
     waits for the next change. Ctrl-C ends that with exit code 0.
     """
+    from exfit.show import run_folder
+
     given = Given(parameters, changes)
     several = len(cases) > 1 or len(strategies) > 1
     if watch and several:
@@ -92,7 +94,7 @@ def fit(
     if watch:
         if not output.shown:
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
-        folder = output.folder(f"{case.stem}-fit")
+        folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
         fit_again_and_again(case, given, folder, strategy, search, output)
         return
     from exfit.features.events.before_fit import event_warnings
@@ -101,7 +103,7 @@ def fit(
     loaded = given.load(case)
     for warning in (*case_warnings(loaded), *event_warnings(loaded)):
         echo(f"warning: {warning}", err=True)
-    folder = output.folder_of(loaded, "fit")
+    folder = output.folder_of(loaded, "fit", run_folder.OF_FIT, after_records=True)
     if output.shown:
         result = fit_live(loaded, folder, strategy, search, output)
     else:

@@ -60,14 +60,14 @@ def fit_again_and_again(
     from exfit.show import run_folder, terminal
 
     read_text(case)
-    run_folder.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder, run_folder.OF_FIT)
     console, before = terminal.console(), None
     with suppress(KeyboardInterrupt):
         while True:
             stamps = stamps_of(case, given.files)
             try:
                 loaded = given.load(case)
-                refuse_own_files(loaded, folder, "fit")
+                refuse_own_files(loaded, folder, run_folder.OF_FIT, True)
                 before = fit_live(loaded, folder, strategy, search, output, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()

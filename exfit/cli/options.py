@@ -1,7 +1,7 @@
 """What several commands share: their options, and small steps on the way."""
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
 from pathlib import Path
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 NOT_CONVERGED = 3
 LONGEST_LINE = 1000  # characters of a message: a longer one quotes what is no name of a file
-NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
 
 case_argument = click.argument("case", type=GivenFile(Kind.CASE))
 cases_argument = click.argument(
@@ -65,21 +64,26 @@ class Output:
         """Whether tables are printed."""
         return not (self.quiet or self.as_json)
 
-    def folder(self, default: str) -> Path:
-        """Return the folder for the files, by default one in runs.
+    def folder(self, default: str, files: Iterable[str] = ()) -> Path:
+        """Find the folder for the ``files`` of a command, by default one in runs.
 
-        Raises ExfitError where it cannot be written: before a run is spent on it.
+        Raises ExfitError where it cannot take them: before a run is spent on it.
         """
         from exfit.show import run_folder
 
         folder = self.given or Path("runs") / default
-        run_folder.refuse_unwritable(folder)
+        run_folder.refuse_unwritable(folder, files)
         return folder
 
-    def folder_of(self, case: "Case", command: str) -> Path:
-        """Return the folder for the files of a command that a case is given to."""
-        folder = self.folder(f"{case.path.stem}-{command}")
-        refuse_own_files(case, folder, command)
+    def folder_of(
+        self, case: "Case", command: str, files: Sequence[str], after_records: bool = False
+    ) -> Path:
+        """Find the folder for the ``files`` of a command that a case is given to.
+
+        ``after_records``: further files are named after the records of the case.
+        """
+        folder = self.folder(f"{case.path.stem}-{command}", files)
+        refuse_own_files(case, folder, files, after_records)
         return folder
 
     def draw(self, figures: "FigureFiles") -> None:
@@ -145,8 +149,10 @@ class Interruption(click.ClickException):
         echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
 
 
-def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
-    """Raise ExfitError where a command's results would write over the files of its case."""
+def refuse_own_files(
+    case: "Case", folder: Path, written: Iterable[str], after_records: bool = False
+) -> None:
+    """Raise ExfitError where the results of a command would write over the files of its case."""
     from exfit.show import run_folder
 
     recordings = (*case.recordings, *case.validations)
@@ -156,8 +162,8 @@ def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
         *(case.folder / file for test in case.tests for file in test.files),
         *filter(None, [case.parameter_file]),
     ]
-    names = [recording.name for recording in recordings] if command in NAMED_AFTER_RECORDS else ()
-    run_folder.refuse_inputs(command, files, folder, names)
+    names = [recording.name for recording in recordings] if after_records else ()
+    run_folder.refuse_inputs(written, files, folder, names)
 
 
 @dataclass(frozen=True)

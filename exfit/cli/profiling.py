@@ -44,7 +44,7 @@ def profile(
     from exfit.show import run_folder
 
     loaded = load(case)
-    folder = output.folder_of(loaded, "profile")
+    folder = output.folder_of(loaded, "profile", run_folder.OF_PROFILES)
     if not output.shown:
         profiles = workflows.profile(loaded, parameters)
     else:

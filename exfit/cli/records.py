@@ -64,7 +64,7 @@ def inspect_(
     from exfit.show import run_folder
 
     # files of one record in several formats have one stem
-    folder = output.folder(f"{file.name}-inspect")
+    folder = output.folder(f"{file.name}-inspect", run_folder.OF_INSPECTION)
     inspection = RecordSettings(clock, unit, sheet, memory=memory).inspect(file)
     figures = run_folder.write_inspection(inspection, folder)
     if output.as_json:

@@ -52,7 +52,7 @@ def simulate(
     from exfit.show import run_folder
 
     loaded = load(case, *(fitted_code(parameters) if parameters else ()))
-    folder = output.folder_of(loaded, "simulate")
+    folder = output.folder_of(loaded, "simulate", run_folder.OF_SIMULATION)
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
     simulation = workflows.simulate(loaded, values)
@@ -127,9 +127,9 @@ def validate(
     if as_found and parameters is not None:
         raise ExfitError("--as-found and --parameters: only one of them says whose values they are")
     loaded, source = (load(case), None) if as_found else _with_source(case, parameters)
-    folder = output.folder_of(loaded, "validate")
+    folder = output.folder_of(loaded, "validate", run_folder.OF_VALIDATION, after_records=True)
     if record is not None:
-        run_folder.refuse_inputs("validate", [record], folder, [record.stem])
+        run_folder.refuse_inputs(run_folder.OF_VALIDATION, [record], folder, [record.stem])
     by_hand = (record, steps, instants)
     if source is None:
         result = workflows.validation_result(loaded, None if as_found else {}, *by_hand)

@@ -39,9 +39,9 @@ def fit_several(
     from exfit.runs.fits import planned
     from exfit.show import run_folder
 
-    folder = output.folder(SERIES)
+    folder = output.folder(SERIES, run_folder.OF_SERIES)
     plan = planned(cases, strategies, given.load, search)
-    refuse_files_of_cases(plan, folder, SERIES)
+    refuse_files_of_cases(plan, folder, run_folder.OF_SERIES)
     figures: dict[str, FigureFiles] = {}
     series = run_planned(plan, folder, figures, output)
     try:
@@ -112,19 +112,19 @@ def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
         raise KeyboardInterrupt(f"{interruption}{others}") from None
 
 
-def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, command: str) -> None:
+def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, files: Sequence[str]) -> None:
     """Raise CaseError where results would replace files of a case, or cannot be written.
 
-    ``command`` names those that are written beside the folders of the fits.
+    ``files`` are those that are written beside the folders of the fits.
     """
     from exfit.show import run_folder
 
     faults: dict[str, None] = {}
     for fit in plan:
         try:
-            run_folder.refuse_unwritable(folder / fit.name)
-            refuse_own_files(fit.case, folder / fit.name, "fit")
-            refuse_own_files(fit.case, folder, command)
+            run_folder.refuse_unwritable(folder / fit.name, run_folder.OF_FIT)
+            refuse_own_files(fit.case, folder / fit.name, run_folder.OF_FIT, True)
+            refuse_own_files(fit.case, folder, files)
         except ExfitError as fault:
             faults[str(fault)] = None
     if faults:

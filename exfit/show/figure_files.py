@@ -1,19 +1,31 @@
 """Figures as files beside the numbers of their run."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from exfit.errors import ExfitError
-from exfit.show.run_figures import PlannedFigure, PlannedFigures
 from exfit.util.files import write
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
+    from matplotlib.figure import Figure
+
 Item = TypeVar("Item")
 Version = tuple[int, ...]  # of a file: what changes when it is replaced
+
+
+@dataclass(frozen=True)
+class PlannedFigure:
+    """A figure to be drawn, and in a few words what it shows."""
+
+    shows: str
+    draw: Callable[[], "Figure"]
+
+
+PlannedFigures = Mapping[str, PlannedFigure]
 Announce = Callable[[PlannedFigures, str], None]  # takes all, and the name of the one written
 
 

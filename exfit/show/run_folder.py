@@ -1,15 +1,16 @@
-"""The files that a run leaves behind: its numbers, written together; its figures come after."""
+"""The files that a run leaves behind: its numbers, written together; its figures come after.
+
+What draws them is imported only where they are drawn.
+"""
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
 from exfit.results.fit_files import (
     HISTORY,
@@ -24,13 +25,10 @@ from exfit.results.io import VALIDATION, WHOLE_FIT, validation_text
 from exfit.results.model import FitResult
 from exfit.results.tables import (
     DIGITS,
-    effects_table,
     parameter_file,
-    table,
     whole_table,
 )
-from exfit.show import run_figures
-from exfit.show.figure_files import FigureFiles
+from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.cache import keep_private, private_cache, read_private
 from exfit.util.file_names import files_named_after
 from exfit.util.files import write_together
@@ -40,66 +38,31 @@ from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
 
 if TYPE_CHECKING:
-    from exfit.features.compare.agreement import Agreement
-    from exfit.features.design.designed_test import DesignedTest
-    from exfit.features.design.experiment_design import Design
-    from exfit.features.rank.ranked_cases import Ranking
-    from exfit.features.translate.result import Translation
-    from exfit.models.sheet import Model
+    from exfit.fitting.uncertainty import UncertaintyAnalysis
     from exfit.records.inspection import Inspection
+    from exfit.results.comparisons import Comparison
     from exfit.results.validation_result import ValidationResult
     from exfit.runs.fits import FitSeries
     from exfit.workflows.profiles import Profiles
     from exfit.workflows.simulation import SimulationResult
 
-Array = NDArray[np.float64]
-
-PROFILES, DESIGN = "profile.json", "identify.json"
-DESIGNED_TEST = "designed_test.json"
-INSPECTION, AGREEMENT = "inspect.json", "compare.json"
-SERIES, AT_RECORD = "fits.json", "compare-record.csv"
-TRANSLATION, RANKING = "translation.json", "rank.json"
-MAIN_FILES = (
-    WHOLE_FIT,
-    VALIDATION,
-    PROFILES,
-    DESIGN,
-    DESIGNED_TEST,
-    INSPECTION,
-    RESPONSE,
-    AGREEMENT,
-    SERIES,
-    TRANSLATION,
-    RANKING,
-)
-# what a command may write that could be an input too, beside files that are named after records
+PROFILES, INSPECTION, SERIES = "profile.json", "inspect.json", "fits.json"
 PHASE_PARAMETERS = tuple(f"parameters_{phase}.yaml" for phase in PHASES)
-NUMBERS = {
-    "fit": (
-        PARAMETERS,
-        *PHASE_PARAMETERS,
-        HISTORY,
-        RESPONSE,
-        ITERATIONS,
-        SENSITIVITIES,
-        WHOLE_FIT,
-    ),
-    "simulate": (RESPONSE,),
-    "validate": (VALIDATION,),
-    "profile": ("profile.csv", PROFILES),
-    "identify": (
-        DESIGN,
-        SENSITIVITIES,
-        DESIGNED_TEST,
-        "test_sheet.txt",
-        "test_sheet.csv",
-        "test_section.yaml",
-    ),
-    "compare": ("compare.csv", AT_RECORD, AGREEMENT),
-    "fits": ("fits.csv", SERIES),
-    "rank": ("rank.csv", RANKING),
-    "translate": ("translation.csv", TRANSLATION),
-}
+# what a command may write that could be an input too, beside files that are named after records
+OF_FIT = (
+    PARAMETERS,
+    *PHASE_PARAMETERS,
+    HISTORY,
+    RESPONSE,
+    ITERATIONS,
+    SENSITIVITIES,
+    WHOLE_FIT,
+)
+OF_SIMULATION = (RESPONSE,)
+OF_VALIDATION = (VALIDATION,)
+OF_PROFILES = ("profile.csv", PROFILES)
+OF_INSPECTION = (INSPECTION,)
+OF_SERIES = ("fits.csv", SERIES)
 # what a fit may write, beside the files that are named after records
 FILES_OF_FIT = (
     *PHASE_PARAMETERS,
@@ -117,28 +80,28 @@ FILES_OF_FIT = (
 )
 
 
-def refuse_unwritable(folder: Path) -> None:
-    """Raise ExfitError where a folder cannot take a run, before that is spent on it."""
+def refuse_unwritable(folder: Path, names: Iterable[str] = ()) -> None:
+    """Raise ExfitError where a folder cannot take files of these names, before a run is spent."""
     place = next(path for path in (folder, *folder.parents) if path.exists())
     if not place.is_dir():
         raise ExfitError(f"{folder}: cannot be written: {place} is not a folder")
     if not os.access(place, os.W_OK | os.X_OK):
         raise ExfitError(f"{folder}: cannot be written: no permission in {place}")
-    for name in MAIN_FILES:
+    for name in names:
         if (folder / name).is_dir():
             raise ExfitError(f"{folder / name}: cannot be written: it is a folder")
 
 
 def refuse_inputs(
-    command: str, inputs: Iterable[Path], folder: Path, records: Iterable[str] = ()
+    names: Iterable[str], inputs: Iterable[Path], folder: Path, records: Iterable[str] = ()
 ) -> None:
-    """Raise ExfitError where a command would write over a file that it reads.
+    """Raise ExfitError where files of these names would be written over an input.
 
-    ``records`` are the names after which it names files.
+    ``records`` are the names after which further files are named.
     """
-    names = {*NUMBERS[command], *_named_after(records)}
+    written = {*names, *_named_after(records)}
     for path in inputs:
-        if path.name in names and path.resolve().parent == folder.resolve():
+        if path.name in written and path.resolve().parent == folder.resolve():
             raise ExfitError(
                 f"{path}: would be written over by the results of that name; "
                 f"choose another folder than {folder} with -o"
@@ -155,7 +118,91 @@ def write_fit(result: FitResult, folder: Path) -> FigureFiles:
         numbers = dict(files_of_fit(result))
         write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
         _remember(result.case, numbers[PARAMETERS])
-    return FigureFiles.beside(folder / WHOLE_FIT, partial(run_figures.of_fit, result))
+    return FigureFiles.beside(folder / WHOLE_FIT, partial(figures_of_fit, result))
+
+
+def figures_of_fit(result: "FitResult") -> PlannedFigures:
+    """Return the figures of a fit."""
+    from exfit.show import figures as plots
+
+    drawings: dict[str, PlannedFigure] = {}
+    single = result.comparison.name == SINGLE
+    title = f"{result.name}: {result.model} fitted to "
+    if single:
+        overlay = partial(plots.overlay, result.comparison, title + result.comparison.record)
+    else:
+        title += f"{len(result.comparisons)} records"
+        overlay = partial(plots.overlays, result.comparisons, title)
+    drawings["overlay.png"] = PlannedFigure("measured, start values and fitted", overlay)
+    drawings |= _phase_ends(result)
+    if any(match.iteration_responses is not None for match in result.comparisons):
+        iterations = partial(plots.iterations, result)
+        drawings["iterations.png"] = PlannedFigure("the response after each iteration", iterations)
+    drawings["convergence.png"] = PlannedFigure(
+        "cost, gradient and damping after each iteration", partial(plots.convergence, result)
+    )
+    drawings["trajectories.png"] = PlannedFigure(
+        "the parameters after each iteration", partial(plots.trajectories, result)
+    )
+    if result.knowledge is not None:
+        drawings |= figures_of_uncertainty(result.knowledge, result.name)
+    if result.minima is not None:
+        waterfall = partial(plots.waterfall, result.minima, result.name)
+        drawings["starts.png"] = PlannedFigure("the cost that each start led to", waterfall)
+    drawings |= figures_of_comparisons(
+        [*(() if single else result.comparisons), *result.validation]
+    )
+    return drawings
+
+
+def _phase_ends(result: "FitResult") -> PlannedFigures:
+    """Return the overlays of the points where a phase of the search handed over to the next."""
+    from exfit.show import figures as plots
+
+    return {
+        f"overlay_{end.phase}.png" if match.name == SINGLE else f"{match.name}-{end.phase}.png": (
+            PlannedFigure(
+                f"measured and the end of {end.phase}",
+                partial(
+                    plots.overlay,
+                    match,
+                    f"{result.name}: end of {end.phase} (iteration {end.iteration}), "
+                    f"{match.record}",
+                    f"end of {end.phase}",
+                ),
+            )
+        )
+        for end in result.phase_ends
+        for match in end.comparisons
+    }
+
+
+def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> PlannedFigures:
+    """Return what each parameter does to each signal over time, and how they are correlated."""
+    from exfit.show import figures as plots
+
+    return {
+        "sensitivity.png": PlannedFigure(
+            "what 1 % of each parameter does to the response",
+            partial(plots.sensitivity, uncertainty, name),
+        ),
+        "correlation.png": PlannedFigure(
+            "the correlation of the estimates", partial(plots.correlation, uncertainty, name)
+        ),
+    }
+
+
+def figures_of_comparisons(comparisons: "Sequence[Comparison]") -> PlannedFigures:
+    """Return the overlay of each comparison under its name."""
+    from exfit.show import figures as plots
+
+    return {
+        f"{match.name}.png": PlannedFigure(
+            f"measured and simulated, {match.record}",
+            partial(plots.overlay, match, f"{match.name}: simulated and {match.record}"),
+        )
+        for match in comparisons
+    }
 
 
 def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
@@ -175,16 +222,17 @@ def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
         for fits in series.by_case.values():
             lowest = min((run.result for run in fits), key=lambda result: result.cost)
             _remember(lowest.case, parameter_file(lowest))
-    return FigureFiles.beside(folder / SERIES, partial(run_figures.of_series, series))
+    return FigureFiles.beside(folder / SERIES, partial(_figure_of_series, series))
 
 
-def write_ranking(ranking: "Ranking", folder: Path) -> FigureFiles:
-    """Write the table of a ranking as CSV and JSON; return the figure of its best models."""
-    from exfit.features.rank.table import ranking_table
+def _figure_of_series(series: "FitSeries") -> PlannedFigures:
+    """Return the figure of the fits of several cases with several strategies."""
+    from exfit.show import figures as plots
 
-    numbers = {"rank.csv": ranking_table(ranking.models), RANKING: to_json(ranking.to_dict())}
-    write_together(folder, numbers, ["rank.png"])
-    return FigureFiles.beside(folder / RANKING, partial(run_figures.of_ranking, ranking))
+    if not series.runs:
+        return {}
+    shows = "responses, errors and costs of all fits"
+    return {"fits.png": PlannedFigure(shows, partial(plots.fit_series, series))}
 
 
 def _of_records(main: Path) -> set[str]:
@@ -212,7 +260,7 @@ def write_validation(result: "ValidationResult", folder: Path) -> FigureFiles:
     with deferred_interrupts():
         numbers = {**dict(comparison_files(result.matches)), VALIDATION: validation_text(result)}
         write_together(folder, numbers, _of_records(main))
-    return FigureFiles.beside(main, partial(run_figures.of_comparisons, result.matches))
+    return FigureFiles.beside(main, partial(figures_of_comparisons, result.matches))
 
 
 def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:
@@ -228,38 +276,29 @@ def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:
         PROFILES: to_json(profiles.as_json()),
     }
     write_together(folder, numbers, ["profile.png"])
-    return FigureFiles.beside(folder / PROFILES, partial(run_figures.of_profiles, profiles))
+    return FigureFiles.beside(folder / PROFILES, partial(_figure_of_profiles, profiles))
 
 
-def write_design(design: "Design", folder: Path) -> FigureFiles:
-    """Write what a planned test would show as JSON, its sensitivities as CSV; return figures."""
-    numbers = {
-        SENSITIVITIES: effects_table(design.own.effects),
-        DESIGN: to_json(design.as_json()),
-    }
-    write_together(folder, numbers, ["sensitivity.png", "correlation.png"])
-    return FigureFiles.beside(folder / DESIGN, partial(run_figures.of_design, design))
+def _figure_of_profiles(profiles: "Profiles") -> PlannedFigures:
+    """Return the figure of the profiles of parameters."""
+    from exfit.show import figures as plots
 
-
-def write_designed_test(design: "DesignedTest", folder: Path) -> FigureFiles:
-    """Write a designed test as JSON, its sheet and its section of a case; return its figure."""
-    from exfit.features.design.test_sheet import case_section, sheet_table, sheet_text
-
-    numbers = {
-        "test_sheet.txt": sheet_text(design),
-        "test_sheet.csv": sheet_table(design),
-        "test_section.yaml": case_section(design),
-        DESIGNED_TEST: to_json(design.as_json()),
-    }
-    write_together(folder, numbers, ["designed_test.png"])
-    drawings = partial(run_figures.of_designed_test, design)
-    return FigureFiles.beside(folder / DESIGNED_TEST, drawings)
+    shows = "the cost along each parameter"
+    return {"profile.png": PlannedFigure(shows, partial(plots.profiles, profiles))}
 
 
 def write_inspection(inspection: "Inspection", folder: Path) -> FigureFiles:
     """Write what a recorder's file holds as JSON; return its figure."""
     write_together(folder, {INSPECTION: to_json(inspection.as_json())}, ["inspect.png"])
-    return FigureFiles.beside(folder / INSPECTION, partial(run_figures.of_inspection, inspection))
+    return FigureFiles.beside(folder / INSPECTION, partial(_figure_of_inspection, inspection))
+
+
+def _figure_of_inspection(inspection: "Inspection") -> PlannedFigures:
+    """Return the figure of what a recorder's file holds."""
+    from exfit.show import figures as plots
+
+    drawing = partial(plots.inspection, inspection, inspection.path.name)
+    return {"inspect.png": PlannedFigure("the channels, with steps, gaps and spikes", drawing)}
 
 
 def write_simulation(simulation: "SimulationResult", name: str, folder: Path) -> FigureFiles:
@@ -268,70 +307,21 @@ def write_simulation(simulation: "SimulationResult", name: str, folder: Path) ->
     header = ["t", *response.signals]
     numbers = {RESPONSE: whole_table(header, [response.time, *response.signals.values()])}
     write_together(folder, numbers, ["response.png", "overlay.png"])
-    drawings = partial(run_figures.of_simulation, simulation, name)
+    drawings = partial(_figures_of_simulation, simulation, name)
     return FigureFiles.beside(folder / RESPONSE, drawings)
 
 
-def write_agreement(agreement: "Agreement", folder: Path) -> FigureFiles:
-    """Write how responses differ as JSON, and their samples on their clocks; return a figure."""
-    record = record_table(agreement)
-    numbers = {
-        "compare.csv": agreement_table(agreement),
-        **({} if record is None else {AT_RECORD: record}),
-        AGREEMENT: to_json(agreement.as_json()),
-    }
-    write_together(folder, numbers, ["compare.png", AT_RECORD])
-    return FigureFiles.beside(folder / AGREEMENT, partial(run_figures.of_agreement, agreement))
+def _figures_of_simulation(simulation: "SimulationResult", name: str) -> PlannedFigures:
+    """Return the figures of a response, beside its record where there is one."""
+    from exfit.show import figures as plots
 
-
-def write_translation(
-    translation: "Translation",
-    result: FitResult,
-    target: "tuple[str, Model]",
-    folder: Path,
-) -> FigureFiles:
-    """Write a translation as JSON, its responses, a case and a PSS/E file; return its figure.
-
-    ``target`` is the model, behind its name as it was given.
-    """
-    from exfit.features.translate.files import files_of_translation
-
-    numbers = files_of_translation(translation, result, target, folder)
-    numbers[TRANSLATION] = to_json(translation.to_dict())
-    write_together(folder, numbers, ["translation.png"])
-    drawings = partial(run_figures.of_translation, translation)
-    return FigureFiles.beside(folder / TRANSLATION, drawings)
-
-
-def agreement_table(agreement: "Agreement") -> str:
-    """Return the responses and their differences from the first on their common clock, as CSV."""
-    columns = {"t": agreement.time}
-    several = len({entry.second for entry in agreement.between}) > 1
-    for signal in agreement.signals:
-        own = [entry for entry in agreement.between if entry.signal == signal]
-        if not agreement.between:
-            columns[f"{signal}_A"] = agreement.curves[0].signals[signal]
-        columns |= {f"{signal}_A": entry.values[0] for entry in own}
-        columns |= {f"{signal}_{entry.second}": entry.values[1] for entry in own}
-        for entry in own:
-            name = f"{signal}_{entry.second}_difference" if several else f"{signal}_difference"
-            columns[name] = entry.error
-    return table([*columns], [*columns.values()])
-
-
-def record_table(agreement: "Agreement") -> str | None:
-    """Return the record and the responses at its instants, as CSV; None without a record."""
-    from exfit.features.compare.curves import RECORD
-
-    compared = [entry for entry in agreement.differences if entry.first == RECORD]
-    if not compared:
-        return None
-    columns = {"t": compared[0].time}
-    for signal in agreement.signals:
-        own = [entry for entry in compared if entry.signal == signal]
-        columns |= {f"{signal}_{RECORD}": entry.values[0] for entry in own}
-        columns |= {f"{signal}_{entry.second}": entry.values[1] for entry in own}
-    return table([*columns], [*columns.values()])
+    response = partial(plots.response, simulation.response, name)
+    drawings = {"response.png": PlannedFigure("every signal and state", response)}
+    if simulation.comparison is not None:
+        title = f"{name}: simulated and {simulation.comparison.record}"
+        overlay = partial(plots.overlay, simulation.comparison, title)
+        drawings["overlay.png"] = PlannedFigure("measured and simulated", overlay)
+    return drawings
 
 
 def last_fit(case: Path) -> Path | None:

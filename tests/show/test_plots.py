@@ -8,7 +8,6 @@ import pytest
 from matplotlib.figure import Figure
 from tiers import few_of
 
-from exfit.features.programme.steady.saturation import saturation_curve
 from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.results.played_records import LeftOut, PlayedRecord, driving_signals
@@ -256,19 +255,3 @@ def test_drawing_leaves_nothing_behind_in_pyplot():
     assert (
         "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
     )
-
-
-def test_a_saturation_test_shows_both_branches_the_air_gap_line_and_the_curve():
-    random = np.random.default_rng(1)
-    vt = np.concatenate([np.linspace(0.2, 1.1, 9), np.linspace(1.0, 0.2, 7)])
-    ifd = 800.0 * (vt + np.maximum(vt - 0.8, 0.0) ** 2) + random.normal(size=16)
-    result = saturation_curve(vt, ifd)
-    figure = plots.saturation(result, "unit 3")
-    curve, beside = figure.axes
-    labels = [text.get_text() for text in curve.get_legend().get_texts()]
-    assert labels[0].startswith("air-gap line, ")
-    assert labels[1:] == ["95 % band", "curve", "extrapolated", "rising", "falling"]
-    assert "field current ifd (A)" in curve.get_xlabel()
-    assert {text.get_text()[:6] for text in curve.texts} == {"S(1.0)", "S(1.2)"}
-    assert "hysteresis" in beside.get_title(loc="right")
-    assert plots.png(figure).startswith(PNG)

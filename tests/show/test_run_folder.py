@@ -370,7 +370,7 @@ def test_figures_do_not_come_beside_the_numbers_of_another_run(fitted, twice, mo
 def test_a_result_that_is_a_folder_is_refused(tmp_path):
     (tmp_path / "result.json").mkdir()
     with pytest.raises(ExfitError, match=r"result\.json: cannot be written: it is a folder"):
-        run_folder.refuse_unwritable(tmp_path)
+        run_folder.refuse_unwritable(tmp_path, run_folder.OF_FIT)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"a\0b", b"elsewhere"])

@@ -2,7 +2,11 @@
 
 import pytest
 
+from exfit.features.compare import files as compare
+from exfit.features.design import files as design
+from exfit.features.rank import files as rank
 from exfit.features.report.writing import PAGE, PRINT
+from exfit.features.translate import files as translate
 from exfit.results.io import WHOLE_PROGRAMME
 from exfit.show import run_folder
 from exfit.util.file_names import OWN_NAMES, files_named_after, taken_names, unusable
@@ -75,8 +79,10 @@ def test_every_name_that_is_taken_is_reported_and_thousands_take_no_time():
 
 
 def test_all_that_is_written_beside_what_is_named_after_records_is_known():
-    files = {*run_folder.MAIN_FILES, *run_folder.FILES_OF_FIT, WHOLE_PROGRAMME, PAGE, PRINT}
-    files |= {name for names in run_folder.NUMBERS.values() for name in names}
+    files = {*run_folder.FILES_OF_FIT, *run_folder.OF_FIT, *run_folder.OF_SIMULATION}
+    files |= {*run_folder.OF_VALIDATION, *run_folder.OF_PROFILES, *run_folder.OF_INSPECTION}
+    files |= {*run_folder.OF_SERIES, *compare.FILES, *design.FILES, *rank.FILES, *translate.FILES}
+    files |= {WHOLE_PROGRAMME, PAGE, PRINT}
     assert {name.partition(".")[0] for name in files} <= {*OWN_NAMES}
 
 

@@ -79,20 +79,22 @@ def compare(
         raise click.UsageError("--align moves all clocks: not together with --shift.")
     from exfit.features.compare.agreement import compare as compared
     from exfit.features.compare.curves import ColumnChoice
+    from exfit.features.compare.files import FILES, write_agreement
     from exfit.show import run_folder
 
-    folder = output.folder("compare")
-    run_folder.refuse_inputs("compare", [*curves, *([record] if record else ())], folder)
+    folder = output.folder("compare", FILES)
+    run_folder.refuse_inputs(FILES, [*curves, *([record] if record else ())], folder)
     choice = ColumnChoice(_columns(columns), time)
     agreement = compared(curves, record, choice, _shifts(shifts), align, step_at)
-    figures = run_folder.write_agreement(agreement, folder)
+    figures = write_agreement(agreement, folder)
     if output.as_json:
         print_json(agreement.as_json())
     elif output.shown:
+        from exfit.features.compare.terminal import show_agreement
         from exfit.show import terminal
 
         console = terminal.console()
-        terminal.agreement(console, agreement)
+        show_agreement(console, agreement)
         terminal.written(console, folder)
     output.draw(figures)
 

@@ -11,7 +11,7 @@ from exfit.show.terminal.terminal import notes, number, paragraph, plain_table, 
 from exfit.util.text import percentage, rounded
 
 
-def agreement(console: Console, result: Agreement) -> None:
+def show_agreement(console: Console, result: Agreement) -> None:
     """Show how responses, and a record, differ, the features of their step, and what was fitted."""
     for curve in result.curves:
         shifted = f", shifted by {curve.shift:.6g} s" if curve.shift else ""

@@ -77,12 +77,14 @@ def identify(
     test sheet for the plant. Writes designed_test.json, test_sheet.txt, test_sheet.csv, a section
     for the case, test_section.yaml, and a figure.
     """
+    from exfit.features.design.files import FILES
+
     given = [name for name, value in of_design.items() if value not in (None, ())]
     if given and not design:
         option = {"limits": "limit"}.get(given[0], given[0])
         raise click.UsageError(f"--{option} is an option of --design, which is missing")
     loaded = load(case)
-    folder = output.folder_of(loaded, "identify")
+    folder = output.folder_of(loaded, "identify", FILES)
     levels = assignments(noise, "--noise")
     if design:
         _design(loaded, folder, levels, output, **of_design)
@@ -93,17 +95,18 @@ def identify(
 def _identify(loaded: "Case", folder: Path, noise: Mapping[str, float], output: Output) -> None:
     """Show how well the test of a case, and others beside it, determine its parameters."""
     from exfit import workflows
-    from exfit.show import run_folder
+    from exfit.features.design.files import write_design
 
     design = workflows.identify(loaded, noise)
-    figures = run_folder.write_design(design, folder)
+    figures = write_design(design, folder)
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
+        from exfit.features.design.terminal import show_design
         from exfit.show import terminal
 
         console = terminal.console()
-        terminal.design(console, design)
+        show_design(console, design)
         terminal.written(console, folder)
     output.draw(figures)
 
@@ -121,7 +124,7 @@ def _design(
 ) -> None:
     """Show the best test within limits."""
     from exfit.features.design.design import design_test
-    from exfit.show import run_folder
+    from exfit.features.design.files import write_designed_test
 
     design = design_test(
         loaded,
@@ -132,14 +135,15 @@ def _design(
         criterion=criterion or "A",
         noise=noise,
     )
-    figures = run_folder.write_designed_test(design, folder)
+    figures = write_designed_test(design, folder)
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
+        from exfit.features.design.terminal import show_designed_test
         from exfit.show import terminal
 
         console = terminal.console()
-        terminal.designed_test(console, design)
+        show_designed_test(console, design)
         terminal.written(console, folder)
     output.draw(figures)
 

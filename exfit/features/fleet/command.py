@@ -189,9 +189,10 @@ def _observer(shown: bool) -> "AbstractContextManager[BatchObserver | None]":
     """Return what shows a batch while it runs, None where nothing is to be shown."""
     if not shown:
         return nullcontext()
+    from exfit.features.fleet.terminal import BatchProgress
     from exfit.show import terminal
 
-    return terminal.BatchProgress(terminal.console()).running()
+    return BatchProgress(terminal.console()).running()
 
 
 def _reports() -> "Sequence[FurtherFiles]":
@@ -214,9 +215,10 @@ def _write_missing_reports(fleet: "Fleet") -> bool:
 
 
 def _show(fleet: "Fleet") -> None:
+    from exfit.features.fleet.terminal import batch
     from exfit.show import terminal
 
-    terminal.batch(terminal.console(), fleet)
+    batch(terminal.console(), fleet)
 
 
 def _exit(fleet: "Fleet") -> None:

@@ -50,9 +50,10 @@ def run(programme: Path, again: bool, output: Output) -> None:
     inputs = [loaded.path, *(file for name in names for file in loaded.files_of(name))]
     programme_folder.refuse_inputs(inputs, names, folder)
     if output.shown:
+        from exfit.features.programme.show.programme_terminal import ProgrammeProgress
         from exfit.show import terminal
 
-        with terminal.ProgrammeProgress(terminal.console(), steps).running() as shown:
+        with ProgrammeProgress(terminal.console(), steps).running() as shown:
             result = run_programme(
                 loaded, folder, again, shown, shown.finished, keep=programme_folder.write_test
             )
@@ -70,6 +71,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
 def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
     """Write what all tests came to and their report, show it, and draw the figures."""
     from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme.show.programme_terminal import programme
     from exfit.features.report.writing import write_report
     from exfit.show import terminal
 
@@ -82,7 +84,7 @@ def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
             print_json(result.to_dict())
         elif output.shown:
             console = terminal.console()
-            terminal.programme(console, result)
+            programme(console, result)
             console.print()
             terminal.written(console, folder)
     if not output.figures or result.interrupted:
@@ -97,10 +99,11 @@ def check(path: Path) -> bool:
     """Check each test of a programme and show what comes of it; False: something speaks against."""
     from exfit.features.programme.case.programme import load_programme
     from exfit.features.programme.checked_programme import check_programme
+    from exfit.features.programme.show.programme_terminal import checked_step
     from exfit.show import terminal
 
     sound = True
     for checked in check_programme(load_programme(path)):
-        terminal.checked_step(terminal.console(), checked)
+        checked_step(terminal.console(), checked)
         sound = sound and checked.sound
     return sound

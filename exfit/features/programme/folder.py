@@ -13,9 +13,8 @@ from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.results.model import FitResult
 from exfit.results.tables import table
-from exfit.show import run_figures, run_folder
-from exfit.show.figure_files import FigureFiles
-from exfit.show.run_figures import PlannedFigures
+from exfit.show import run_folder
+from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.signals import TERMINALS
 from exfit.util.files import write, write_together
 
@@ -70,8 +69,18 @@ def points_table(result: SaturationResult | VCurve) -> str:
 
 def _planned(test: FinishedTest) -> Callable[[], PlannedFigures]:
     if isinstance(test.result, FitResult):
-        return partial(run_figures.of_fit, test.result)
-    return partial(run_figures.of_steady_test, test.result, test.name)
+        return partial(run_folder.figures_of_fit, test.result)
+    return partial(_figure_at_rest, test.result, test.name)
+
+
+def _figure_at_rest(result: SaturationResult | VCurve, name: str) -> PlannedFigures:
+    from exfit.features.programme.show import programme_figures as figures
+
+    if isinstance(result, VCurve):
+        shows = "V-curves: the points beside the machine's model"
+        return {"v_curve.png": PlannedFigure(shows, partial(figures.v_curve, result, name))}
+    shows = "the saturation curve with its points"
+    return {"saturation.png": PlannedFigure(shows, partial(figures.saturation, result, name))}
 
 
 def _missing(folder: Path, planned: Callable[[], PlannedFigures]) -> PlannedFigures:
@@ -82,5 +91,7 @@ def _missing(folder: Path, planned: Callable[[], PlannedFigures]) -> PlannedFigu
 def refuse_inputs(files: Iterable[Path], names: Iterable[str], folder: Path) -> None:
     """Raise ExfitError where the tests of these names would write over a file of the programme."""
     for name in names:
-        run_folder.refuse_unwritable(folder / name)
-        run_folder.refuse_inputs("fit", files, folder / name, [path.stem for path in files])
+        run_folder.refuse_unwritable(folder / name, run_folder.OF_FIT)
+        run_folder.refuse_inputs(
+            run_folder.OF_FIT, files, folder / name, [path.stem for path in files]
+        )

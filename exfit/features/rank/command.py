@@ -53,18 +53,18 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
     or to DIR. Ctrl-C keeps the models that are done. Exit code 0: all were fitted, and the first
     one matches; 1: bad input; 3: otherwise.
     """
+    from exfit.features.rank.files import FILES, write_ranking
     from exfit.features.rank.ranked_cases import planned_models, ranking_of
-    from exfit.show import run_folder
 
     loaded = load(case)
     names = [] if models is None else [name.strip() for name in models.split(",")]
     plan = planned_models(loaded, names, search)
-    folder = output.folder(f"{case.stem}-rank")
-    refuse_files_of_cases(plan, folder, "rank")
+    folder = output.folder(f"{case.stem}-rank", FILES)
+    refuse_files_of_cases(plan, folder, FILES)
     figures: dict[str, FigureFiles] = {}
     ranking = ranking_of(loaded, run_planned(plan, folder, figures, output))
     try:
-        of_all = run_folder.write_ranking(ranking, folder)
+        of_all = write_ranking(ranking, folder)
     finally:  # whatever becomes of the files
         _show(ranking, folder, output)
     output.draw(of_all)
@@ -78,7 +78,8 @@ def _show(ranking: "Ranking", folder: Path, output: Output) -> None:
     if output.as_json:
         print_json(ranking.to_dict())
     elif output.shown:
+        from exfit.features.rank.terminal import show_ranking
         from exfit.show import terminal
 
-        terminal.ranking(terminal.console(), ranking)
+        show_ranking(terminal.console(), ranking)
         terminal.written(terminal.console(), folder)

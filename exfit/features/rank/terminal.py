@@ -13,7 +13,7 @@ COLUMNS = ("model", "unseen", "rmse", "BIC", "determined", "verdict")
 NUMBERS = ("unseen", "rmse", "BIC", "determined")
 
 
-def ranking(console: Console, ranked: Ranking) -> None:
+def show_ranking(console: Console, ranked: Ranking) -> None:
     """Show models, the best first, and below them which the records tell apart."""
     console.print()
     if ranked.models:

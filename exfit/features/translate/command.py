@@ -38,6 +38,7 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     a figure to runs/CASE-MODEL, or to DIR. Exit code 3: the response is another, by more than 5 %
     of a step.
     """
+    from exfit.features.translate.files import FILES, write_translation
     from exfit.features.translate.translate import target_model
     from exfit.features.translate.translate import translate as translated
     from exfit.results.io import load_result, result_file
@@ -46,8 +47,8 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     source = result_file(result)
     fit = load_result(source)
     target = target_model(model)
-    folder = output.folder(f"{fit.name}-{target.name}")
-    run_folder.refuse_inputs("translate", [source], folder)
+    folder = output.folder(f"{fit.name}-{target.name}", FILES)
+    run_folder.refuse_inputs(FILES, [source], folder)
     try:
         if output.shown:
             from exfit.show import terminal
@@ -59,11 +60,13 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
             translation = translated(fit, target, steps)
     except ExfitError as fault:
         raise ExfitError(f"{source}: {fault}") from None
-    figures = run_folder.write_translation(translation, fit, (model, target), folder)
+    figures = write_translation(translation, fit, (model, target), folder)
     if output.as_json:
         print_json(translation.to_dict())
     elif output.shown:
-        terminal.translation(console, translation)
+        from exfit.features.translate.terminal import show_translation
+
+        show_translation(console, translation)
         terminal.written(console, folder)
     output.draw(figures)
     if translation.poor:

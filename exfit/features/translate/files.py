@@ -1,5 +1,6 @@
 """The files of a translation: its responses as a table, a case and PSS/E records of the target."""
 
+from functools import partial
 from pathlib import Path
 
 from exfit.case.draft.suggestion import relative
@@ -13,7 +14,37 @@ from exfit.models.sheet import Model
 from exfit.plants import INFINITE_BUS, MACHINE, NETWORK, OPEN_CIRCUIT
 from exfit.results.model import FitResult
 from exfit.results.tables import table
+from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
+from exfit.util.files import write_together
 from exfit.util.sources import SOURCES
+from exfit.util.text import to_json
+
+SAMPLES, TRANSLATION = FILES = ("translation.csv", "translation.json")
+
+
+def write_translation(
+    translation: Translation,
+    result: FitResult,
+    target: tuple[str, Model],
+    folder: Path,
+) -> FigureFiles:
+    """Write a translation as JSON, its responses, a case and a PSS/E file; return its figure.
+
+    ``target`` is the model, behind its name as it was given.
+    """
+    numbers = files_of_translation(translation, result, target, folder)
+    numbers[TRANSLATION] = to_json(translation.to_dict())
+    write_together(folder, numbers, ["translation.png"])
+    return FigureFiles.beside(folder / TRANSLATION, partial(_figure, translation))
+
+
+def _figure(translation: Translation) -> PlannedFigures:
+    from exfit.features.translate import figure
+
+    title = f"{translation.name}: {translation.source} and {translation.target}"
+    drawing = partial(figure.translation, translation, title)
+    shows = "the responses of both models to the same steps"
+    return {"translation.png": PlannedFigure(shows, drawing)}
 
 
 def files_of_translation(
@@ -28,7 +59,7 @@ def files_of_translation(
     name = relative(Path(given), folder) if given.endswith(".py") else model.name
     files = {
         f"{own}.yaml": case_of_translation(translation, result, (name, model), folder),
-        "translation.csv": responses_table(translation),
+        SAMPLES: responses_table(translation),
     }
     if alternatives(model):
         files[f"{own}.dyr"] = records_of_translation(translation, result)

@@ -18,7 +18,7 @@ LOOP_ROWS = (
 )
 
 
-def translation(console: Console, result: Translation) -> None:
+def show_translation(console: Console, result: Translation) -> None:
     """Show the verdict, the parameters with their origin, the errors in each step, what is lost."""
     style = "bold red" if result.poor else "bold"
     paragraph(console, result.verdict, style)

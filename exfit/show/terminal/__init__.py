@@ -8,16 +8,6 @@ from typing import TYPE_CHECKING
 from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
-    from exfit.features.compare.terminal import agreement
-    from exfit.features.design.terminal import designed_test
-    from exfit.features.fleet.terminal import BatchProgress, batch
-    from exfit.features.programme.show.programme_terminal import (
-        ProgrammeProgress,
-        checked_step,
-        programme,
-    )
-    from exfit.features.rank.terminal import ranking
-    from exfit.features.translate.terminal import translation
     from exfit.show.terminal.checks import check
     from exfit.show.terminal.fits import fit
     from exfit.show.terminal.model_tables import catalogue, model
@@ -33,25 +23,18 @@ if TYPE_CHECKING:
         waiting,
         written,
     )
-    from exfit.show.terminal.uncertainty import design, profiles
+    from exfit.show.terminal.uncertainty import profiles
     from exfit.show.terminal.validations import comparisons, validation
 
 __all__ = [
-    "BatchProgress",
     "LiveIterations",
-    "ProgrammeProgress",
     "ProgressBar",
     "SeriesProgress",
     "again",
-    "agreement",
-    "batch",
     "catalogue",
     "check",
-    "checked_step",
     "comparisons",
     "console",
-    "design",
-    "designed_test",
     "figure",
     "figures_of_fit",
     "fit",
@@ -60,25 +43,13 @@ __all__ = [
     "model",
     "notes",
     "profiles",
-    "programme",
-    "ranking",
     "task",
-    "translation",
     "validation",
     "waiting",
     "written",
 ]
 
 _MODULES = {
-    "agreement": "exfit.features.compare.terminal",
-    "designed_test": "exfit.features.design.terminal",
-    "BatchProgress": "exfit.features.fleet.terminal",
-    "batch": "exfit.features.fleet.terminal",
-    "ProgrammeProgress": "exfit.features.programme.show.programme_terminal",
-    "checked_step": "exfit.features.programme.show.programme_terminal",
-    "programme": "exfit.features.programme.show.programme_terminal",
-    "ranking": "exfit.features.rank.terminal",
-    "translation": "exfit.features.translate.terminal",
     "check": "exfit.show.terminal.checks",
     "fit": "exfit.show.terminal.fits",
     "catalogue": "exfit.show.terminal.model_tables",
@@ -89,7 +60,6 @@ _MODULES = {
     "inspection": "exfit.show.terminal.records",
     "SeriesProgress": "exfit.show.terminal.series",
     "fit_series": "exfit.show.terminal.series",
-    "design": "exfit.show.terminal.uncertainty",
     "profiles": "exfit.show.terminal.uncertainty",
     "comparisons": "exfit.show.terminal.validations",
     "validation": "exfit.show.terminal.validations",

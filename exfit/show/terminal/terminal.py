@@ -18,7 +18,7 @@ from exfit.inference import Interval, Uncertainty
 from exfit.util.text import printable, rounded
 
 if TYPE_CHECKING:
-    from exfit.show.run_figures import PlannedFigures
+    from exfit.show.figure_files import PlannedFigures
 
 BETWEEN_COLUMNS = 2  # characters
 NARROW = 80  # columns where the width is unknown

@@ -14,6 +14,7 @@ from exfit import cli
 from exfit.errors import RecordError
 from exfit.features.compare.agreement import compare
 from exfit.features.compare.curves import ColumnChoice
+from exfit.features.compare.figure import agreement as agreement_figure
 from exfit.show import figures as plots
 from exfit.show import run_folder
 
@@ -338,7 +339,7 @@ def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(recor
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time), efd=rise(time))
     b = write("b.csv", t=time, vt=rise(time) + 1e-3, efd=rise(time))
-    figure = plots.agreement(compare([a, b], a if record else None, BY_NAME))
+    figure = agreement_figure(compare([a, b], a if record else None, BY_NAME))
     assert plots.png(figure)
     assert len(figure.axes) == 4
     curves, differences = figure.axes[:2]
@@ -356,7 +357,7 @@ def test_of_many_responses_the_differences_from_the_reference_are_drawn():
     time = clock(0.01)
     sources = [write(f"{k}.csv", t=time, vt=rise(time) + 1e-3 * k) for k in range(6)]
     for record, first in ((None, "A"), (sources[0], "record")):
-        curves, differences = plots.agreement(compare(sources, record)).axes
+        curves, differences = agreement_figure(compare(sources, record)).axes
         lines = curves.lines if record is None else curves.lines[1:]  # the record lies below
         assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(sources)
         widths = [line.get_linewidth() for line in lines]

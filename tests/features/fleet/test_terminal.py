@@ -6,8 +6,13 @@ from dataclasses import replace
 import pytest
 from fleets import fleet, row
 
-from exfit.features.fleet.terminal import BETWEEN_LINES, FIRST_LINE, MOST_ATTENTION
-from exfit.show import terminal
+from exfit.features.fleet.terminal import (
+    BETWEEN_LINES,
+    FIRST_LINE,
+    MOST_ATTENTION,
+    BatchProgress,
+)
+from exfit.features.fleet.terminal import batch as show_batch
 from exfit.show.terminal.terminal import GuardedConsole
 
 
@@ -22,7 +27,7 @@ def progress(is_terminal=False, width=80):
     """Return the progress of a batch on a clock of its own, and what it prints to."""
     out, clock = io.StringIO(), Clock()
     console = GuardedConsole(file=out, force_terminal=is_terminal, width=width, highlight=False)
-    return terminal.BatchProgress(console, clock), clock, out
+    return BatchProgress(console, clock), clock, out
 
 
 def fit(shown, clock, name, seconds, **content):
@@ -89,7 +94,7 @@ def test_a_terminal_shows_no_line_that_is_wider(width):
 
 def summary_of(batch):
     out = io.StringIO()
-    terminal.batch(GuardedConsole(file=out, width=80, highlight=False), batch)
+    show_batch(GuardedConsole(file=out, width=80, highlight=False), batch)
     return out.getvalue()
 
 

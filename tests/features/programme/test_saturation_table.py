@@ -1,10 +1,12 @@
-"""A saturation test on the terminal."""
+"""A saturation test on the terminal, and as a figure."""
 
 import numpy as np
 from rich.console import Console
 
+from exfit.features.programme.show import programme_figures
 from exfit.features.programme.show.programme_terminal import saturation
 from exfit.features.programme.steady.saturation import saturation_curve
+from exfit.show import figures as plots
 
 
 def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):
@@ -24,3 +26,19 @@ def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):
         "S(1.2)",
     } <= first_words
     assert {"quadratic", "exponential", "exponential-se"} <= first_words
+
+
+def test_a_saturation_test_shows_both_branches_the_air_gap_line_and_the_curve():
+    random = np.random.default_rng(1)
+    vt = np.concatenate([np.linspace(0.2, 1.1, 9), np.linspace(1.0, 0.2, 7)])
+    ifd = 800.0 * (vt + np.maximum(vt - 0.8, 0.0) ** 2) + random.normal(size=16)
+    result = saturation_curve(vt, ifd)
+    figure = programme_figures.saturation(result, "unit 3")
+    curve, beside = figure.axes
+    labels = [text.get_text() for text in curve.get_legend().get_texts()]
+    assert labels[0].startswith("air-gap line, ")
+    assert labels[1:] == ["95 % band", "curve", "extrapolated", "rising", "falling"]
+    assert "field current ifd (A)" in curve.get_xlabel()
+    assert {text.get_text()[:6] for text in curve.texts} == {"S(1.0)", "S(1.2)"}
+    assert "hysteresis" in beside.get_title(loc="right")
+    assert plots.png(figure).startswith(b"\x89PNG\r\n\x1a\n")

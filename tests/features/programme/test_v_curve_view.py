@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from exfit.features.programme.show import programme_figures
 from exfit.features.programme.show.programme_terminal import v_curve as show
 from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad
@@ -46,7 +47,7 @@ def test_the_terminal_shows_every_point_in_eighty_columns(result):
 
 
 def test_the_figure_has_a_curve_and_points_for_each_power(result):
-    figure = plots.v_curve(result, "v-curve")
+    figure = programme_figures.v_curve(result, "v-curve")
     above, below = figure.axes
     texts = [text.get_text() for text in above.get_legend().get_texts()]
     assert texts == ["P = 0.10 pu", "P = 0.80 pu", "power factor 1", "measured", "simulated"]

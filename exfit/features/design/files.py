@@ -1,10 +1,53 @@
-"""The sheet of a designed test for the plant: as text, as a table, and as a section of a case."""
+"""The files of a planned test: what it would show; of a designed one its sheet for the plant."""
 
 from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
 
 from exfit.features.design.designed_test import DesignedTest
+from exfit.features.design.experiment_design import Design
+from exfit.results.fit_files import SENSITIVITIES
+from exfit.results.tables import effects_table
+from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
+from exfit.show.run_folder import figures_of_uncertainty
+from exfit.util.files import write_together
+from exfit.util.text import to_json
 
+DESIGN, DESIGNED_TEST = "identify.json", "designed_test.json"
+SHEET, STEPS, SECTION = "test_sheet.txt", "test_sheet.csv", "test_section.yaml"
+FILES = (DESIGN, SENSITIVITIES, DESIGNED_TEST, SHEET, STEPS, SECTION)
 NAMES = {"vt": "terminal voltage vt", "efd": "field voltage efd"}
+
+
+def write_design(design: Design, folder: Path) -> FigureFiles:
+    """Write what a planned test would show as JSON, its sensitivities as CSV; return figures."""
+    numbers = {
+        SENSITIVITIES: effects_table(design.own.effects),
+        DESIGN: to_json(design.as_json()),
+    }
+    write_together(folder, numbers, ["sensitivity.png", "correlation.png"])
+    return FigureFiles.beside(
+        folder / DESIGN, partial(figures_of_uncertainty, design.own, design.name)
+    )
+
+
+def write_designed_test(design: DesignedTest, folder: Path) -> FigureFiles:
+    """Write a designed test as JSON, its sheet and its section of a case; return its figure."""
+    numbers = {
+        SHEET: sheet_text(design),
+        STEPS: sheet_table(design),
+        SECTION: case_section(design),
+        DESIGNED_TEST: to_json(design.as_json()),
+    }
+    write_together(folder, numbers, ["designed_test.png"])
+    return FigureFiles.beside(folder / DESIGNED_TEST, partial(_figure, design))
+
+
+def _figure(design: DesignedTest) -> PlannedFigures:
+    from exfit.features.design import figure
+
+    shows = "the reference, vt and efd of the designed test, with limits"
+    return {"designed_test.png": PlannedFigure(shows, partial(figure.designed_test, design))}
 
 
 def sheet_text(design: DesignedTest) -> str:
