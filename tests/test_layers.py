@@ -50,7 +50,7 @@ AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml
 
 # what costs a short fit much of its time: NumPy's own parts among them
 SLOW_TO_IMPORT = {
-    "scipy", "matplotlib", "rich", "jinja2", "bokeh", "pandas", "numpy.ma", "numpy.random",
+    "scipy", "matplotlib", "rich", "jinja2", "pandas", "numpy.ma", "numpy.random",
     "numpy.testing",
 }  # fmt: skip
 NOT_OF_A_FIT = {

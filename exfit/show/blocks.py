@@ -134,7 +134,8 @@ class Panel:
 class Chart:
     """Panels above each other on one x axis; ``text`` says what a reader would see there.
 
-    ``key`` begins the ids of the drawing; it must be its alone on a page.
+    ``key`` begins the ids of the drawing; it must be its alone on a page. Of a ``live`` chart a page
+    has the samples, and says where its axes begin and end, so that it can be zoomed.
     """
 
     key: str
@@ -146,6 +147,7 @@ class Chart:
     width: float = WIDE
     x_range: Range | None = None
     whole: bool = False
+    live: bool = False
 
     @property
     def legend(self) -> tuple[Series, ...]:

@@ -60,6 +60,8 @@ class Drawn:
     title: str
     top: float
     height: float
+    low: float
+    high: float
     y_ticks: tuple[Tick, ...]
     marks: tuple[Mark, ...]
     rules: tuple[Mark, ...]
@@ -73,6 +75,8 @@ class Drawing:
     chart: Chart
     height: float
     inner: float
+    start: float
+    end: float
     x_ticks: tuple[Tick, ...]
     panels: tuple[Drawn, ...]
 
@@ -109,17 +113,21 @@ def drawing(chart: Chart) -> Drawing:
         top += panel.height + TOP
     height = top - TOP + BOTTOM
     most = max(3, int(inner // PER_TICK[0]))
-    return Drawing(chart, height, inner, ticks(across, most, chart.whole), tuple(panels))
+    x_ticks = ticks(across, most, chart.whole)
+    return Drawing(chart, height, inner, across.low, across.high, x_ticks, tuple(panels))
 
 
 def ticks(axis: Axis, most: int, whole: bool = False) -> tuple[Tick, ...]:
-    """Return marks at round values, at most so many; on a logarithmic axis at powers of ten."""
+    """Place marks at round values, about so many; on a logarithmic axis at powers of ten."""
     if axis.logarithmic:
         return tuple(_decades(axis, most))
-    step = _round_step((axis.high - axis.low) / most)
-    step = max(step, 1.0) if whole else step
-    first, last = ceil(axis.low / step - 1e-9), floor(axis.high / step + 1e-9)
-    values = [k * step for k in range(first, last + 1)]
+    for finer in (1, 2):  # one mark alone would give no scale
+        step = _round_step((axis.high - axis.low) / (finer * most))
+        step = max(step, 1.0) if whole else step
+        first, last = ceil(axis.low / step - 1e-9), floor(axis.high / step + 1e-9)
+        values = [k * step for k in range(first, last + 1)]
+        if len(values) > 1:
+            break
     return tuple(Tick(axis.place(value), _number(value, step)) for value in values)
 
 
@@ -134,6 +142,8 @@ def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
         panel.title,
         top,
         panel.height,
+        upward.low,
+        upward.high,
         tuple(Tick(panel.height - tick.at, tick.label) for tick in y_ticks),
         tuple(_mark(series, across, upward) for series in panel.series),
         tuple(_rule(rule, across, upward) for rule in panel.rules),

@@ -6,14 +6,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exfit import __version__
 from exfit.dsp.features import LABELS
-from exfit.errors import ExfitError
 from exfit.features.report.charts import drawing
 from exfit.features.report.sections import AGAINST, OF_VALIDATION, SECTIONS, ReportSection
 from exfit.features.report.sections.against import against
@@ -32,7 +30,6 @@ TEMPLATES = Path(__file__).parent / "templates"
 CHART_STYLE = TEMPLATES / "chart.css"
 CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of caption counts
 CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
-LIBRARY = ("bokeh.min.js", "bokeh-api.min.js")
 LONG = 12  # lines of a history that a reader sees without asking for more
 MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
 GENERATOR = '<meta name="generator" content="exfit '
@@ -97,8 +94,7 @@ def _with_other_program(page: Page, result: Reported) -> Page:
 
 def page_html(page: Page, interactive: bool = True) -> str:
     """Return a page as HTML; without scripts, for a print, where it is not ``interactive``."""
-    style, script = (TEMPLATES / "report.css", TEMPLATES / "report.js")
-    scripts = [*library(), script.read_text(encoding="utf-8")] if interactive else []
+    style = CHART_STYLE.read_text(encoding="utf-8") + _text("report.css")
     overlays = _overlays(content for _, content in page.sections) if interactive else []
     text: str = (
         environment()
@@ -113,11 +109,15 @@ def page_html(page: Page, interactive: bool = True) -> str:
             simulated_by=page.simulated_by,
             no_behaviour=page.no_behaviour,
             data=list(live_data(overlays)),
-            css=CHART_STYLE.read_text(encoding="utf-8") + style.read_text(encoding="utf-8"),
-            scripts=scripts,
+            css=style,
+            script=_text("report.js") if interactive else "",
         )
     )
     return _numbered(text)
+
+
+def _text(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def _numbered(page: str) -> str:
@@ -136,18 +136,6 @@ def is_page(path: Path) -> bool:
     """Return whether a file is a page that this module made."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return GENERATOR in file.read(HEAD)
-
-
-def library() -> list[str]:
-    """Return the scripts of BokehJS, which the package bokeh brings.
-
-    They are read as files: importing bokeh takes longer than all of a report.
-    """
-    package = find_spec("bokeh")
-    if package is None or package.origin is None:
-        raise ExfitError("the package bokeh is missing: pip install bokeh")
-    folder = Path(package.origin).parent / "server" / "static" / "js"
-    return [(folder / name).read_text(encoding="utf-8") for name in LIBRARY]
 
 
 def _overlays(contents: Iterable[Any]) -> list[OverlayChart]:

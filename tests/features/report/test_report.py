@@ -26,9 +26,10 @@ from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.planner.export import export
 from exfit.features.report.charts import Axis, drawing, ticks
-from exfit.features.report.page import html, write_report
+from exfit.features.report.page import html
 from exfit.features.report.sections.matches import fitted_matches, live_data
 from exfit.features.report.verdict import headline
+from exfit.features.report.writing import write_report
 from exfit.models import from_file
 from exfit.results.io import load_result, result_file
 from exfit.results.other_values import AsFound

@@ -99,14 +99,14 @@ def spread(png):
 def ranges(page):
     """Return the ends of the axes of time of the interactive overlays."""
     return page.evaluate(
-        "Bokeh.documents.flatMap((d) => d.roots()).flatMap((r) => r.children)"
-        ".map((p) => [p.x_range.start, p.x_range.end])"
+        "[...document.querySelectorAll('.alive .panel')]"
+        ".map((panel) => [Number(panel.dataset.start), Number(panel.dataset.end)])"
     )
 
 
 def middle(page, number=0):
     """Return where the middle of the first panel of an overlay is, scrolled into sight."""
-    place = page.locator(".live").nth(number)
+    place = page.locator(".alive .static").nth(number)
     place.scroll_into_view_if_needed()
     box = place.bounding_box()
     return box["x"] + 0.5 * box["width"], box["y"] + 150.0
@@ -120,9 +120,10 @@ def test_a_report_opens_from_disk_without_a_fault_or_a_question_to_the_network(o
     assert [url for url in page.asked if not url.startswith(("data:", "blob:"))] == [page.address]
     figures = page.locator("figure").count()
     overlays = page.locator("figure.alive").count()
-    assert figures > overlays == page.locator(".live").count() > 0
+    assert figures > overlays == page.locator(".alive .readout").count() > 0
     for number in range(overlays):
-        assert page.locator(".live").nth(number).bounding_box()["height"] > 300
+        box = page.locator(".alive .static").nth(number).bounding_box()
+        assert box["height"] > 0.5 * box["width"]
     wide, seen = page.evaluate(
         "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
     )
@@ -134,7 +135,7 @@ def test_no_part_of_a_report_is_blank(opened, width):
     page = opened("ac1a_typical", width)
     for section in page.locator("section").all():
         assert spread(section.screenshot()) > BLANK
-    for overlay in page.locator(".live").all():
+    for overlay in page.locator(".alive").all():
         assert spread(overlay.screenshot()) > BLANK
 
 
@@ -187,14 +188,40 @@ def test_pointing_at_an_overlay_shows_its_values(opened):
     x, y = middle(page)
     page.mouse.move(x - 3, y)
     page.mouse.move(x, y)
-    page.locator(".bk-Tooltip .bk-tooltip-row-value").first.wait_for(timeout=5_000)
-    names = page.locator(".bk-Tooltip .bk-tooltip-row-label").all_inner_texts()
-    values = page.locator(".bk-Tooltip .bk-tooltip-row-value").all_inner_texts()
-    told = {name.rstrip(": "): value for name, value in zip(names, values, strict=True)}
-    assert told.keys() >= {"time", "measured", "start", "simulated"}
+    page.locator(".readout dd").first.wait_for(timeout=5_000)
+    names, values = (page.locator(f".readout {tag}").all_inner_texts() for tag in ("dt", "dd"))
+    told = dict(zip(names, values, strict=True))
+    assert [*told] == ["time", "measured", "start values", "fitted", "difference (1e-3 pu)"]
     # in the middle of ten seconds, beside the labels of the axis
     assert 4.0 < float(told["time"].removesuffix(" s")) < 6.0
     assert 1.04 < float(told["measured"]) < 1.06
+
+
+def test_keys_reach_what_the_pointer_does_and_the_whole_record_again(opened):
+    page = opened("ac1a_typical")
+    drawn = page.locator(".alive .static").first.inner_html()
+    before = ranges(page)
+    page.locator(".tools button").first.focus()
+    for _ in range(2):
+        page.keyboard.press("Tab")
+        page.keyboard.press("Enter")
+    after = ranges(page)
+    assert after[0] == after[1] != before[0]
+    assert after[0][0] >= before[0][0]
+    page.locator(".tools button").nth(4).press("Enter")
+    assert ranges(page) == before
+    assert page.locator(".alive .static").first.inner_html() == drawn
+
+
+def test_a_zoomed_drawing_is_printed_whole(opened):
+    page = opened("ac1a_typical")
+    before = ranges(page)
+    page.get_by_label("zoom in").first.click()
+    zoomed = ranges(page)
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert ranges(page) == before
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert ranges(page) == zoomed != before
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -216,7 +243,7 @@ def test_without_scripts_every_drawing_is_seen(opened, name):
     for one in drawings:
         assert one.is_visible()
         assert spread(one.screenshot()) > BLANK
-    assert page.locator(".live").first.is_hidden()
+    assert page.locator(".tools, .readout").count() == 0
     assert page.locator(".hint").first.is_hidden()
 
 
@@ -225,11 +252,11 @@ def test_a_report_prints_to_pages_with_its_drawings_and_whole_history(opened, tm
     assert page.locator(".history").is_hidden()
     page.emulate_media(media="print")
     assert page.locator("figure.alive svg[role=img]").first.is_visible()
-    assert page.locator(".live").first.is_hidden()
+    assert page.locator(".tools").first.is_hidden()
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert page.locator(".history").is_visible()
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
-    assert page.locator(".live").first.is_hidden()
+    assert page.locator(".tools").first.is_hidden()
     printed = page.pdf(prefer_css_page_size=True)
     assert 4 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 20
     # A4 between its margins is 180 mm wide

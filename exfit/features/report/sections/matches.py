@@ -138,11 +138,12 @@ def overlay(key: str, comparison: Comparison, signal: str, bins: int = BINS) -> 
             Panel("simulated - measured (1e-3 pu)", (error,), LOW, rules=(LEVEL,)),
         ),
         x_range=(float(time[0]), float(time[-1])),
+        live=True,
     )
 
 
 def live_data(overlays: Sequence[OverlayChart]) -> Iterator[dict[str, Any]]:
-    """Yield the samples of the overlays for the interactive twins, thinned where they are many.
+    """Yield the samples of the overlays for the script, thinned where they are many.
 
     A gap is None.
     """
@@ -156,11 +157,11 @@ def live_data(overlays: Sequence[OverlayChart]) -> Iterator[dict[str, Any]]:
         signals = {"measured": samples.measured, "simulated": samples.simulated}
         if samples.start is not None:
             signals["start"] = samples.start
+        if samples.reference is not None:
+            signals["reference"] = samples.reference
         yield {
             "key": overlay_chart.chart.key,
             "group": overlay_chart.comparison.name,
-            "title": overlay_chart.chart.title,
-            "label": overlay_chart.chart.panels[0].title,
             "time": _numbers(time[rows], clock_digits(time, DIGITS)),
             **{name: _numbers(line[rows], DIGITS) for name, line in signals.items()},
         }
