@@ -134,8 +134,8 @@ class Panel:
 class Chart:
     """Panels above each other on one x axis; ``text`` says what a reader would see there.
 
-    ``key`` begins the ids of the drawing; it must be its alone on a page. Of a ``live`` chart a page
-    has the samples, and says where its axes begin and end, so that it can be zoomed.
+    ``key`` begins the ids of the drawing; it must be its alone on a page. Of a ``live`` chart a
+    page has the samples, and says where its axes begin and end, so that it can be zoomed.
     """
 
     key: str
