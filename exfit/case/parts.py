@@ -36,8 +36,6 @@ Contradictions = Iterator[tuple[str, str]]
 
 # in place of a kind that does not exist, which is a fault of its own
 ANY_PLANT = replace(OPEN_CIRCUIT, events=EVENTS, signals=RECORDED)
-# the types of plants that exfit does not simulate
-ELSEWHERE = tuple(name for name, kind in KINDS.items() if not kind.has_equations)
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
@@ -125,8 +123,10 @@ def kind_of(plant: Data) -> PlantKind:
 
     That of a plant that exfit does not simulate is the kind of its twin, where it has one.
     """
-    key = "twin" if plant.get("type") in ELSEWHERE and "twin" in plant else "type"
-    return KINDS.get(str(plant.get(key)), ANY_PLANT)
+    kind = KINDS.get(str(plant.get("type")), ANY_PLANT)
+    if kind.has_equations or "twin" not in plant:
+        return kind
+    return KINDS.get(str(plant.get("twin")), ANY_PLANT)
 
 
 def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:

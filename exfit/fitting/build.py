@@ -10,7 +10,7 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
 from exfit.engine.system import System
 from exfit.errors import CaseError
-from exfit.features.events.recorded_event import (
+from exfit.fitting.recorded.event import (
     event_inputs,
     offset_step,
     with_even_clock,

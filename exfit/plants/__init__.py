@@ -1,6 +1,5 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
-from exfit.features.events.grid_playback import RESTING, grid_playback
 from exfit.plants.alone import alone
 from exfit.plants.breaker import BREAKER, SPEED
 from exfit.plants.governing import rests_at
@@ -57,7 +56,6 @@ __all__ = [
     "PLACES",
     "PLAYBACK",
     "REFERENCES",
-    "RESTING",
     "SATURATION",
     "SPEED",
     "STABILISER",
@@ -76,7 +74,6 @@ __all__ = [
     "exciter_inputs",
     "exciter_parameters",
     "flow_sheet",
-    "grid_playback",
     "infinite_bus",
     "initial",
     "inputs_at",

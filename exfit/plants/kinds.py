@@ -1,6 +1,6 @@
 """The kinds of plant, by the names that a case file gives them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from exfit.plants.alone import ALONE
 from exfit.plants.infinite_bus import INFINITE_BUS
@@ -12,19 +12,38 @@ from exfit.plants.plant import PlantKind
 from exfit.plants.playback import PLAYBACK
 from exfit.registry import parts
 
-OF_CORE = (
-    OPEN_CIRCUIT,
-    INFINITE_BUS,
-    MACHINE_ON_LOAD,
-    PLAYBACK,
-    MACHINE_PLAYBACK,
-    ALONE,
-    OUTSIDE,
-    FMU,
-)
-KINDS: Mapping[str, PlantKind] = {
-    **{kind.name: kind for kind in OF_CORE},
-    **{name: part.load() for name, part in parts("PLANTS").items()},
+CORE: Mapping[str, PlantKind] = {
+    kind.name: kind
+    for kind in (
+        OPEN_CIRCUIT,
+        INFINITE_BUS,
+        MACHINE_ON_LOAD,
+        PLAYBACK,
+        MACHINE_PLAYBACK,
+        ALONE,
+        OUTSIDE,
+        FMU,
+    )
 }
+PLUG = "PLANTS"
 
-EVENTS = tuple(dict.fromkeys(event for kind in KINDS.values() for event in kind.events))
+
+class Kinds(Mapping[str, PlantKind]):
+    """The kinds of the core, and those of features, each imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> PlantKind:
+        if name in CORE:
+            return CORE[name]
+        kind: PlantKind = parts(PLUG)[name].load()
+        return kind
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([*CORE, *parts(PLUG)])
+
+    def __len__(self) -> int:
+        return len(CORE) + len(parts(PLUG))
+
+
+KINDS = Kinds()
+# a kind of a feature has some of these
+EVENTS = tuple(dict.fromkeys(event for kind in CORE.values() for event in kind.events))

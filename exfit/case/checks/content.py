@@ -13,6 +13,7 @@ from exfit.case.checks.plant import (
     governor_faults,
     limiter_faults,
     model_faults,
+    plant_faults,
     plants_of_records_faults,
     stabiliser_faults,
 )
@@ -55,6 +56,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     content = ContentNode((), plain)
     kind = kind_of(content.at("plant").content)
     several = [entry for key in ("records", "validate") for entry in content.at(key).entries]
+    yield from plant_faults(content.at("plant"))
     yield from model_faults(content, kind)
     yield from parameter_faults(content, parts, ties)
     if kind.has_equations:

@@ -9,6 +9,7 @@ from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
 from exfit.plants import (
     HEARD,
+    KINDS,
     Attached,
     PlantKind,
     Stabilised,
@@ -21,6 +22,14 @@ from exfit.plants import (
 from exfit.util.text import show, show_value
 
 PROGRAM_HAS_IT = "the program has its own"
+
+
+def plant_faults(plant: ContentNode) -> Iterator[Fault]:
+    """Yield a kind of plant that is described but not installed: the folder of a feature has it."""
+    for key in ("type", "twin"):
+        if key in plant and plant.at(key).value not in KINDS:
+            text = f"{plant.at(key).value}: this installation of exfit has no such plant"
+            yield plant.at(key).fault(f"{text}; it has {', '.join(KINDS)}")
 
 
 def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:

@@ -9,7 +9,7 @@ from exfit.case.case import Case
 from exfit.case.schema import Recording
 from exfit.errors import SimulationError
 from exfit.features.events.record_causes import clock_causes, mismatch, record_causes, swing_causes
-from exfit.features.events.recorded_event import with_rest
+from exfit.fitting.recorded.event import with_rest
 from exfit.fitting.build import build_experiment
 from exfit.fitting.recordings import record_of
 from exfit.records.record import Record

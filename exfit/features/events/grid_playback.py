@@ -37,7 +37,6 @@ from exfit.plants.unit import (
 OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
 DRIVING_ANGLE = ("angle", "frequency")  # of which one drives, beside vt
 LEVELS = ("p", "q", "speed")
-RESTING = ("vt", "frequency", "p", "q")  # what shows the rest before an event
 
 TRANSFORMER: Sheet = sheet(
     ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
