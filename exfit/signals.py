@@ -112,6 +112,7 @@ SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}
 RECORDED = tuple(row.symbol for row in ROWS if row.words)
 COMPARED = tuple(row.symbol for row in ROWS if row.noise is not None)
 OF_EVENT = ("angle", "frequency")  # what drives a unit beside vt, and is in no bump test
+RESTING = ("vt", "frequency", "p", "q")  # what shows the rest before an event
 OF_CURRENT_PHASOR = ("p", "q", "it")  # what it gives beside the phasor of the voltage
 COMPARED_IN_EVENT = ("p", "q", "efd", "ifd", "speed")  # what a record of an event mostly holds
 OF_FLAT_RUN = ("efd", "p", "q")  # what shows whether a unit rests where nothing is compared

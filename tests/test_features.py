@@ -16,6 +16,7 @@ from exfit.cli import OF_CORE
 
 PACKAGE = Path(exfit.__file__).parent
 CASE = ROOT / "configs" / "ac1a_typical.yaml"
+EVENT = ROOT / "configs" / "grid_event.yaml"
 
 
 def run(code, place, *arguments, package=None):
@@ -74,3 +75,6 @@ def test_without_features_the_core_fits_simulates_and_validates(tmp_path):
     unknown = run(MAIN, tmp_path, "batch", CASE)
     assert unknown.returncode == 2
     assert "No such command 'batch'" in unknown.stderr
+    event = run(MAIN, tmp_path, "validate", EVENT, "--as-found", "--no-plots")
+    assert event.returncode == 1
+    assert "grid-playback: this installation of exfit has no such plant" in event.stderr

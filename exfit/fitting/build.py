@@ -10,12 +10,6 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
 from exfit.engine.system import System
 from exfit.errors import CaseError
-from exfit.fitting.recorded.event import (
-    event_inputs,
-    offset_step,
-    with_even_clock,
-    with_rest,
-)
 from exfit.fitting.channels import channel_of, with_filter, without_masked
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.input_steps import input_steps
@@ -25,6 +19,12 @@ from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
 from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recorded.detected_steps import with_detected_steps
+from exfit.fitting.recorded.event import (
+    event_inputs,
+    offset_step,
+    with_even_clock,
+    with_rest,
+)
 from exfit.fitting.recorded.references import references_of, span_of
 from exfit.fitting.recorded.switchings import (
     Switching,

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 from exfit.case.case import Case
 from exfit.dsp.jumps import jumps_while_moving
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.recorded.event import with_even_clock
 from exfit.fitting.build import build_experiment
+from exfit.fitting.recorded.event import with_even_clock
 from exfit.fitting.recorded.switchings import MASKED, names_of_switchings
 from exfit.records.record import Record
 

@@ -11,6 +11,7 @@ from exfit.case import schema
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import EVENTS, KINDS, SATURATION, Equipment
+from exfit.registry import parts
 from exfit.signals import RECORDED, SIGNALS
 
 EQUIPMENT = Equipment(
@@ -63,15 +64,18 @@ def test_a_record_may_hold_what_drives_and_what_is_compared(kind):
     assert {*kind.required_if_used} <= {*kind.driving}
 
 
-def test_only_the_plants_the_schema_and_the_plugs_of_features_know_a_plant_by_its_name():
+def test_no_room_but_that_of_the_plants_and_the_schema_knows_a_plant_by_its_name():
     names = KINDS.keys() - {"none"}  # which is a word of other things too
     knowing = {
         path.relative_to(ROOT).as_posix()
         for path, node in nodes(lambda text: any(f'"{name}"' in text for name in names))
         if isinstance(node, ast.Constant) and node.value in names
     }
-    rest = {path for path in knowing if not path.startswith("plants/")}
-    rest -= {path for path in rest if path.startswith("features/") and "__init__" in path}
+    of_features = {
+        str(Path(*path.partition(":")[0].split(".")[1:-1]))
+        for path in (part.path for part in parts("PLANTS").values())
+    }
+    rest = {path for path in knowing if not path.startswith(("plants/", *of_features))}
     assert rest == {"case/schema/plants.py"}
 
 

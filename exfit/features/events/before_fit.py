@@ -9,8 +9,8 @@ from exfit.case.case import Case
 from exfit.case.schema import Recording
 from exfit.errors import SimulationError
 from exfit.features.events.record_causes import clock_causes, mismatch, record_causes, swing_causes
-from exfit.fitting.recorded.event import with_rest
 from exfit.fitting.build import build_experiment
+from exfit.fitting.recorded.event import with_rest
 from exfit.fitting.recordings import record_of
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record

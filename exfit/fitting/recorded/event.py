@@ -13,6 +13,7 @@ from exfit.errors import RecordError
 from exfit.fitting.levels import deviation, initial_level
 from exfit.fitting.recorded.switchings import Switching
 from exfit.records.record import Record
+from exfit.signals import RESTING
 from exfit.simulation.inputs import InputStep, RecordedInput
 from exfit.simulation.splines import SplinedInput
 from exfit.util.text import show
@@ -20,7 +21,6 @@ from exfit.util.text import show
 Array = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
-RESTING = ("vt", "frequency", "p", "q")  # what shows the rest before an event
 
 
 def offset_step(test: BumpTest, begin: float, end: float) -> tuple[InputStep, ...]:
