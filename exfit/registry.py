@@ -8,6 +8,9 @@ feature is imported before it is used:
     CHECKS    what `exfit check` does with a file that has this key, given its path; False: unsound
     SECTIONS  keys of a case file that other commands read: a class of fields, and why not a case
     PLANTS    kinds of plant, by the names that a case gives them
+    EVENT_DRAFT  lines of a case that a record of an event suggests: its plant, its record
+    INPUT_NOISE  of the signals that drive a simulation: to weigh errors by it, to take out its bias
+    CAUSES_BEFORE_FIT  causes of a misfit that a record shows before a fit, (case, recording)
     CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of a misfit, by what it looks at
 
 The core asks for plugs here and names no feature.

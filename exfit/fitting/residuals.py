@@ -103,6 +103,16 @@ class Residuals:
         sizes = [c.weight * (c.residual_deviation or noise_of(c)) for c in self.channels]
         return float(np.sqrt(np.mean(np.square(sizes))))
 
+    @property
+    def shift(self) -> Array:
+        """What is taken from the errors (M,) of the records for the bias by what drives them."""
+        return np.concatenate(
+            [
+                np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.shift
+                for each in self.experiments
+            ]
+        )
+
     def match(self, residuals: Array, rmse: float) -> bool:
         """Return whether no channel of any record has a root mean square error above ``rmse``.
 

@@ -15,6 +15,8 @@ ROWS_TOGETHER = 400  # that are whitened by one factor
 ROWS_BEFORE = 1200  # that tell what noise comes next: more add nothing, and cost their square
 ROWS_OF_A_PART = 200  # of a factor: its other half is zero
 
+BIAS_KNOWN_TO = 0.12  # of itself, as the variance of noise by fourth differences of 720 samples
+
 
 class CarriedNoise(NamedTuple):
     """The covariance of the noise of M errors: diag(own) + carried carried'.

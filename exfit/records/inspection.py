@@ -13,7 +13,6 @@ from exfit.dsp.jumps import rest_end
 from exfit.dsp.quality import mains_frequency
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
-from exfit.features.events.pmu_recognition import PmuContent, pmu_content
 from exfit.records.angle_findings import angle_findings
 from exfit.records.angles import in_radians
 from exfit.records.channel_identity import identified
@@ -30,6 +29,7 @@ from exfit.records.field_base import base_findings
 from exfit.records.formats import PLAY_IN
 from exfit.records.formats.memory import TooLargeError
 from exfit.records.formats.table import Table, column_error, listed, refuse_uneven
+from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
 from exfit.records.status import Status, bad_rows

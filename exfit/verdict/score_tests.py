@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.features.events.driving_noise.weighing import BIAS_KNOWN_TO, shift_of, without_bias
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import slopes_of
+from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.plants import REFERENCES, VT0
+from exfit.registry import parts
 from exfit.results.intervals.typical_values import parameters_of
 from exfit.results.verdict import REJECTED, Cause
 from exfit.simulation.inputs import InputStep
@@ -161,7 +162,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     added = extended.free[count:]
     theta = np.append(evidence.solution.x, extended.start[count:])
     if evidence.weighed_by_noise:
-        extended, _ = without_bias(extended, theta)
+        extended, _ = parts("INPUT_NOISE")["without bias"].load()(extended, theta)
     errors, slopes = extended.errors(theta)
     own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
     column = {free.name: each for free, each in zip(added, others.T, strict=True)}
@@ -175,7 +176,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     influence, _ = evidence.residuals.influence(errors)
     tested = [each for each in directions if each[0].words]
     tested.extend(_of_channels(evidence, errors))
-    return linear_model(influence, known), tested, shift_of(extended)
+    return linear_model(influence, known), tested, extended.shift
 
 
 def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, float]]:

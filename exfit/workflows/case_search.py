@@ -4,18 +4,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
-from exfit.features.events.driving_noise.weighing import (
-    NOT_WEIGHED,
-    weighed_by_noise,
-    why_not_weighed,
-    with_minima_of,
-)
 from exfit.features.external.setups import settled, with_setups
 from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
-from exfit.fitting.descents import Announce, stopped
+from exfit.fitting.descents import Announce
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.nuisances.found_lines import with_found_lines
@@ -23,6 +20,7 @@ from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.registry import parts
 from exfit.results.intervals.determination import (
     NEEDS_PROFILE,
     Determination,
@@ -34,6 +32,7 @@ from exfit.results.intervals.samples_at_steps import without_contradicting_sampl
 from exfit.util.strategies import WEIGHED_BY_NOISE
 from exfit.workflows.choice_by_validation import judge_of
 
+Array = NDArray[np.float64]
 Watch = Callable[[estimate.Progress], None]
 
 MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
@@ -158,19 +157,16 @@ def weighed_search(
     ended = found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED
     if ended or not task.case.kind.finds_rest:
         return problem, found
-    setups = as_fitted(task.setups, problem)
-    reason = why_not_weighed(problem.residuals, setups)
-    if reason is not None:
-        return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHED} {reason}"))
-    try:
-        weighed, theta, notes = weighed_by_noise(problem, setups, found.best.x, progress)
-        found = with_minima_of(weighed, found)
-    except KeyboardInterrupt:
-        return problem, found._replace(best=stopped(found.best, estimate.Stop.INTERRUPTED))
-    found = continued_from(
-        theta, found, weighed, announce, task.counter, task.options, WEIGHED_BY_NOISE
+
+    def proceed(weighed: FitProblem, found: SearchResult, point: Array) -> SearchResult:
+        counter, options = task.counter, task.options
+        return continued_from(point, found, weighed, announce, counter, options, WEIGHED_BY_NOISE)
+
+    weigh = parts("INPUT_NOISE")["weighed search"].load()
+    weighed: tuple[FitProblem, SearchResult] = weigh(
+        problem, as_fitted(task.setups, problem), found, proceed, progress
     )
-    return weighed, found._replace(notes=(*found.notes, *notes))
+    return weighed
 
 
 def weighted_search(

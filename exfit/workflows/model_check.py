@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import ExfitError
-from exfit.features.events.before_fit import event_warnings
 from exfit.features.external.fmu_setups import own_value_notes
 from exfit.features.external.setups import differences_of_program
 from exfit.fitting.build import build_experiments, planned
@@ -20,7 +19,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.signals import OF_FLAT_RUN
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Simulator
-from exfit.verdict.causes.before_fit import case_warnings, record_warnings
+from exfit.verdict.causes.before_fit import case_warnings, event_warnings, record_warnings
 from exfit.verdict.causes.run_quality import unstable_rest_notes
 from exfit.verdict.diagnostics import diagram_notes, search_range_notes, typical_notes
 

@@ -11,7 +11,6 @@ from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
-from exfit.features.events.before_fit import event_causes
 from exfit.features.external.description import other_program_of
 from exfit.features.external.program import ExternalProgram
 from exfit.features.external.setups import as_by_program
@@ -28,6 +27,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
 from exfit.results.description import OtherProgram
 from exfit.util.file_names import folded
+from exfit.verdict.causes.before_fit import causes_before_fit
 from exfit.verdict.causes.rest import unsteady_signals
 from exfit.verdict.causes.run_quality import (
     step_error_notes,
@@ -178,17 +178,10 @@ def _validated(
     comparison = validation_of(case, fitted, setup, values)
     notes = (
         *comparison.notes,
-        *_event_notes(case, recording),
+        *(cause.sentence for cause in causes_before_fit(case, recording)),
         *_run_notes(case, setup, comparison, values),
     )
     return ComparedTest(recording, setup, values, replace(comparison, notes=notes))
-
-
-def _event_notes(case: Case, recording: Recording) -> Iterator[str]:
-    """Yield what is wrong with the record of a grid event, as before a fit."""
-    if case.seen_from(recording).kind.finds_rest:
-        for cause in event_causes(case, recording):
-            yield cause.sentence
 
 
 def _run_notes(
@@ -236,7 +229,7 @@ def _validated_by_hand(
         notes=(
             *comparison.notes,
             *_notes(test, setup, comparison, fitted, best),
-            *_event_notes(case, recording),
+            *(cause.sentence for cause in causes_before_fit(case, recording)),
             *_run_notes(case, setup, comparison, own_values),
         ),
     )

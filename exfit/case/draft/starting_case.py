@@ -7,6 +7,7 @@ from textwrap import wrap
 from exfit.case.draft.free_parameters import bounds_of, free_of
 from exfit.case.draft.starting_tests import StartingTest
 from exfit.case.draft.starting_unit import PartData, UnitData
+from exfit.case.draft.suggested_sections import event_plant, event_section, suggests_event
 from exfit.case.draft.suggestion import (
     channel_lines,
     clock_text,
@@ -28,7 +29,6 @@ from exfit.case.templates import (
     parameter_line,
     source_lines,
 )
-from exfit.features.events.suggestion import event_plant, event_section
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.field_base import shows_power
 from exfit.records.inspection import Inspection
@@ -87,7 +87,7 @@ def _recordings(
     tests: Sequence[StartingTest], names: Mapping[Path, str], exciter: str
 ) -> tuple[list[str], list[str]]:
     """Return the sections of what is fitted, and of what validates."""
-    if tests[0].inspection.is_event:
+    if suggests_event(tests[0].inspection):
         return _events(tests, names)
     if len(tests) == 1:
         level = _voltage_before(exciter, tests[0])
@@ -206,7 +206,7 @@ def _channels_once(test: StartingTest, anchors: dict[str, str]) -> list[str]:
 
 def _plant(unit: UnitData, inspection: Inspection) -> Iterator[str]:
     machine = unit.machine
-    if inspection.is_event:
+    if suggests_event(inspection):
         yield from event_plant(inspection)
         yield from _machine(machine, {"R": TYPICAL, "X": TYPICAL})
         return

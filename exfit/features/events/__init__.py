@@ -1,6 +1,12 @@
 """Grid events: a unit played back, the noise that drives it, PMU channels, causes of a misfit."""
 
 PLANTS = {"grid-playback": "grid_playback:GRID_PLAYBACK"}
+EVENT_DRAFT = {"plant": "suggestion:event_plant", "record": "suggestion:event_section"}
+INPUT_NOISE = {
+    "weighed search": "driving_noise.weighing:weighed_search",
+    "without bias": "driving_noise.weighing:without_bias",
+}
+CAUSES_BEFORE_FIT = {"records of events": "before_fit:event_causes"}
 CAUSES_AT_REST = {"record of the event": "record_causes:wrong_event"}
 CAUSES_OF_EVENTS = {
     "equation of the speed": "unit_causes:other_swing",

@@ -1,6 +1,6 @@
 """What is wrong with the records of grid events, before anything is fitted."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 from types import MappingProxyType
@@ -33,21 +33,8 @@ FAR_BETTER = 0.25  # of the mismatch: what is left of it with another angle
 STILL_UNLIKE = 0.2  # of the sizes of both: a better one is not right
 
 
-def event_warnings(case: Case) -> Iterator[str]:
-    """Yield what is wrong with the records of grid events that are fitted; they are read for that.
-
-    Raises RecordError where one cannot be read.
-    """
-    for recording in case.recordings:
-        if not case.seen_from(recording).kind.finds_rest:
-            continue
-        place = f"{recording.name}: " if len(case.recordings) > 1 else ""
-        for cause in event_causes(case, recording):
-            yield f"{place}{cause.cause}: {cause.remedy}"
-
-
 def event_causes(case: Case, recording: Recording) -> tuple[Cause, ...]:
-    """Return what is wrong with the record of an event: its clock, its levels, its swings.
+    """Find what is wrong with the record of an event: its clock, its levels, its swings.
 
     Each of these hides what comes after it.
     """

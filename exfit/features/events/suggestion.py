@@ -17,10 +17,10 @@ from exfit.case.draft.suggestion import (
 )
 from exfit.case.open_values import FILL_IN
 from exfit.case.templates import commented, in_comment
-from exfit.features.events.pmu_recognition import InspectedPhasor, PmuContent
 from exfit.records.angles import unit_by_range
 from exfit.records.inspection import Inspection
 from exfit.records.phasors import OF_POWER, PREFIX
+from exfit.records.pmu_recognition import InspectedPhasor, PmuContent
 from exfit.records.units import quantity_of, scale_between
 from exfit.signals import COMPARED_IN_EVENT, SIGNALS
 

@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.features.events.driving_noise.weighing import BIAS_KNOWN_TO, bias_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation
 from exfit.inference import UNDETERMINED, Uncertainty
 from exfit.inference.confidence import NORMAL
+from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals
 from exfit.results.intervals.value_shifts import shifts_by_values
 
 Array = NDArray[np.float64]
 
+UNSEEN = 1e-9  # of the largest singular value: rounding
 TINY = float(np.finfo(float).tiny)  # where the errors given leave nothing of a variance
 
 
@@ -95,12 +96,14 @@ def allowing_for_bias(
 
     That bias was taken out: it is as uncertain as the variance of the noise.
     """
-    bias = bias_of(problem.residuals, theta)
-    if bias is None:
+    residuals = problem.residuals
+    if all(experiment.whitening is None for experiment in residuals.experiments):
         return uncertainty
+    jacobian = residuals.errors(theta)[1]
+    bias = np.linalg.lstsq(jacobian, -residuals.shift, rcond=UNSEEN)[0]
     sizes = linearisation(problem, theta, of_record).own_size
     widened = {}
-    for parameter, x, size, moved in zip(problem.residuals.free, theta, sizes, bias, strict=True):
+    for parameter, x, size, moved in zip(residuals.free, theta, sizes, bias, strict=True):
         shift = BIAS_KNOWN_TO * abs(float(moved) * parameter.slope(float(x)))
         own = uncertainty.confidence.parameters[parameter.name]
         widened[parameter.name] = widened_by(

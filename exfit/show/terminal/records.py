@@ -6,9 +6,9 @@ from rich.console import Console
 from rich.text import Text
 
 from exfit.dsp.sampling import Sampling
-from exfit.features.events.pmu_recognition import PmuContent
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
+from exfit.records.pmu_recognition import PmuContent
 from exfit.show.terminal.terminal import notes, number, paragraph, plain_table, show_table
 
 NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers

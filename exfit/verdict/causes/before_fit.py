@@ -17,8 +17,10 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import MACHINE
 from exfit.records.contradictions import LARGEST_STEP, size_in_words
 from exfit.records.ripple import ripple_at_rest
+from exfit.registry import parts
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Overlay
+from exfit.results.verdict import Cause
 from exfit.signals import POSITIVE_AT_REST
 from exfit.util.text import show
 from exfit.verdict.causes.rest import FAR_FROM_BASE, other_levels, unsteady_signals
@@ -71,6 +73,27 @@ def _in_words(begin: float, end: float) -> str:
     if end == inf:
         return f"what is after {show(begin)} s"
     return f"what is before {show(end)} s" if begin == -inf else f"{show(begin)} ... {show(end)} s"
+
+
+def causes_before_fit(case: Case, recording: Recording) -> Iterator[Cause]:
+    """Yield what features see to be wrong with a record that drives a unit; it is read for that.
+
+    Raises RecordError where it cannot be read.
+    """
+    if case.seen_from(recording).kind.finds_rest:
+        for part in parts("CAUSES_BEFORE_FIT").values():
+            yield from part.load()(case, recording)
+
+
+def event_warnings(case: Case) -> Iterator[str]:
+    """Yield what is wrong with the records of grid events that are fitted; they are read for that.
+
+    Raises RecordError where one cannot be read.
+    """
+    for recording in case.recordings:
+        place = f"{recording.name}: " if len(case.recordings) > 1 else ""
+        for cause in causes_before_fit(case, recording):
+            yield f"{place}{cause.cause}: {cause.remedy}"
 
 
 def record_warnings(case: Case, setups: Sequence[ExperimentSetup], values: Values) -> Iterator[str]:

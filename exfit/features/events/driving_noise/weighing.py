@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.sampling import sampling_of
-from exfit.estimate import LocalMinimum, Progress
+from exfit.estimate import LocalMinimum, Progress, Stop
 from exfit.features.events.driving_noise.responses import carried_noise, noise_of_inputs, with_added
-from exfit.fitting.descents import descent_near, minimum_near
+from exfit.fitting.descents import descent_near, minimum_near, stopped
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
@@ -48,12 +48,37 @@ SMALL_BIAS = 0.1  # standard errors: a smaller change of it matters to no interv
 UNSEEN = 1e-9  # of the largest singular value: rounding
 REFUTED = 4.0  # times the least cost: such a minimum stays refuted whatever the weights
 NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
-BIAS_KNOWN_TO = 0.12  # of itself, as the variance of noise by fourth differences of 720 samples
 TURN = 2.0 * np.pi  # rad
 NOT_WEIGHED = (
     "the noise of the signals that drive the simulation biases the parameters, and the intervals "
     "do not hold all of it: it cannot be weighed"
 )
+
+
+def weighed_search(
+    problem: FitProblem,
+    setups: Sequence[ExperimentSetup],
+    found: SearchResult,
+    proceed: Callable[[FitProblem, SearchResult, Array], SearchResult],
+    watch: Callable[[Progress], object] = lambda _: None,
+) -> tuple[FitProblem, SearchResult]:
+    """Weigh a problem by the noise of what drives its tests, and search on from where that leads.
+
+    ``found`` is the search of the problem without it, ``setups`` its tests as fitted; ``proceed``
+    searches on, by the weighed problem, from a point (N,). Where errors cannot be weighed the
+    problem and the search remain, with a note that says why; so they do at an interruption.
+    Raises SimulationError where there is no response.
+    """
+    reason = why_not_weighed(problem.residuals, setups)
+    if reason is not None:
+        return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHED} {reason}"))
+    try:
+        weighed, theta, notes = weighed_by_noise(problem, setups, found.best.x, watch)
+        found = with_minima_of(weighed, found)
+    except KeyboardInterrupt:
+        return problem, found._replace(best=stopped(found.best, Stop.INTERRUPTED))
+    found = proceed(weighed, found, theta)
+    return weighed, found._replace(notes=(*found.notes, *notes))
 
 
 def why_not_weighed(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
@@ -143,24 +168,6 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     some = deviations > 0.0
     relative = np.where(some, bias, 0.0) / np.where(some, deviations, 1.0)
     return replace(residuals, experiments=experiments), relative
-
-
-def bias_of(residuals: Residuals, theta: Array) -> Array | None:
-    """Return the bias (N,) of scaled parameters that `without_bias` took out; None without one."""
-    if all(experiment.whitening is None for experiment in residuals.experiments):
-        return None
-    jacobian = residuals.errors(theta)[1]
-    return np.asarray(np.linalg.lstsq(jacobian, -shift_of(residuals), rcond=UNSEEN)[0])
-
-
-def shift_of(residuals: Residuals) -> Array:
-    """Return what was taken from the errors (M,) of the records for the bias."""
-    return np.concatenate(
-        [
-            np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.shift
-            for each in residuals.experiments
-        ]
-    )
 
 
 def added_gradient(residuals: Residuals, theta: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pmu_records import degrees, phasors_of, smooth_course
 
-from exfit.features.events.pmu_recognition import pmu_content
+from exfit.records.pmu_recognition import pmu_content
 from exfit.records.units import unit_in
 
 COURSE = smooth_course(slip=0.3)
