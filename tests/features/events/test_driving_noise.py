@@ -21,6 +21,8 @@ WRONG = 1.02  # of X''d: residuals show no such error by themselves
 FACTORS = (0.0, 0.01, 0.1, 1.0)  # of NOISE: the stator makes five times as much of it
 STEP = 1e-5  # of a sample, for a difference quotient
 
+WHY_NOT = "exfit.features.events.driving_noise.weighing.why_not_weighed"
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -126,7 +128,7 @@ def test_without_noise_of_what_drives_a_fit_is_that_of_least_squares(fit_of):
     The scatter of p and q is that of the residuals to 6 %: so much do the weights differ.
     """
     weighed = fit_of(0.0, weights="balanced")
-    with mock.patch("exfit.workflows.case_search.why_not_weighed", return_value="here"):
+    with mock.patch(WHY_NOT, return_value="here"):
         plain = fit_of(0.0)
     for name, parameter in plain.parameters.items():
         own = weighed.parameters[name]
