@@ -12,7 +12,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from exfit.errors import SimulationError
 from exfit.estimate import STATUS, Descent, OneByOne, Result, SolverIteration, Stop
+from exfit.estimate.run import NotFinite
 from exfit.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -186,7 +188,7 @@ def minimum_near(residuals: Residuals, theta: Array) -> Array:
 
 
 def descent_near(residuals: Residuals, theta: Array) -> Result:
-    """Return one descent from scaled parameters theta (N,), without announcements.
+    """Run one descent from scaled parameters theta (N,), without announcements.
 
     Raises KeyboardInterrupt at an interruption.
     """
@@ -199,3 +201,32 @@ def descent_near(residuals: Residuals, theta: Array) -> Result:
     if end.stop is Stop.INTERRUPTED:
         raise KeyboardInterrupt
     return end
+
+
+def short_descent(
+    residuals: Residuals,
+    theta: Array,
+    most_iterations: int,
+    watch: Announce = lambda _: None,
+    tolerance: float | None = None,
+    matches: Callable[[Array], bool] | None = None,
+) -> Result | None:
+    """Run one descent of few iterations in each phase, from scaled parameters theta (N,).
+
+    It may end early: by a ``tolerance`` of the step and of the gradient, in the units of the
+    search, or where the residuals match. None where there is no response.
+    """
+    descent = Descent(
+        functions=OneByOne(residuals, residuals.exact),
+        bounds=residuals.bounds,
+        method="lm-then-dgn",
+        max_iterations=most_iterations,
+        x_scale=residuals.units,
+        matches=matches,
+    )
+    if tolerance is not None:
+        descent = replace(descent, gtol=tolerance, xtol=tolerance)
+    try:
+        return descent.run(theta, watch)
+    except (SimulationError, NotFinite):
+        return None

@@ -157,21 +157,24 @@ def profile(
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
     setups, problem, found = _found(case, setups, problem, progress)
-    verdict = _verdict(case, setups, problem, found)
+    x, records = found.best.x, names_of_records(setups)
+    uncertainty = uncertainty_at(problem, x, records)
+    verdict = _verdict(case, setups, problem, found, uncertainty)
     by_twin = program is not None and not case.has_no_equations
     if by_twin:
-        setups, problem = _by_twin(setups, problem, found.best.x)
-    wanted = _indices(case, problem.residuals, names)
-    residuals, records, others = problem.compressed, names_of_records(setups), other_minima(found)
-    x = found.best.x
-    for _ in range(MOST_MINIMA):
+        setups, problem = _by_twin(setups, problem, x)
         uncertainty = uncertainty_at(problem, x, records)
+    wanted = _indices(case, problem.residuals, names)
+    residuals, others = problem.compressed, other_minima(found)
+    for further in range(MOST_MINIMA):
+        if further:  # the residuals of another minimum, and so the rise, are others
+            uncertainty = uncertainty_at(problem, x, records)
         rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
         solution = FoundMinimum(x, estimate.half_square(residuals(x)))
         profiles = profiles_about(residuals, solution, others, rises, POINTS, progress)
         if profiles.lower is None or profiles.interrupted or by_twin:
             break
-        x = profiles.lower  # its residuals, and so the rise, are others
+        x = profiles.lower
     first = next(iter(profiles.by_index.values()))[0]
     return Profiles(
         name=case.path.stem,
@@ -192,16 +195,19 @@ def profile(
 
 
 def _verdict(
-    case: Case, setups: Sequence[ExperimentSetup], problem: FitProblem, found: SearchResult
+    case: Case,
+    setups: Sequence[ExperimentSetup],
+    problem: FitProblem,
+    found: SearchResult,
+    uncertainty: UncertaintyAnalysis | None,
 ) -> Verdict:
-    """Return what the fit comes to, without its causes."""
+    """Judge the fit, without its causes."""
     values = problem.residuals.values(found.best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     records = (
         FittedRecord(recording.test, setup, compare_with_record(setup, setup.name, values))
         for recording, setup in zip(case.recordings, fine, strict=True)
     )
-    uncertainty = uncertainty_at(problem, found.best.x, names_of_records(setups))
     return verdict_alone(Evidence(case, problem.residuals, found.best, tuple(records), uncertainty))
 
 

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit import estimate
-from exfit.errors import SimulationError
-from exfit.estimate.run import NotFinite
+from exfit.estimate import half_square
+from exfit.fitting.descents import short_descent
 from exfit.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -71,16 +70,10 @@ def _on_floor(residuals: Residuals, point: Array, k: int, allowed: float) -> Arr
     fixed = {**residuals.fixed, held.name: held.value(float(point[k]))}
     free = [parameter for parameter in residuals.free if parameter is not held]
     others = replace(residuals, free=free, fixed=fixed, counter=None)
-    descent = estimate.Descent(
-        functions=estimate.OneByOne(others, others.exact),
-        bounds=others.bounds,
-        method="lm-then-dgn",
-        max_iterations=MOST_ITERATIONS,
-        x_scale=others.units,
-        matches=lambda own: estimate.half_square(own) <= allowed,
+    end = short_descent(
+        others,
+        np.delete(point, k),
+        MOST_ITERATIONS,
+        matches=lambda errors: half_square(errors) <= allowed,
     )
-    try:
-        end = descent.run(np.delete(point, k))
-    except (SimulationError, NotFinite):
-        return None
-    return np.insert(end.x, k, point[k]) if end.cost <= allowed else None
+    return None if end is None or end.cost > allowed else np.insert(end.x, k, point[k])

@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import ChannelSection, Recording
 from exfit.dsp.noise import noise
 from exfit.errors import ExfitError
+from exfit.estimate import Stop
 from exfit.fitting.build import build_experiment
+from exfit.fitting.descents import short_descent
 from exfit.fitting.propagated_noise import carried_noise
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -282,15 +283,10 @@ def _fitted(setup: ExperimentSetup, residuals: Residuals, values: Values) -> Win
         robust=None,
         counter=None,
     )
-    descent = estimate.Descent(
-        functions=estimate.OneByOne(own, own.exact),
-        bounds=own.bounds,
-        method="lm-then-dgn",
-        max_iterations=MOST_ITERATIONS,
-        x_scale=own.units,
-    )
-    best = descent.run(own.start)
-    if best.stop is estimate.Stop.INTERRUPTED:
+    best = short_descent(own, own.start, MOST_ITERATIONS)
+    if best is None:
+        return None
+    if best.stop is Stop.INTERRUPTED:
         raise KeyboardInterrupt
     values = own.values(best.x)
     draws = _draws(setup, values)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.errors import SimulationError
-from exfit.estimate.run import NotFinite
+from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.parameters import FreeParameter
@@ -102,22 +101,14 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
 
 def _descended(evidence: Evidence, residuals: Residuals, start: Array) -> estimate.Result | None:
     evidence.pace.goes_on()
-    descent = estimate.Descent(
-        functions=estimate.OneByOne(residuals, residuals.exact),
-        bounds=residuals.bounds,
-        method="lm-then-dgn",
-        max_iterations=MOST_ITERATIONS,
-        gtol=TOLERANCE,
-        xtol=TOLERANCE,
-        x_scale=residuals.units,
-    )
-    try:
-        end = descent.run(start, lambda line: evidence.pace.goes_on(line.cost))
-    except (SimulationError, NotFinite):
-        return None
-    if end.stop is estimate.Stop.INTERRUPTED:
+
+    def watch(line: estimate.SolverIteration) -> None:
+        evidence.pace.goes_on(line.cost)
+
+    end = short_descent(residuals, start, MOST_ITERATIONS, watch, TOLERANCE)
+    if end is not None and end.stop is estimate.Stop.INTERRUPTED:
         raise KeyboardInterrupt
-    return end if np.isfinite(end.cost) else None
+    return end if end is not None and np.isfinite(end.cost) else None
 
 
 def always(cause: Cause) -> Callable[[Trial], Cause]:
