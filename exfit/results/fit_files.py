@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from exfit.fitting.nuisances.parameters import prefix_from
 from exfit.results.comparisons import Comparison
-from exfit.results.io import WHOLE_FIT, result_text
+from exfit.results.io import result_text
 from exfit.results.model import FitResult
 from exfit.results.tables import (
     comparison_table,
@@ -14,9 +14,14 @@ from exfit.results.tables import (
     parameter_file,
     phase_end_file,
 )
-
-PARAMETERS, HISTORY, RESPONSE = "parameters.yaml", "history.csv", "response.csv"
-ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
+from exfit.util.file_names import (
+    HISTORY,
+    ITERATIONS,
+    PARAMETERS,
+    RESPONSE,
+    SENSITIVITIES,
+    WHOLE_FIT,
+)
 
 
 def files_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:

@@ -12,12 +12,12 @@ from exfit.results.description import PARTS, PartDescription
 from exfit.results.model import FitResult
 from exfit.results.thinning import thinned, thinned_validation
 from exfit.results.validation_result import ValidationResult
+from exfit.util.file_names import VALIDATION, WHOLE_FIT
 from exfit.util.json_files import read_json
 from exfit.util.sources import FITTED, TYPICAL
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
-WHOLE_FIT, WHOLE_PROGRAMME, VALIDATION = "result.json", "programme.json", "validation.json"
 VERSION = 10  # of the file; a file without a version is of the first
 
 

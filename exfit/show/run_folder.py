@@ -12,16 +12,8 @@ from typing import TYPE_CHECKING
 
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
-from exfit.results.fit_files import (
-    HISTORY,
-    ITERATIONS,
-    PARAMETERS,
-    RESPONSE,
-    SENSITIVITIES,
-    comparison_files,
-    files_of_fit,
-)
-from exfit.results.io import VALIDATION, WHOLE_FIT, validation_text
+from exfit.results.fit_files import comparison_files, files_of_fit
+from exfit.results.io import validation_text
 from exfit.results.model import FitResult
 from exfit.results.tables import (
     DIGITS,
@@ -30,7 +22,16 @@ from exfit.results.tables import (
 )
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.cache import keep_private, private_cache, read_private
-from exfit.util.file_names import files_named_after
+from exfit.util.file_names import (
+    HISTORY,
+    ITERATIONS,
+    PARAMETERS,
+    RESPONSE,
+    SENSITIVITIES,
+    VALIDATION,
+    WHOLE_FIT,
+    files_named_after,
+)
 from exfit.util.files import write_together
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.json_files import read_json

@@ -11,6 +11,10 @@ DEVICES = frozenset(("con", "prn", "aux", "nul", "conin$", "conout$", *PORTS))
 FORBIDDEN = '<>:"/\\|?*'  # by Windows
 LONGEST_NAME = 100  # characters: a name of any system has 255 bytes, and what is added takes some
 
+WHOLE_FIT, WHOLE_PROGRAMME, VALIDATION = "result.json", "programme.json", "validation.json"
+PARAMETERS, HISTORY, RESPONSE = "parameters.yaml", "history.csv", "response.csv"
+ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
+
 # of what exfit itself writes into the folder of a run, and of the folder of all bump tests
 OWN_NAMES = (
     "compare",

@@ -1,6 +1,6 @@
 """What a reader of a fit must know beside its numbers."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +17,13 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
-from exfit.plants import BREAKER, GOVERNOR, NETWORK, REFERENCES, SPEED, acts_without_load
+from exfit.plants import REFERENCES
 from exfit.results.comparisons import Comparison
-from exfit.results.intervals.typical_values import typical_values_used
-from exfit.simulation.inputs import Inputs
-from exfit.simulation.limit_hits import limiter_actions
-from exfit.simulation.simulator import Response, Simulator
-from exfit.verdict.causes.rest import INVISIBLE, other_levels, unsteady_signals
-from exfit.verdict.causes.run_quality import (
+from exfit.verdict.run_quality import (
+    INVISIBLE,
     LARGEST_STEP_ERROR,
-    step_error_notes,
-    switching_notes,
+    typical_notes,
+    unphysical_notes,
     unstable_rest_notes,
     voltage_notes,
 )
@@ -35,7 +31,6 @@ from exfit.verdict.causes.run_quality import (
 Array = NDArray[np.float64]
 
 COARSE = 0.2  # of the error of the fit: what halving the step may move
-GOVERNOR_ACTS = 0.2  # s after a load rejection: until then the mechanical power stays
 NEAR_MINIMUM = 0.1  # standard errors: what errors and intervals in two digits do not show
 
 
@@ -151,27 +146,6 @@ def search_range_notes(case: Case) -> Iterator[str]:
         )
 
 
-def unphysical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield the values that lie outside the range of their data sheet."""
-    for name, row in case.rows().items():
-        if not row.is_physical(values[name]):
-            text = f"{name} = {values[name]:.4g} is not physical"
-            yield f"{text}: its data sheet's range is {row.physical_range}"
-
-
-def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield which of the values that act are typical: marked as such, or left out of the case."""
-    used = typical_values_used(case)
-    typical = {name: value for name, value in used.items() if values[name] == value}
-    for part in case.parts.all:
-        names = [symbol for symbol in part.symbols if part.prefix + symbol in typical]
-        if names and part.kind != "network":
-            listed = ", ".join(f"{symbol} {typical[part.prefix + symbol]:g}" for symbol in names)
-            yield f"typical values taken for {part.name}: {listed}"
-    for name in idle_models(case):
-        yield f"{name} does not act: the breaker is open"
-
-
 def diagram_notes(case: Case) -> Iterator[str]:
     """Yield what is not settled about the diagrams of the models of a case."""
     parts = case.parts
@@ -179,58 +153,3 @@ def diagram_notes(case: Case) -> Iterator[str]:
     for model in (parts.exciter, parts.stabiliser, parts.governor, *limiters):
         if model is not None and model.doubt:
             yield f"{model.name} {model.doubt}"
-
-
-def idle_models(case: Case) -> list[str]:
-    """Return the models of a case that do nothing without load, where no test has one."""
-    if case.on_load or case.kind.plays_back:
-        return []
-    added = [case.parts.stabiliser, case.parts.governor]
-    added += [at.model for at in case.parts.limiters if not acts_without_load(at)]
-    return [model.name for model in added if model is not None]
-
-
-def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str]:
-    """Yield how long a simulated speed holds for which a breaker has opened under power."""
-    opened = [step.at for step in inputs.steps if step.signal == BREAKER]
-    power = parameters.get(f"{NETWORK}P", 0.0)
-    governed = any(name.startswith(GOVERNOR) for name in parameters)
-    if not opened or power == 0.0 or SPEED in inputs.recorded or governed:
-        return
-    until = opened[0] + GOVERNOR_ACTS
-    if inputs.end > until:
-        yield (
-            f"from {opened[0]:.6g} s on the speed, and vt with it, is that of constant mechanical "
-            f"power, {power:g} pu, which holds for some {GOVERNOR_ACTS:g} s: record the speed, or "
-            f"end the window at {until:.4g} s"
-        )
-
-
-def simulation_notes(
-    case: Case, simulator: Simulator, values: Mapping[str, float], response: Response
-) -> Iterator[str]:
-    """Yield what a reader of a simulated response must know: its values, and whether it holds.
-
-    ``values`` are those of the case, and of what the test has of its own.
-    """
-    yield from typical_notes(case, values)
-    yield from unphysical_notes(case, values)
-    yield from speed_notes(simulator.inputs, values)
-    yield from (action.sentence for action in limiter_actions(simulator, values))
-    yield from unstable_rest_notes(simulator, values)
-    yield from step_error_notes(case, simulator, values, response.signals)
-    yield from voltage_notes(case, response.time, response.signals.get("vt"))
-    delta = response.signals.get("delta")
-    if delta is not None and np.max(np.abs(delta)) > np.pi:
-        at = float(response.time[np.argmax(np.abs(delta) > np.pi)])
-        yield f"the machine falls out of step at {at:.3g} s: delta passes half a turn"
-
-
-def rest_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
-    """Yield where the steady part of a record contradicts the case, and what is left out of it."""
-    yield from switching_notes(setup)
-    test = setup.test
-    if test.steady is not None and test.begin is None:
-        causes = unsteady_signals(setup.record, test.steady, setup.channels)
-        yield from (cause.sentence for cause in causes)
-        yield from (cause.sentence for cause in other_levels(comparison, test.steady))

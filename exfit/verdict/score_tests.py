@@ -17,7 +17,7 @@ from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
-from exfit.results.intervals.typical_values import parameters_of
+from exfit.results.typical_values import parameters_of
 from exfit.results.verdict import REJECTED, Cause
 from exfit.simulation.inputs import InputStep
 from exfit.verdict.causes import Evidence

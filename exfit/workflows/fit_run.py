@@ -16,9 +16,9 @@ from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.intervals.minima import minima_notes, minima_of
 from exfit.results.model import FitResult, Iteration
 from exfit.util.versions import versions
-from exfit.verdict import verdict_of
 from exfit.verdict.causes import Pace
 from exfit.verdict.causes.pace import time_for_causes
+from exfit.verdict.rule import verdict_of
 from exfit.workflows.case_search import SearchTask, search_outcome, with_lines
 from exfit.workflows.descriptions.case_description import (
     criteria_of,

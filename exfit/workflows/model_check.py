@@ -20,8 +20,8 @@ from exfit.signals import OF_FLAT_RUN
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Simulator
 from exfit.verdict.causes.before_fit import case_warnings, event_warnings, record_warnings
-from exfit.verdict.causes.run_quality import unstable_rest_notes
-from exfit.verdict.diagnostics import diagram_notes, search_range_notes, typical_notes
+from exfit.verdict.diagnostics import diagram_notes, search_range_notes
+from exfit.verdict.run_quality import typical_notes, unstable_rest_notes
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

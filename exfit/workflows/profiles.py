@@ -34,9 +34,9 @@ from exfit.results.intervals.profile_hull import (
 )
 from exfit.results.verdict import Verdict
 from exfit.util.text import error_of_interval, near, rounded_value
-from exfit.verdict import verdict_alone
 from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.diagnostics import search_range_notes
+from exfit.verdict.rule import verdict_alone
 from exfit.workflows.case_search import SearchTask, weighed_search, with_lines
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from exfit.fitting.setup import with_enough_substeps
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.simulation.simulator import Response
-from exfit.verdict.diagnostics import rest_notes, simulation_notes
+from exfit.verdict.run_quality import rest_notes, simulation_notes
 
 
 @dataclass(frozen=True)

@@ -41,14 +41,8 @@ from exfit.results.recorder_averages import RecorderAverages
 from exfit.results.typical_values import TypicalValue, by_weight
 from exfit.results.windows import WindowSpread
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
-from exfit.verdict.causes.run_quality import switching_notes
-from exfit.verdict.diagnostics import (
-    notes,
-    outlier_notes,
-    reference_notes,
-    speed_notes,
-    tolerance_notes,
-)
+from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tolerance_notes
+from exfit.verdict.run_quality import speed_notes, switching_notes
 from exfit.workflows.behaviour import behaviour_of
 from exfit.workflows.given_values import given_value_notes
 from exfit.workflows.iteration_responses import skipped_response_notes, with_iteration_responses

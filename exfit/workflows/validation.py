@@ -28,11 +28,11 @@ from exfit.results.comparisons import Comparison, ValidatedStep
 from exfit.results.description import OtherProgram
 from exfit.util.file_names import folded
 from exfit.verdict.causes.before_fit import causes_before_fit
-from exfit.verdict.causes.rest import unsteady_signals
-from exfit.verdict.causes.run_quality import (
+from exfit.verdict.run_quality import (
     step_error_notes,
     switching_notes,
     unstable_rest_notes,
+    unsteady_signals,
     voltage_notes,
 )
 from exfit.workflows.given_values import ValuesOrResult, changes_of
@@ -82,7 +82,7 @@ class Validation(NamedTuple):
 
 def validate(
     case: Case,
-    values: ValuesOrResult | None,
+    values: "ValuesOrResult | None",
     record: Record | Path | str | None,
     step: float | Sequence[float],
     at: float | Sequence[float],
@@ -131,7 +131,7 @@ def _compared(
 
 
 def _with_values(
-    case: Case, values: ValuesOrResult | None
+    case: Case, values: "ValuesOrResult | None"
 ) -> tuple[Case, Values, tuple[Recording, ...]]:
     """Return the case whose model the values are of, all values, and what a fit saw of its records.
 

@@ -13,7 +13,7 @@ from exfit.plants import BREAKER
 from exfit.results.io import load_result
 from exfit.show.run_folder import write_fit
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.verdict.diagnostics import speed_notes, typical_notes
+from exfit.verdict.run_quality import speed_notes, typical_notes
 from exfit.workflows import fit, simulate
 
 TRUTH = {"governor.R": 0.05, "governor.T1": 0.5, "governor.T3": 8.0}

@@ -13,7 +13,7 @@ from exfit.fitting.input_steps import input_steps
 from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.fitting.system import inputs_of, system_of
 from exfit.show.run_folder import PARAMETERS, write_fit
-from exfit.verdict.diagnostics import typical_notes
+from exfit.verdict.run_quality import typical_notes
 from exfit.workflows import fit, simulate
 
 ON_LOAD = """\

@@ -7,9 +7,14 @@ from exfit.features.design import files as design
 from exfit.features.rank import files as rank
 from exfit.features.report.writing import PAGE, PRINT
 from exfit.features.translate import files as translate
-from exfit.results.io import WHOLE_PROGRAMME
 from exfit.show import run_folder
-from exfit.util.file_names import OWN_NAMES, files_named_after, taken_names, unusable
+from exfit.util.file_names import (
+    OWN_NAMES,
+    WHOLE_PROGRAMME,
+    files_named_after,
+    taken_names,
+    unusable,
+)
 
 
 @pytest.mark.parametrize(

@@ -24,9 +24,10 @@ from exfit.features.compare.curves import (
 )
 from exfit.features.compare.differences import Difference, differences
 from exfit.results.comparisons import judged_of
-from exfit.results.io import WHOLE_FIT, load_result
+from exfit.results.io import load_result
 from exfit.results.model import FitResult
 from exfit.signals import COMPARED
+from exfit.util.file_names import WHOLE_FIT
 from exfit.util.typed import plain
 
 Array = NDArray[np.float64]

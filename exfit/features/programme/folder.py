@@ -10,12 +10,12 @@ from exfit.features.programme.kept import summary_text, text_of
 from exfit.features.programme.result import FinishedTest, ProgrammeResult
 from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.features.programme.steady.v_curve_result import VCurve
-from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.results.model import FitResult
 from exfit.results.tables import table
 from exfit.show import run_folder
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.signals import TERMINALS
+from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import write, write_together
 
 POINTS = "points.csv"

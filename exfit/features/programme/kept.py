@@ -12,10 +12,11 @@ from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.results.consistency import steady_contradictions
 from exfit.results.description import UnitDescription
-from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME, load_result, result_text
+from exfit.results.io import load_result, result_text
 from exfit.results.model import FitResult
 from exfit.runs import store
 from exfit.runs.store import digest_of
+from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import write
 from exfit.util.json_files import read_json
 from exfit.util.text import show_value, to_json

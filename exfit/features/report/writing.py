@@ -5,14 +5,9 @@ from pathlib import Path
 from exfit.errors import ExfitError
 from exfit.features.report.page import Page, fit_page, html, is_page, page_html, validation_page
 from exfit.features.report.pdf import is_pdf, page_pdf
-from exfit.results.io import (
-    VALIDATION,
-    WHOLE_PROGRAMME,
-    load_result,
-    load_validation,
-    result_file,
-)
+from exfit.results.io import load_result, load_validation, result_file
 from exfit.results.model import FitResult
+from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
 from exfit.util.files import write
 
 __all__ = ["html", "write_report"]

@@ -7,27 +7,13 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.system import system_of
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.intervals.value_shifts import shifts_by_values
-from exfit.results.typical_values import DEVIATION, TypicalValue
-from exfit.simulation.kernels import parameters_used
+from exfit.results.typical_values import DEVIATION, TypicalValue, typical_values_used
 
 Array = NDArray[np.float64]
 
 IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
-
-
-def parameters_of(case: Case) -> set[str]:
-    """Return the parameters that a response of any of the records depends on."""
-    own = [system_of(case.seen_from(recording), recording) for recording in case.recordings]
-    return {name for system in own or [system_of(case)] for name in parameters_used(system)}
-
-
-def typical_values_used(case: Case) -> dict[str, float]:
-    """Return the typical values that a response of any of the records depends on."""
-    used, values = parameters_of(case), case.values()
-    return {name: values[name] for name in case.typical() if name in used}
 
 
 def influence_of_typical_values(

@@ -23,7 +23,7 @@ from exfit.results.comparisons import Overlay
 from exfit.results.verdict import Cause
 from exfit.signals import POSITIVE_AT_REST
 from exfit.util.text import show
-from exfit.verdict.causes.rest import FAR_FROM_BASE, other_levels, unsteady_signals
+from exfit.verdict.run_quality import FAR_FROM_BASE, other_levels, unsteady_signals
 
 Values = Mapping[str, float]
 Array = NDArray[np.float64]

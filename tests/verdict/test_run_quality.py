@@ -7,7 +7,7 @@ import pytest
 from places import CONFIGS
 
 from exfit.case.load import load_case
-from exfit.verdict.causes.run_quality import voltage_notes
+from exfit.verdict.run_quality import voltage_notes
 from exfit.workflows import check, simulate, validate
 
 UNSTABLE = {"KA": 7000.0, "KF": 0.0024}
