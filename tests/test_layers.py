@@ -19,7 +19,7 @@ IN_ORDER = (  # each of the core may import those above it, the leaves nothing
 LEAVES = {"signals", "dsp", "estimate", "inference", "engine"}
 # beside the core, and another feature only as here
 OTHER_FEATURES = {
-    "fleet": {"planner", "report", "start"},
+    "fleet": {"planner", "programme", "report", "start"},
     "planner": {"start", "fleet"},
     "programme": {"report"},
     "rank": set(),

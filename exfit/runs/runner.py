@@ -6,6 +6,16 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 from exfit.errors import ExfitError
 
 
+class FitSettings(NamedTuple):
+    """How cases are fitted, in place of what each says: None for the case's own."""
+
+    strategy: str | None = None
+    search: str | None = None
+
+
+AS_CASES_SAY = FitSettings()
+
+
 class Planned(Protocol):
     """A part of a plan, by a name that no other has: a fit of a case, a test of a programme."""
 

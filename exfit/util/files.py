@@ -182,6 +182,7 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
             _make_folder(folder)
             remove_abandoned(folder)
             for name, content in contents.items():
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 beside[folder / name] = _temporary(folder)
                 _write_new(beside[folder / name], content.encode())
             for temporary in beside.values():

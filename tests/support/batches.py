@@ -10,7 +10,6 @@ from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 
 from exfit.case.peek import files_of
 from exfit.features.fleet.folder import read_fleet
-from exfit.features.fleet.task import run_case
 from exfit.util.typed import plain
 
 NOISE = 1e-3
@@ -60,13 +59,6 @@ class Events:
     def of(self, kind):
         """Return the cases of the events of a kind, without their folders."""
         return [event[1].rpartition("/")[2] for event in self.events if event[0] == kind]
-
-
-def here(cases, begin, end):
-    """Fit cases in this process, as workers do it in theirs."""
-    for case in cases:
-        if begin(case):
-            end(case, run_case(case.task))
 
 
 def troubled(result, folder):

@@ -24,7 +24,7 @@ from exfit.features.fleet.folder import (
     write_entry,
     write_outcome,
 )
-from exfit.features.fleet.local import Compute, local_workers
+from exfit.features.fleet.local import Compute, in_this_process, local_workers
 from exfit.features.fleet.observer import BatchObserver, Unobserved
 from exfit.features.fleet.plan import (
     BatchSettings,
@@ -35,7 +35,8 @@ from exfit.features.fleet.plan import (
     refused_case,
     share_of,
 )
-from exfit.features.fleet.task import FitSettings, FurtherFiles
+from exfit.features.fleet.task import FurtherFiles
+from exfit.runs.runner import FitSettings
 from exfit.util.interrupts import endings_as_interruptions
 from exfit.util.strategies import SEARCHES, STRATEGIES
 from exfit.util.text import near
@@ -72,15 +73,17 @@ def batch(
 ) -> Fleet:
     """Fit many cases in several processes; what the folder has already is not fitted again.
 
-    A case is fitted as ``exfit.fit`` does it, in a worker process with one thread. Its result lies
+    A case is fitted as ``exfit.fit`` does it, in a worker process with one thread, and a programme
+    is run as by ``exfit.run``. Its result lies
     in the folder under a hash of all that goes into it: the case, its records, the code that it
     names, these settings and the version of exfit. A case that fails, crashes or does not end is a
     row with its reason, and the others go on.
 
     Args:
-        cases: case files, and folders with such files in them or below.
+        cases: case files, programmes, and folders with such files in them or below.
         folder: keeps the results; that of an earlier batch is gone on with.
-        workers: processes at work; None: as many as there are processors.
+        workers: processes at work; None: as many as there are processors; 0: none, the cases are
+            fitted in this process, where no time limit ends them.
         scheduler: the address of that of a Dask cluster, whose workers fit the cases in place of
             processes of this computer; the contents of all files travel to them.
         part: (number, of): only every such share of the cases, so that several computers that see
@@ -112,7 +115,9 @@ def batch(
     existing = case_files(map(Path, given), place) if given or not made else ()
     files = share_of(_each_once([*existing, *made], place), share, place)
     settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
-    count = min(workers or processors(), max(1, len(files)))
+    count = min(workers or processors(), max(1, len(files))) if workers != 0 else 1
+    if workers == 0:
+        compute = compute or in_this_process
     run = BatchRun(files, place, settings, observer or Unobserved(), made)
     if scheduler is not None:
         from exfit.features.fleet.dispatch import cluster_workers
@@ -141,8 +146,8 @@ def _refuse(
     faults = []
     if not 1 <= share.number <= share.of:
         faults.append(f"part {share.number}/{share.of}: must be 1/N ... N/N")
-    if workers is not None and workers < 1:
-        faults.append(f"workers: {workers} must be 1 or more")
+    if workers is not None and workers < 0:
+        faults.append(f"workers: {workers} must be 0 or more")
     if not 0.0 < time_limit <= inf:
         faults.append(f"time limit: {time_limit:g} s must be above 0")
     for word, given, known in (("strategy", strategy, STRATEGIES), ("search", search, SEARCHES)):

@@ -45,9 +45,10 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
 )
 @click.option(
     "--workers",
-    type=click.IntRange(min=1),
+    type=click.IntRange(min=0),
     metavar="N",
-    help="Processes at work, with one thread each (default: as many as there are processors).",
+    help="Processes at work, with one thread each (default: as many as there are processors); "
+    "0: in this process, without a time limit.",
 )
 @click.option(
     "--scheduler",
@@ -107,7 +108,7 @@ def batch(
     """Fit all CASES: case files, folders with case files (*.yaml) in them or below, and tables.
 
     A table, CSV or a workbook, lists records with what is known of each; the rows of a unit become
-    a case in DIR/cases, as `exfit new` makes it.
+    a case in DIR/cases, as `exfit new` makes it. A programme is one case: `exfit run` runs it.
 
     Each case is fitted as `exfit fit` does it, in worker processes. Its files lie in a folder of
     DIR that is named after a hash of all that goes into the fit: the case, its records, its model

@@ -1,7 +1,8 @@
 """The folder of a batch: a folder for each fit, an index of the cases, and both read as a fleet.
 
-    <key>/result.json   a fit with its tables: there, and whole, once it is done
-    <key>/summary.json  its row of the table, made again from result.json where it is missing
+    <key>/result.json   a fit with its tables: there, and whole, once it is done; of a programme
+                        programme.json, with a folder for each of its tests
+    <key>/summary.json  its row of the table, made again where it is missing
     <key>/failed.json   in place of both: why there is no fit
     index/<hash>.json   for each case its path, and its key or the reason why it has none
 
@@ -27,6 +28,7 @@ from exfit.util.typed import plain
 
 INDEX, CASES = "index", "cases"
 RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
+WHOLE_PROGRAMME, FIT_OF_PROGRAMME = "programme.json", "fit"
 VERSION = 1  # of a summary; one of another version is made again
 KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
 KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
@@ -64,6 +66,7 @@ class Failure:
 class CaseOutcome:
     """What a worker makes of a case: the files of its fit by name with their summary, or a failure.
 
+    The last file is that by which the fit, or the programme, is known to be done.
     Neither: the case, or a file of it, was changed meanwhile, in the way that ``changed`` says.
     """
 
@@ -101,8 +104,15 @@ class Fleet:
         return case_path(self.folder, case.case)
 
     def folder_of(self, case: CaseSummary) -> Path | None:
-        """Return the folder of the fit of a case; None where there is none."""
+        """Return the folder of the fit, or the programme, of a case; None where there is none."""
         return self.folder / case.key if case.status == "done" else None
+
+    def fit_of(self, case: CaseSummary) -> Path | None:
+        """Return the folder of the fit of a case, that of its bump tests in a programme."""
+        place = self.folder_of(case)
+        if place is not None and (place / WHOLE_PROGRAMME).is_file():
+            return place / FIT_OF_PROGRAMME
+        return place
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the curves as plain data, as ``exfit batch --json`` prints it."""
@@ -130,7 +140,7 @@ def case_path(folder: Path, case: str) -> Path:
 
 def is_done(folder: Path, key: str) -> bool:
     """Return whether the fit of a key is done."""
-    return (folder / key / RESULT).is_file()
+    return any((folder / key / name).is_file() for name in (RESULT, WHOLE_PROGRAMME))
 
 
 def failure_of(folder: Path, key: str) -> Failure | None:
@@ -142,9 +152,8 @@ def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
     """Write what a case came to under its key; raises ExfitError where that is not possible."""
     if outcome.summary is not None:
         summary = text_of(outcome.summary, version=VERSION)
-        files = {name: text for name, text in outcome.files.items() if name != RESULT}
-        contents = {**files, SUMMARY: summary, RESULT: outcome.files[RESULT]}
-        write_together(folder / key, contents, [FAILED])
+        *others, result = outcome.files.items()
+        write_together(folder / key, dict([*others, (SUMMARY, summary), result]), [FAILED])
     elif outcome.failure is not None:
         write(folder / key / FAILED, text_of(outcome.failure))
 
@@ -208,7 +217,7 @@ def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
 def _stamps(folder: Path) -> Iterator[tuple[str, int, int]]:
     for entry in (folder / INDEX).glob("*.json"):
         yield from _stamp(entry)
-    for outcome in (RESULT, FAILED):
+    for outcome in (RESULT, WHOLE_PROGRAMME, FAILED):
         for file in folder.glob(f"*/{outcome}"):
             yield from _stamp(file)
 
@@ -253,6 +262,13 @@ def _summary(folder: Path, key: str) -> CaseSummary:
     summary = read_kept(folder / key / SUMMARY, CaseSummary, version=VERSION)
     if summary is not None:
         return summary
+    if (folder / key / WHOLE_PROGRAMME).is_file():
+        from exfit.features.fleet.programmes import summary_of_programme
+        from exfit.features.programme.kept import load_summary
+
+        programme = load_summary(folder / key)
+        seconds = sum(getattr(each, "seconds", 0.0) for each in programme.results.values())
+        return summary_of_programme(programme, key, seconds)
     from exfit.results.io import load_result
 
     result = load_result(folder / key)

@@ -14,7 +14,8 @@ from exfit.case.yaml import decoded
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.features.fleet.folder import IndexEntry, case_name
 from exfit.features.fleet.summary import CaseStatus, facts_of
-from exfit.features.fleet.task import CODE, CaseTask, FitSettings, FurtherFiles, key_of
+from exfit.features.fleet.task import CODE, CaseTask, FurtherFiles, key_of
+from exfit.runs.runner import FitSettings
 from exfit.util.files import read_regular, refuse_bytes
 from exfit.util.text import dotted
 

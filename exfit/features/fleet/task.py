@@ -6,30 +6,26 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from traceback import extract_tb
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import KEY_DIGITS, CaseOutcome, Failure
+from exfit.features.fleet.programmes import TESTS, run_programme, summary_of_programme
 from exfit.features.fleet.summary import summary_of
 from exfit.runs import store
+from exfit.runs.runner import FitSettings
 from exfit.runs.store import digest_of
 from exfit.util.files import read_regular
 
 if TYPE_CHECKING:
-    from exfit.case.case import Case
+    from exfit.features.programme.result import ProgrammeResult
     from exfit.results.model import FitResult
 
-FurtherFiles = Callable[["FitResult", Path], Iterable[tuple[str, str]]]
+# of a result, and of the folder where it will lie
+FurtherFiles = Callable[["FitResult | ProgrammeResult", Path], Iterable[tuple[str, str]]]
 
 CODE = ".py"
 CHANGED = "changed while the case was fitted: run the batch again"
-
-
-class FitSettings(NamedTuple):
-    """How the cases of a batch are fitted, in place of what each says: None for the case's own."""
-
-    strategy: str | None = None
-    search: str | None = None
 
 
 @dataclass(frozen=True)
@@ -89,40 +85,42 @@ def crash(fault: BaseException, seconds: float = 0.0) -> CaseOutcome:
 
 
 def _outcome(task: CaseTask, began: float) -> CaseOutcome:
-    """Return what becomes of a case; raises ExfitError where it cannot be fitted."""
-    from exfit import workflows
-    from exfit.results.fit_files import files_of_fit
-
-    case = _case_of(task)
-    if case is None:
-        return CaseOutcome(changed=CHANGED)
-    result = workflows.fit(case, task.settings.strategy, search=task.settings.search)
-    files = dict(files_of_fit(result))
-    for further in task.further:
-        files |= further(result, task.folder)
-    if key_of(task.files, task.settings) != task.key:
-        return CaseOutcome(changed=CHANGED)
-    return CaseOutcome(files, summary_of(result, task.key, _seconds(began)))
-
-
-def _case_of(task: CaseTask) -> "Case | None":
-    """Return the case of a task; None where a file of it is another than when it got its key.
+    """Fit a case, or run a programme; raises ExfitError where that is not possible.
 
     What is run is what the key was made of, code that the case names too.
     """
+    from exfit import workflows
     from exfit.case.load import parse_case
+    from exfit.case.peek import content_of
     from exfit.case.yaml import decoded
+    from exfit.results.fit_files import files_of_fit
 
-    path = task.files[0]
+    path, settings = task.files[0], task.settings
     try:
         data = read_regular(path)
     except OSError:
-        return None
+        return CaseOutcome(changed=CHANGED)
     digests = [hashlib.sha256(data).hexdigest(), *map(digest_of, task.files[1:])]
-    if _key(digests, task.settings) != task.key:
-        return None
-    code = (digest for file, digest in zip(task.files, digests, strict=True) if file.suffix == CODE)
-    return parse_case(decoded(data, path), path, next(code, None) or "")
+    if _key(digests, settings) != task.key:
+        return CaseOutcome(changed=CHANGED)
+    text = decoded(data, path)
+    result: FitResult | ProgrammeResult
+    if TESTS in content_of(text, path):
+        result, files = run_programme(path, *settings)
+        summary = summary_of_programme(result, task.key, _seconds(began))
+    else:
+        hashes = zip(task.files, digests, strict=True)
+        code = next((digest for file, digest in hashes if file.suffix == CODE), None)
+        case = parse_case(text, path, code or "")
+        result = workflows.fit(case, settings.strategy, search=settings.search)
+        if result.interrupted:
+            raise KeyboardInterrupt
+        files = dict(files_of_fit(result))
+        summary = summary_of(result, task.key, _seconds(began))
+    made = dict(entry for further in task.further for entry in further(result, task.folder))
+    if key_of(task.files, settings) != task.key:
+        return CaseOutcome(changed=CHANGED)
+    return CaseOutcome({**made, **files}, summary)
 
 
 def _key(digests: Sequence[str | None], settings: FitSettings) -> str:

@@ -164,7 +164,7 @@ def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
 
     fits, others = list[FittedUnit](), list[LeftUnit]()
     for case in fleet.cases:
-        folder = fleet.folder_of(case)
+        folder = fleet.fit_of(case)
         if folder is None:
             if case.status != "no record":
                 others.append(LeftUnit(case.name, f"{case.status}: {case.reason}", False))

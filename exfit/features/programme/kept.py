@@ -15,6 +15,7 @@ from exfit.results.description import UnitDescription
 from exfit.results.io import load_result, result_text
 from exfit.results.model import FitResult
 from exfit.runs import store
+from exfit.runs.runner import AS_CASES_SAY, FitSettings
 from exfit.runs.store import digest_of
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import write
@@ -57,7 +58,12 @@ class KeptSummary:
 Keep = Callable[[FinishedTest, Path], None]
 
 
-def key_of(step: ProgrammeStep, programme: Programme, values: tuple[EnteredValue, ...]) -> str:
+def key_of(
+    step: ProgrammeStep,
+    programme: Programme,
+    values: tuple[EnteredValue, ...],
+    settings: FitSettings = AS_CASES_SAY,
+) -> str:
     """Return the SHA-256 of all that goes into a test: its section, its files, values, exfit.
 
     ``values`` are those that the tests before gave.
@@ -68,7 +74,9 @@ def key_of(step: ProgrammeStep, programme: Programme, values: tuple[EnteredValue
         if value.entered
     }
     files = [digest_of(path) for path in programme.files_of(step.name)]
-    return store.key_of(files, content=programme.content_of(step.name), values=entered)
+    given = {name: value for name, value in settings._asdict().items() if value is not None}
+    content = programme.content_of(step.name)
+    return store.key_of(files, content=content, values=entered, **given)
 
 
 def result_kept(step: ProgrammeStep, key: str, folder: Path) -> StepResult | None:

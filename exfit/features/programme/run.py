@@ -29,7 +29,7 @@ from exfit.plants import MACHINE
 from exfit.records.reading import file_hash
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, Iteration
-from exfit.runs.runner import run_in_turn
+from exfit.runs.runner import AS_CASES_SAY, FitSettings, run_in_turn
 from exfit.workflows.descriptions.case_description import parts_of
 
 Progress = Iteration | estimate.Progress
@@ -43,6 +43,8 @@ def run(
     progress: Callable[[ProgrammeStep, Progress | None], None] = lambda *_: None,
     finished: Callable[[FinishedTest], None] = lambda _: None,
     keep: Keep = keep,
+    strategy: str | None = None,
+    search: str | None = None,
 ) -> ProgrammeResult:
     """Run the tests of a programme in the order in which one feeds the next.
 
@@ -60,6 +62,8 @@ def run(
             further starts is; None as it begins.
         finished: called with every test that has ended.
         keep: writes the result of a test into the folder.
+        strategy: of the descent of each fit; None: the programme's own.
+        search: "global" or "local"; None: the programme's own.
 
     A KeyboardInterrupt ends the run: the result has the tests that were done, and the best point of
     the fit that was running, which is not kept as done. A test that fails keeps no other from
@@ -77,7 +81,9 @@ def run(
 
     def finished_step(step: ProgrammeStep) -> FinishedTest:
         kept = None if again else place
-        test = finished_test(programme, step, tuple(values), kept, progress)
+        test = finished_test(
+            programme, step, tuple(values), kept, progress, FitSettings(strategy, search)
+        )
         if place is not None:
             keep(test, place)
         values.extend(values_given(test, programme))
@@ -141,16 +147,17 @@ def finished_test(
     values: Values,
     folder: Path | None,
     progress: Callable[[ProgrammeStep, Progress | None], None] = lambda *_: None,
+    settings: FitSettings = AS_CASES_SAY,
 ) -> FinishedTest:
     """Return a test with its result: the one that is kept in a folder, or else that of a run."""
     programme = programme.with_bases(bases_of(values))
-    key = key_of(step, programme, values)
+    key = key_of(step, programme, values, settings)
     kept = None if folder is None else result_kept(step, key, folder)
     if kept is not None:
         result = _as_it_is_now(kept, programme)
         return FinishedTest(step.name, step.kind, step.tests, key, result, kept=True)
     progress(step, None)
-    result = _result_of(programme, step, values, partial(progress, step))
+    result = _result_of(programme, step, values, partial(progress, step), settings)
     if isinstance(result, FitResult) and not result.interrupted:
         result = replace(
             result,
@@ -165,6 +172,7 @@ def _result_of(
     step: ProgrammeStep,
     values: Values,
     progress: Callable[[Progress | None], None],
+    settings: FitSettings,
 ) -> StepResult:
     section = None if step.name == FIT else programme.test(step.name)
     shared = programme.shared_case()
@@ -179,7 +187,7 @@ def _result_of(
         points = points_of(section, programme.folder)
         return steady(section, points, machine, data, std_errors)
     case = with_values(case_of(programme, step), values)
-    return workflows.fit(case, progress=progress, search_progress=progress)
+    return workflows.fit(case, settings.strategy, progress, progress, search=settings.search)
 
 
 def _as_it_is_now(result: StepResult, programme: Programme) -> StepResult:

@@ -5,14 +5,19 @@ import signal
 from pathlib import Path
 
 import pytest
-from batches import Events, case_file, here, record_file, table_of, troubled
+from batches import Events, case_file, record_file, table_of, troubled
+from programmes import programme_content, written
 from tiers import few_of
 
 import exfit
 from exfit.errors import ExfitError
 from exfit.features.fleet.batch import tables_of
 from exfit.features.fleet.folder import CaseOutcome, write_outcome
+from exfit.features.fleet.local import in_this_process as here
+from exfit.features.fleet.table_files import report_file
 from exfit.features.fleet.task import CHANGED
+from exfit.features.programme.kept import load_summary
+from exfit.util.typed import plain
 
 NAMES = ("a", "b", "c", "d")
 
@@ -222,7 +227,7 @@ def test_a_crash_is_a_row(cases, tmp_path):
     ("settings", "message"),
     [
         ({"part": (4, 3)}, "part 4/3: must be 1/N ... N/N"),
-        ({"workers": 0}, "workers: 0 must be 1 or more"),
+        ({"workers": -1}, "workers: -1 must be 0 or more"),
         ({"time_limit": 0.0}, "time limit: 0 s must be above 0"),
         ({"time_limit": float("nan")}, "time limit"),
         ({"strategy": "newton"}, "strategy: newton"),
@@ -240,3 +245,38 @@ def test_a_folder_that_cannot_be_written_is_refused(cases):
     Path("fleet").write_text("")
     with pytest.raises(ExfitError, match="cannot be written"):
         run()
+
+
+@pytest.mark.long
+def test_a_programme_is_a_row_with_the_files_of_all_its_tests(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = written(programme_content(), tmp_path)
+    fleet, events = run(str(file), further=(report_file,))
+    alone = exfit.run(file, "alone")
+    (row,) = fleet.cases
+    assert (row.status, row.verdict, row.holds) == ("done", "good", alone.holds)
+    place = fleet.folder_of(row)
+    assert load_summary(place).fit.values == alone.fit.values
+    assert exfit.load_result(fleet.fit_of(row)).cost == alone.fit.cost
+    assert "Test programme" in (place / "report.html").read_text(encoding="utf-8")
+    assert row.parameters["machine.S12"].fitted
+    assert row.parameters["KPR"].value == alone.fit.values["KPR"]
+    _, events = run(str(file))
+    assert (events.of("started"), events.of("kept")) == ([], ["unit.yaml"])
+    (place / "summary.json").unlink()
+    assert table_of("fleet") == [{**plain(row, whole=True), "seconds": None}]
+
+
+@pytest.mark.long
+def test_a_programme_of_which_a_test_fails_has_failed_with_its_reason(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    content = programme_content()
+    content["tests"][0]["file"] = str(tmp_path / "gone.csv")
+    fleet, _ = run(str(written(content, tmp_path)))
+    assert fleet.cases[0].status == "failed"
+    assert "gone.csv" in fleet.cases[0].reason
+
+
+def test_without_workers_a_batch_fits_in_this_process(cases):
+    fleet = exfit.batch(cases, "fleet", workers=0)
+    assert [case.status for case in fleet.cases] == ["done"] * len(NAMES)

@@ -6,9 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from batches import case_file, here, record_file
+from batches import case_file, record_file
 
 from exfit.features.fleet import batch as batches
+from exfit.features.fleet.local import in_this_process as here
 
 
 @pytest.fixture(autouse=True)

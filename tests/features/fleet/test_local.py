@@ -7,13 +7,14 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from batches import Events, case_file, here, record_file, table_of, troubled
+from batches import Events, case_file, record_file, table_of, troubled
 
 import exfit
 from exfit.errors import ExfitError
 from exfit.features.fleet import processes
 from exfit.features.fleet.folder import IndexEntry
 from exfit.features.fleet.local import Waiting
+from exfit.features.fleet.local import in_this_process as here
 from exfit.features.fleet.plan import PlannedCase
 from exfit.features.fleet.task import CaseTask
 

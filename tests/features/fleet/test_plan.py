@@ -8,7 +8,7 @@ from tiers import few_of
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.plan import BatchSettings, Share, case_files, planned_case, share_of
-from exfit.features.fleet.task import FitSettings
+from exfit.runs.runner import FitSettings
 
 SETTINGS = BatchSettings(FitSettings(search="local"))
 

@@ -7,8 +7,9 @@ import pytest
 from batches import case_file, files_of_case, record_file
 
 import exfit
-from exfit.features.fleet.task import CHANGED, CaseTask, FitSettings, key_of, run_case
+from exfit.features.fleet.task import CHANGED, CaseTask, key_of, run_case
 from exfit.results.fit_files import files_of_fit
+from exfit.runs.runner import FitSettings
 
 LOCAL = FitSettings(search="local")
 
