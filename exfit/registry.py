@@ -11,6 +11,10 @@ feature is imported before it is used:
     EVENT_DRAFT  lines of a case that a record of an event suggests: its plant, its record
     INPUT_NOISE  of the signals that drive a simulation: to weigh errors by it, to take out its bias
     CAUSES_BEFORE_FIT  causes of a misfit that a record shows before a fit, (case, recording)
+    PROGRAMS  what simulates a case in place of exfit, by the kind of its plant: given the case, a
+              context that provides an `exfit.fitting.program.Program`
+    FAULTS    what contradicts itself in a case, by the kind of its plant: given its content and
+              its parts
     CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of a misfit, by what it looks at
 
 The core asks for plugs here and names no feature.

@@ -156,7 +156,7 @@ class Experiment:
     def _averages(self) -> Averages | None:
         """What short windows of averages show of the simulation, None where that is its samples."""
         filterings = [channel.filtering for channel in self.channels]
-        return averages_of(filterings) if self.simulator.alone else None
+        return averages_of(filterings) if self.simulator.responder.alone else None
 
     @cached_property
     def _reader(self) -> Simulator:

@@ -1,7 +1,7 @@
 """The problem of a fit: its residuals, as functions of all that is free."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from exfit.case.case import Case
 from exfit.dsp.robust_loss import LOSSES
@@ -29,6 +29,13 @@ class FitProblem:
 def problem_of(residuals: Residuals) -> FitProblem:
     """Return both forms of the residuals of all samples."""
     return FitProblem(residuals, compressed(residuals))
+
+
+def with_setups(problem: FitProblem, setups: Sequence[ExperimentSetup]) -> FitProblem:
+    """Make the problem of other tests, without another form."""
+    experiments = [setup.experiment for setup in setups]
+    residuals = replace(problem.residuals, experiments=experiments)
+    return FitProblem(residuals, residuals)
 
 
 def residuals_of(

@@ -13,10 +13,6 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
-from exfit.features.external.program import ExternalProgram
-from exfit.features.external.setups import has_twin, is_external, simulated_by, start_tried
-from exfit.features.external.simulator import QUOTIENT_STEP
-from exfit.features.external.twin_descent import descent_by_twin
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import NO_JUDGE, STAGES, Announce, Judge, no_doubt
 from exfit.fitting.global_search import (
@@ -29,6 +25,7 @@ from exfit.fitting.global_search import (
 )
 from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
+from exfit.fitting.program import Program
 from exfit.fitting.residuals import CENTRAL_STEP, LEAST_NOISE, ONE_SIDED_STEP, Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
@@ -45,8 +42,6 @@ from exfit.util.text import near
 Array = NDArray[np.float64]
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
-PROGRAM_TOLERANCE = 1e-5  # of the cost: no gain that is less is worth a run
-PROGRAM_STEP = 1e-4  # of scaled parameters: no step that is less
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
 ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
 JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {
@@ -58,7 +53,7 @@ JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {
 
 
 def fitted(
-    case: Case, program: ExternalProgram | None = None
+    case: Case, program: Program | None = None
 ) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
     """Return the tests of a case with the records that it is fitted to, and what is made small.
 
@@ -68,10 +63,10 @@ def fitted(
     start = case.values()
     setups = tuple(setup.with_enough_substeps(start) for setup in build_experiments(case, start))
     if program is not None:
-        setups = simulated_by(program, case, setups)
+        setups = program.simulated(setups)
     problem = problem_of(residuals_of(case, setups, start))
     if program is not None:
-        start_tried(case, problem.residuals)
+        program.try_start(problem.residuals)
     refuse_unfit(case, problem)
     return setups, problem
 
@@ -118,15 +113,17 @@ def search(
     counter: SimulationCounter | None = None,
     options: Estimate | None = None,
     judge: Judge | None = None,
+    program: Program | None = None,
 ) -> SearchResult:
     """Return the best point found from the start of a case and, in a global search, from others.
 
     ``counter`` counts the simulations of the search alone; ``options`` are by default the case's.
+    The ``program`` is the one that simulates the records, if there is one.
     The ``judge`` says on which of the minima that the records do not tell apart the validations
     hold, and to strategy auto why an end may not be the one looked for.
     """
     options = options or case.estimate
-    searches = CaseSearches(problem, options, progress, counter)
+    searches = CaseSearches(problem, options, progress, counter, program)
     staged = method == "auto" and judge is not None
     judge = judge or NO_JUDGE
     search_of = local_search if options.search == "local" else global_search
@@ -162,6 +159,7 @@ class CaseSearches:
     options: Estimate
     progress: Callable[[estimate.Progress], None]
     counter: SimulationCounter | None
+    program: Program | None = None
 
     @cached_property
     def residuals(self) -> Residuals:
@@ -176,9 +174,9 @@ class CaseSearches:
 
     def one(self, method: str, announce: Announce) -> estimate.Result:
         """Return the end of a descent from the start of the case."""
-        if self.options.jacobian == "exact" and has_twin(self.residuals):
+        if self.program is not None and self.program.has_twin and self.options.jacobian == "exact":
             by_twin = partial(self._descent, method)
-            return descent_by_twin(self.residuals, by_twin, announce)
+            return self.program.descend(self.residuals, by_twin, announce)
         descent = self._descent(method, estimate.OneByOne(self.residuals, self._jacobian))
         return descent.run(self.residuals.start, announce)
 
@@ -195,23 +193,12 @@ class CaseSearches:
             functions=functions,
             method=method,
             max_iterations=options.most_iterations,
-            jacobian_error=self._jacobian_error,
+            jacobian_error=jacobian_error(options.jacobian, options.difference_step),
             good_enough=_good_enough(options, self.residuals),
             searches=searches_of(options),
             **self._limits,
         )
-        if not is_external(self.residuals):
-            return descent
-        xtol = max(descent.xtol, PROGRAM_STEP)
-        return replace(descent, ftol=PROGRAM_TOLERANCE, xtol=xtol)
-
-    @property
-    def _jacobian_error(self) -> float | None:
-        """The error of the Jacobian, as a share; None where it is exact."""
-        jacobian, step = self.options.jacobian, self.options.difference_step
-        if jacobian == "exact" and is_external(self.residuals) and not has_twin(self.residuals):
-            return jacobian_error("forward", QUOTIENT_STEP)
-        return jacobian_error(jacobian, step)
+        return descent if self.program is None else self.program.coarser(descent)
 
     def refined(self, end: estimate.Result, announce: Announce) -> estimate.Result:
         """Return the descent from an end with the full tolerances of the case."""

@@ -3,6 +3,7 @@
 from collections.abc import Container, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,15 +60,84 @@ class Response:
     substeps: int
 
 
+class Responder(Protocol):
+    """What gives the response of a simulator: the equations of its system, or another program."""
+
+    @property
+    def alone(self) -> bool:
+        """Whether the signals are those of the system, which may be simulated in other ways."""
+
+    def outputs(self, simulator: "Simulator") -> tuple[str, ...]:
+        """Name the outputs of a response for which no others are asked."""
+
+    def confirm(self, simulator: "Simulator", values: Values) -> None:
+        """Raise SimulationError where there is no response though the start is at rest."""
+
+    def samples_of_many(
+        self,
+        simulator: "Simulator",
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        tests: "Sequence[Simulator] | None",
+    ) -> tuple[Array, Counts]:
+        """Simulate as `Simulator.samples_of_many`."""
+
+    def tangents_of_many(
+        self,
+        simulator: "Simulator",
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        directions: Sequence[Sequence[Direction]],
+        tests: "Sequence[Simulator] | None",
+    ) -> tuple[Array, Array, Counts]:
+        """Simulate as `Simulator.tangents_of_many`."""
+
+
+class Equations:
+    """The responder of a simulator by the machine code of its system."""
+
+    alone = True
+
+    def outputs(self, simulator: "Simulator") -> tuple[str, ...]:
+        """Name the outputs of the system."""
+        return simulator.system.outputs
+
+    def confirm(self, simulator: "Simulator", values: Values) -> None:
+        """Accept every start at rest."""
+
+    def samples_of_many(
+        self,
+        simulator: "Simulator",
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        tests: "Sequence[Simulator] | None",
+    ) -> tuple[Array, Counts]:
+        """Simulate as `Simulator.samples_of_many`."""
+        return simulator.samples_by_equations(sets, outputs, tests)
+
+    def tangents_of_many(
+        self,
+        simulator: "Simulator",
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        directions: Sequence[Sequence[Direction]],
+        tests: "Sequence[Simulator] | None",
+    ) -> tuple[Array, Array, Counts]:
+        """Simulate as `Simulator.tangents_of_many`."""
+        return simulator.tangents_by_equations(sets, outputs, directions, tests)
+
+
+EQUATIONS = Equations()
+
+
 class Simulator:
     """Simulates one system through a test's inputs, sampled at ``times`` (M,) in s.
 
     ``step`` (s) is the largest step; where the system is faster, every step is divided, into no
     fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
-    at ``times - delay``: before the start, where all is at rest, and after the end that there.
+    at ``times - delay``: before the start, where all is at rest, and after the end that there. The
+    ``responder`` gives the response at these times; on the grid it is that of the equations.
     """
-
-    alone = True  # its signals are those of its system, which may be simulated in other ways
 
     def __init__(
         self,
@@ -77,9 +147,11 @@ class Simulator:
         step: float,
         least: int = 1,
         delay: float = 0.0,
+        responder: Responder = EQUATIONS,
     ) -> None:
         self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay = step, least, delay
+        self.responder = responder
         self._share = 1.0  # of the inputs
         self._grid = grid_segments(inputs, step)
         # a long record is read on the grid once, whatever else a fit moves
@@ -89,6 +161,12 @@ class Simulator:
         ]
         self._segments = self._segments_of()
         self._sampling: Interpolation | GridPoints = Interpolation(self._grid, times, delay)
+
+    def with_responder(self, responder: Responder) -> "Simulator":
+        """Make the simulator of the same test whose response another responder gives."""
+        result = copy(self)
+        result.responder = responder
+        return result
 
     def with_inputs(self, steps: tuple[InputStep, ...], delay: float) -> "Simulator":
         """Return the simulator of the same test with other steps and another delay (s).
@@ -126,7 +204,7 @@ class Simulator:
         times = np.concatenate([segment.times for segment in self._grid])
         count = len(times)
         rows = np.arange(count) if points is None else np.linspace(0, count - 1, points).astype(int)
-        result = copy(self)
+        result = self.with_responder(EQUATIONS)
         result.times, result._sampling = times[rows], GridPoints(rows)
         return result
 
@@ -136,7 +214,7 @@ class Simulator:
         It simulates a small share of them, so that no limit is met, and enlarges how the response
         deviates from the rest.
         """
-        result = copy(self)
+        result = self.with_responder(EQUATIONS)
         result.least, result._share = 1, SMALL_SHARE
         result._segments = result._segments_of()
         return result
@@ -163,7 +241,12 @@ class Simulator:
         parts = int(self._substeps_of_many(p)[0])
         if parts == NO_SUBSTEPS:
             raise why_unreachable(self.system, self.step, values, p[0])
+        self.responder.confirm(self, values)
         return parts
+
+    def substeps_of_many(self, sets: Sequence[Values]) -> Counts:
+        """Find the sub-steps of sets of values (K,), NO_SUBSTEPS where there is no rest."""
+        return self._substeps_of_many(self._vectors(sets))
 
     def rates_at_rest(self, values: Values) -> ComplexArray:
         """Return the eigenvalues (1/s) of the system at rest, zero for a state that stays put.
@@ -200,7 +283,8 @@ class Simulator:
             parts, required = simulator.substeps_along(values)
             if required <= parts:
                 break
-            simulator = self._with(self.step, required)
+            test = self.system, self.inputs, self.times, self.step
+            simulator = Simulator(*test, required, self.delay, self.responder)
         return simulator
 
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
@@ -224,8 +308,8 @@ class Simulator:
         return dict(zip(outputs, map(float, moved), strict=True))
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
-        """Return the outputs (all of the system's by default) at the sample times."""
-        wanted = self.system.outputs if outputs is None else tuple(outputs)
+        """Simulate the outputs (those of the responder by default) at the sample times."""
+        wanted = self.responder.outputs(self) if outputs is None else tuple(outputs)
         samples, parts = self.samples(values, wanted)
         return Response(self.times, dict(zip(wanted, samples.T, strict=True)), parts)
 
@@ -271,6 +355,15 @@ class Simulator:
         are not all the same. A set without a start at rest has outputs that are no numbers, and
         NO_SUBSTEPS sub-steps; the others are what they are alone.
         """
+        return self.responder.samples_of_many(self, sets, outputs, tests)
+
+    def samples_by_equations(
+        self,
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        tests: "Sequence[Simulator] | None" = None,
+    ) -> tuple[Array, Counts]:
+        """Simulate as `samples_of_many`, by the equations of the system."""
         p = self._vectors(sets)
         parts = self._substeps_of_many(p)
         courses = [test.course() for test in tests or [self]]
@@ -307,6 +400,16 @@ class Simulator:
 
         Each set has its own N directions; all else is as in ``samples_of_many``.
         """
+        return self.responder.tangents_of_many(self, sets, outputs, directions, tests)
+
+    def tangents_by_equations(
+        self,
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        directions: Sequence[Sequence[Direction]],
+        tests: "Sequence[Simulator] | None" = None,
+    ) -> tuple[Array, Array, Counts]:
+        """Simulate as `tangents_of_many`, by the equations of the system."""
         p = self._vectors(sets)
         parts = self._substeps_of_many(p)
         reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
@@ -349,9 +452,6 @@ class Simulator:
         """Return the machine code whose derivatives cover what moves."""
         width = DIRECTIONS if len(moves.columns) <= DIRECTIONS else 2 * DIRECTIONS
         return tangent_kernel(self.system, outputs, moves.free, moves.moving, width)
-
-    def _with(self, step: float, least: int) -> "Simulator":
-        return Simulator(self.system, self.inputs, self.times, step, least, self.delay)
 
     def _segments_of(self, changed: Container[str] | None = None) -> list[Segment]:
         """Return the inputs at the grid points of each segment, (n + 1, nu).

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from exfit.case import load
 from exfit.case.case import Case
 from exfit.case.load import CaseOrPath
+from exfit.errors import CaseError
 
 if TYPE_CHECKING:
     from exfit import estimate
@@ -60,7 +61,7 @@ def fit(
         >>> result = exfit.fit("case.yaml", progress=lambda iteration: print(iteration.cost))
         >>> result.parameters["KA"].value
     """
-    from exfit.features.external.setups import program_of
+    from exfit.fitting.program import program_of
     from exfit.fitting.search import checked_strategy, search_options
     from exfit.workflows.fit_run import FitRequest, fit_result
     from exfit.workflows.given_values import with_values
@@ -125,7 +126,7 @@ def loaded(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> Case:
 
     So is the program that simulates it.
     """
-    from exfit.features.external.program_files import refuse_changed_program
+    from exfit.case.program_files import refuse_changed_program
 
     hashes = getattr(values, "inputs", {})
     if not isinstance(case, Case):
@@ -147,7 +148,7 @@ def simulate(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> "Simul
     Example:
         >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
-    from exfit.features.external.setups import program_of
+    from exfit.fitting.program import program_of
     from exfit.fitting.system import values_of
     from exfit.workflows import simulation
     from exfit.workflows.given_values import changes_of
@@ -184,7 +185,7 @@ def validate(
         >>> [match.rmse for match in exfit.validate("case.yaml", result)]
         >>> exfit.validate("case.yaml", result, "down.csv")[-1].accepted
     """
-    from exfit.features.external.setups import program_of
+    from exfit.fitting.program import program_of
     from exfit.workflows import validation
 
     case = loaded(case, values)
@@ -205,7 +206,7 @@ def validation_result(
     Without ``values`` they are those of the model as found, or else the start values: no record was
     fitted then. ``sources`` says where values come from that are given by name.
     """
-    from exfit.features.external.setups import program_of
+    from exfit.fitting.program import program_of
     from exfit.results.model import FitResult
     from exfit.util.versions import versions
     from exfit.workflows import validation
@@ -216,7 +217,7 @@ def validation_result(
     case = loaded(case, values)
     with program_of(case) as program:  # it runs the model as found, too
         compared = validation.validate(case, values, record, step, at, program)
-        return validation_result(compared, versions(), sources or {})
+        return validation_result(compared, versions(), sources or {}, program)
 
 
 def profile(
@@ -238,7 +239,7 @@ def profile(
         >>> for profile in exfit.profile("case.yaml", ["KA"]).profiles:
         ...     print(profile.name, profile.low, profile.high)
     """
-    from exfit.features.external.setups import program_of
+    from exfit.fitting.program import program_of
     from exfit.workflows import profiles
 
     names = [names] if isinstance(names, str) else names
@@ -261,10 +262,11 @@ def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Des
         >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
     """
     from exfit.features.design import experiment_design
-    from exfit.features.external.setups import refuse_without_equations
 
     case = loaded(case)
-    refuse_without_equations(case, "identify")
+    if case.has_no_equations:
+        text = "plant.twin: missing; identify needs the equations of a plant of exfit"
+        raise CaseError([f"{case.path}: {text}"])
     return experiment_design.identify(case, noise or {})
 
 
@@ -276,6 +278,9 @@ def check(case: CaseOrPath) -> "Check":
     Example:
         >>> exfit.workflows.check("case.yaml").agrees
     """
+    from exfit.fitting.program import program_of
     from exfit.workflows import model_check
 
-    return model_check.check(loaded(case))
+    case = loaded(case)
+    with program_of(case) as program:
+        return model_check.check(case, program)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
-from exfit.features.external.setups import settled, with_setups
 from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
 from exfit.fitting.descents import Announce
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.nuisances.found_lines import with_found_lines
-from exfit.fitting.problem import FitProblem, problem_of, residuals_of
+from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
+from exfit.fitting.program import Program
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
@@ -47,6 +47,7 @@ class SearchTask(NamedTuple):
     method: str
     options: Estimate
     counter: SimulationCounter
+    program: Program | None = None
 
 
 class SearchOutcome(NamedTuple):
@@ -69,13 +70,14 @@ def search_outcome(
     options, counter = task.options, task.counter
     problem, found = weighed_search(task, problem, announce, progress)
     setups, unseen = as_fitted(task.setups, problem), task.unseen
-    if task.case.external is not None:
+    if task.program is not None:
         values = problem.residuals.values(found.best.x)
-        setups, unseen = settled(setups, values, problem.residuals), settled(unseen, values)
+        setups = task.program.settled(setups, values, problem.residuals)
+        unseen = task.program.settled(unseen, values)
         problem = with_setups(problem, setups)
     if options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
-    if task.case.external is not None:
+    if task.program is not None:
         determined = determined_by_twin(task, problem, found, setups, progress)
         return SearchOutcome(problem, setups, unseen, found, determined)
     profiled = options.search != "local"
@@ -191,10 +193,10 @@ def _weighted_search(
     task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
 ) -> tuple[FitProblem, SearchResult]:
     def search_of(problem: FitProblem) -> SearchResult:
-        external = task.case.external is not None  # whose runs are too dear to judge its ends
-        judge = None if external else judge_of(task.case, problem, task.setups, task.unseen)
-        return search(
-            task.case, problem, task.method, announce, progress, task.counter, task.options, judge
-        )
+        program, judge = task.program, None
+        if program is None:  # whose runs are too dear to judge its ends
+            judge = judge_of(task.case, problem, task.setups, task.unseen)
+        rest = task.counter, task.options, judge, program
+        return search(task.case, problem, task.method, announce, progress, *rest)
 
     return searched(problem, task.options, search_of, task.counter)

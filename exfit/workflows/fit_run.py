@@ -7,10 +7,8 @@ from typing import NamedTuple
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
-from exfit.features.external.description import other_program_of
-from exfit.features.external.program import ExternalProgram
-from exfit.features.external.setups import LINEAR_ALONE, program_notes, simulated_by
 from exfit.fitting.build import build_experiment
+from exfit.fitting.program import Program
 from exfit.fitting.search import fitted
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.intervals.minima import minima_notes, minima_of
@@ -32,6 +30,7 @@ from exfit.workflows.descriptions.case_description import (
     text_of,
     values_by_part,
 )
+from exfit.workflows.descriptions.other_program import other_program_of
 from exfit.workflows.given_values import given_values
 from exfit.workflows.iteration_responses import LiveResponse, live_response
 from exfit.workflows.solution import (
@@ -43,6 +42,8 @@ from exfit.workflows.solution import (
     iteration_of,
     without_intervals,
 )
+
+LINEAR_ALONE = "no twin: intervals are those of linear theory, by quotients at the result"
 
 
 class FitRequest(NamedTuple):
@@ -56,10 +57,11 @@ class FitRequest(NamedTuple):
     live: Callable[[LiveResponse], None] | None
 
 
-def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResult:
+def fit_result(request: FitRequest, program: Program | None) -> FitResult:
     """Return the result of a fit, simulated by a program where one is given."""
     began = clock.perf_counter()
-    timer = _timer(program)
+    # of the processor, but for a program that runs beside it
+    timer = clock.process_time if program is None else clock.perf_counter
     search_began = timer()
     case, method, options, progress, search_progress, live = request
     start = case.values()
@@ -67,11 +69,11 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
     counter = SimulationCounter()
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
     if program is not None:
-        unseen = simulated_by(program, case, unseen)
+        unseen = program.simulated(unseen)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     hashes, case_text = input_hashes(case, used), text_of(case)
-    task = SearchTask(case, setups, unseen, method, options, counter)
+    task = SearchTask(case, setups, unseen, method, options, counter, program)
     task, problem, line_notes = with_lines(task, problem, search_progress)
     residuals = problem.residuals
 
@@ -89,7 +91,9 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
     values = residuals.values(best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
-    analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
+    analysis = analysed(
+        case, problem, best, determined, fine, comparisons, unseen, program, history
+    )
     walked = problem.compressed if program is None else None
     minima = minima_of(residuals, found, analysis.uncertainty, walked)
     interrupted = analysis.interrupted or found.interrupted
@@ -133,7 +137,7 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
-        simulations=counter.simulations if program is None else program.counts.runs,
+        simulations=counter.simulations if program is None else program.runs,
         substeps=counter.substeps,
         seconds=clock.perf_counter() - began,
         notes=(
@@ -141,7 +145,7 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
             *line_notes,
             *noted,
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
-            *([] if program is None else program_notes(case, program, [*setups, *unseen])),
+            *([] if program is None else program.notes([*setups, *unseen])),
             *([LINEAR_ALONE] if case.has_no_equations else []),
             *filter(None, [pace.sentence]),
         ),
@@ -163,8 +167,3 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
         criteria=criteria_of(case),
         other_program=other_program_of(case, program, [*setups, *unseen]),
     )
-
-
-def _timer(program: ExternalProgram | None) -> Callable[[], float]:
-    """Return the clock of a fit: of its processor, but for a program that runs beside it."""
-    return clock.process_time if program is None else clock.perf_counter

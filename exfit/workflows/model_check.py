@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import ExfitError
-from exfit.features.external.fmu_setups import own_value_notes
-from exfit.features.external.setups import differences_of_program
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.problem import free_parameters
+from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.models.blocks import SHORTEST
@@ -69,7 +68,7 @@ class Check:
         return self.drift <= FLAT_DRIFT
 
 
-def check(case: Case) -> Check:
+def check(case: Case, program: Program | None = None) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     of_events = tuple(event_warnings(case))
     if case.recordings:
@@ -103,13 +102,13 @@ def check(case: Case) -> Check:
             *typical_notes(case, case.values()),
             *diagram_notes(case),
             *search_range_notes(case),
-            *own_value_notes(case),
+            *(() if program is None else program.own_value_notes()),
             *(note for setup in setups for note in setup.record.notes),
             *dict.fromkeys(_rest_notes(experiments, values)),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
         has_equations=not case.has_no_equations,
-        from_program=differences_of_program(case, setups, values),
+        from_program={} if program is None else program.deviations(setups, values),
     )
 
 

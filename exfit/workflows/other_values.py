@@ -11,8 +11,8 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.case.schema import AsFoundSection
 from exfit.errors import CaseError, SimulationError
-from exfit.features.external.setups import run_by_program
 from exfit.fitting.build import build_experiment
+from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
@@ -65,7 +65,9 @@ def phase_ends(
         )
 
 
-def as_found_of(case: Case, tests: Sequence[tuple[ExperimentSetup, Values]]) -> AsFound:
+def as_found_of(
+    case: Case, tests: Sequence[tuple[ExperimentSetup, Values]], program: Program | None = None
+) -> AsFound:
     """Return the model before the test, which the case states or starts from, and its responses.
 
     ``tests`` are all tests with what was found about their records among the values: step
@@ -82,7 +84,7 @@ def as_found_of(case: Case, tests: Sequence[tuple[ExperimentSetup, Values]]) -> 
     own = {name: values[name] for name in before.rows()}
     unit = _of_unit(AsFound(source, before.subject, own), section)
     try:
-        comparisons = _comparisons(case, before, values, tests)
+        comparisons = _comparisons(case, before, values, tests, program)
     except (CaseError, SimulationError) as fault:
         return replace(unit, why=str(fault))
     kept = comparisons if unit.is_stated else [_without_samples(match) for match in comparisons]
@@ -121,7 +123,11 @@ def _case_before(case: Case, section: AsFoundSection) -> Case:
 
 
 def _comparisons(
-    case: Case, before: Case, values: Values, tests: Sequence[tuple[ExperimentSetup, Values]]
+    case: Case,
+    before: Case,
+    values: Values,
+    tests: Sequence[tuple[ExperimentSetup, Values]],
+    program: Program | None,
 ) -> list[Comparison]:
     """Return the responses of the model before the test beside all records."""
     recordings = (*case.recordings, *case.validations)
@@ -130,7 +136,8 @@ def _comparisons(
         of_record = {name: value for name, value in fitted.items() if name not in case.rows()}
         at = {**of_record, **values}
         own = setup if before is case else build_experiment(before, recording, at)
-        run_by_program(own, at)
+        if program is not None:
+            program.run(own, at)
         comparisons.append(compare_with_record(own.with_enough_substeps(at), setup.name, at))
     return comparisons
 

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.features.external.program import ExternalProgram
-from exfit.features.external.setups import program_notes, settled, with_setups
 from exfit.fitting.build import build_experiment
 from exfit.fitting.channel_weights import as_fitted
 from exfit.fitting.global_search import SearchResult
-from exfit.fitting.problem import FitProblem
+from exfit.fitting.problem import FitProblem, with_setups
+from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
 from exfit.fitting.setup import ExperimentSetup
@@ -141,7 +140,7 @@ def profile(
     case: Case,
     names: Iterable[str] = (),
     progress: Callable[[estimate.Progress], None] = lambda _: None,
-    program: ExternalProgram | None = None,
+    program: Program | None = None,
 ) -> Profiles:
     """Fit a case and return the profiles of some of its free parameters, all by default.
 
@@ -156,13 +155,15 @@ def profile(
     names = tuple(names)
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
-    setups, problem, found = _found(case, setups, problem, progress)
+    setups, problem, found = _found(case, setups, problem, progress, program)
     x, records = found.best.x, names_of_records(setups)
     uncertainty = uncertainty_at(problem, x, records)
     verdict = _verdict(case, setups, problem, found, uncertainty)
-    by_twin = program is not None and not case.has_no_equations
-    if by_twin:
-        setups, problem = _by_twin(setups, problem, x)
+    by_twin = program is not None and program.has_twin
+    if program is not None and by_twin:
+        values = problem.residuals.values(x)
+        setups = program.settled(as_fitted(setups, problem), values)
+        problem = with_setups(problem, setups)
         uncertainty = uncertainty_at(problem, x, records)
     wanted = _indices(case, problem.residuals, names)
     residuals, others = problem.compressed, other_minima(found)
@@ -187,7 +188,7 @@ def profile(
             *([f"no parameter has an interval: {verdict.misfit}"] if verdict.misfit else []),
             *search_range_notes(case),
             *_notes(found.best, profiles, by_twin),
-            *([] if program is None else program_notes(case, program, setups, "profiles")),
+            *([] if program is None else program.notes(setups, "profiles")),
         ),
         interrupted=profiles.interrupted,
         verdict=verdict,
@@ -229,6 +230,7 @@ def _found(
     setups: tuple[ExperimentSetup, ...],
     problem: FitProblem,
     progress: Callable[[estimate.Progress], None],
+    program: Program | None,
 ) -> tuple[tuple[ExperimentSetup, ...], FitProblem, SearchResult]:
     """Return the tests and the problem of a case as they were searched, and that search.
 
@@ -237,20 +239,13 @@ def _found(
     options = case.estimate.to_the_minimum()
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
     unseen = tuple(build_experiment(case, recording, start) for recording in judged)
-    task = SearchTask(case, setups, unseen, options.strategy, options, SimulationCounter())
+    counter = SimulationCounter()
+    task = SearchTask(case, setups, unseen, options.strategy, options, counter, program)
     task, problem, _ = with_lines(task, problem, progress)
     problem, found = weighed_search(task, problem, lambda _: None, progress)
     if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
         raise KeyboardInterrupt
     return task.setups, problem, found
-
-
-def _by_twin(
-    setups: tuple[ExperimentSetup, ...], problem: FitProblem, x: Array
-) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
-    """Return the tests and the problem of the twin of a program, corrected at a point (N,)."""
-    setups = settled(as_fitted(setups, problem), problem.residuals.values(x))
-    return setups, with_setups(problem, setups)
 
 
 def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:

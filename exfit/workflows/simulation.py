@@ -4,13 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from exfit.case.case import Case
-from exfit.features.external.program import ExternalProgram
-from exfit.features.external.setups import (
-    external_simulator,
-    simulated_by,
-    simulation_by_twin_notes,
-)
 from exfit.fitting.build import build_experiment, plain_simulator
+from exfit.fitting.program import Program
 from exfit.fitting.setup import with_enough_substeps
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
@@ -28,28 +23,29 @@ class SimulationResult:
 
 
 def simulate(
-    case: Case, values: Mapping[str, float], program: ExternalProgram | None
+    case: Case, values: Mapping[str, float], program: Program | None
 ) -> "SimulationResult":
     """Simulate a case at values, by a program where one is given."""
+    before, after = tuple[str, ...](), tuple[str, ...]()
+    comparison = None
     if case.recordings:
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
         if program is not None:
-            (setup,) = simulated_by(program, case, [setup])
-        response = setup.response(values)
-        comparison = compare_with_record(setup, "record", values) if setup.channels else None
-        notes = [] if comparison is None else rest_notes(setup, comparison)
-        at = setup.experiment.parameters(setup.with_start_values(values))
-        simulator = setup.experiment.with_inputs(setup.with_start_values(values))
-        simulated = simulation_notes(case, simulator, at, response)
-        by_twin = simulation_by_twin_notes(case, simulator, response.signals)
-        left_out = setup.record.notes
-        return SimulationResult(response, comparison, (*left_out, *simulated, *notes, *by_twin))
-    simulator, levels = plain_simulator(case, values)
-    at = {**values, **levels}
-    simulator = with_enough_substeps(simulator, at, case.path)
-    if program is not None:
-        simulator = external_simulator(program, case, simulator)
-    response = simulator.response(at)
-    notes = simulation_notes(case, simulator, at, response)
-    by_twin = simulation_by_twin_notes(case, simulator, response.signals)
-    return SimulationResult(response, None, (*notes, *by_twin))
+            (setup,) = program.simulated([setup])
+        values = setup.with_start_values(values)
+        simulator, at = setup.experiment.with_inputs(values), setup.experiment.parameters(values)
+        response = simulator.response(at)
+        before = setup.record.notes
+        if setup.channels:
+            comparison = compare_with_record(setup, "record", values)
+            after = tuple(rest_notes(setup, comparison))
+    else:
+        simulator, levels = plain_simulator(case, values)
+        at = {**values, **levels}
+        simulator = with_enough_substeps(simulator, at, case.path)
+        if program is not None:
+            simulator = program.simulator(simulator)
+        response = simulator.response(at)
+    simulated = simulation_notes(case, simulator, at, response)
+    shown = () if program is None else program.response_notes(simulator, response.signals)
+    return SimulationResult(response, comparison, (*before, *simulated, *after, *shown))

@@ -15,6 +15,7 @@ from exfit.fitting.descents import descent_near
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.parameters import FreeParameter, scaled_values
 from exfit.fitting.problem import FitProblem, robust_of
+from exfit.fitting.program import Program
 from exfit.fitting.recorded.shown_instants import instants_of, with_shown_instants
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
@@ -92,6 +93,7 @@ def analysed(
     setups: Sequence[ExperimentSetup],
     fitted: Sequence[Comparison],
     unseen: Sequence[ExperimentSetup],
+    program: Program | None = None,
     history: Sequence[Iteration] = (),
 ) -> Analysis:
     """Return how well the best point is determined, how it does on ``unseen`` records, and more.
@@ -113,7 +115,8 @@ def analysed(
         validation += [validation_of(case, fitted, *pair) for pair in validated]
         if not case.has_no_equations:
             behaviour = behaviour_of([(setup, values) for setup in setups], validated)
-        as_found = as_found_of(case, [*((setup, values) for setup in setups), *validated])
+        tests = [*((setup, values) for setup in setups), *validated]
+        as_found = as_found_of(case, tests, program)
         if uncertainty is not None:
             at = problem, best.x, names_of_records(setups)
             uncertainty = allowing_for_bias(uncertainty, *at)

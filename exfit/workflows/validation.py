@@ -11,12 +11,10 @@ from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
-from exfit.features.external.description import other_program_of
-from exfit.features.external.program import ExternalProgram
-from exfit.features.external.setups import as_by_program
 from exfit.fitting.build import build_experiment
 from exfit.fitting.parameters import scaled_values
 from exfit.fitting.problem import residuals_of
+from exfit.fitting.program import Program, by_program
 from exfit.fitting.recorded.shown_instants import instants_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
@@ -35,6 +33,7 @@ from exfit.verdict.run_quality import (
     unsteady_signals,
     voltage_notes,
 )
+from exfit.workflows.descriptions.other_program import other_program_of
 from exfit.workflows.given_values import ValuesOrResult, changes_of
 from exfit.workflows.other_values import model_as_found
 from exfit.workflows.solution import aligned, fitted_to_record, validation_of
@@ -86,7 +85,7 @@ def validate(
     record: Record | Path | str | None,
     step: float | Sequence[float],
     at: float | Sequence[float],
-    program: ExternalProgram | None = None,
+    program: Program | None = None,
 ) -> Validation:
     """Return the comparisons with the fitted records, then with those that no fit saw.
 
@@ -109,7 +108,7 @@ def _compared(
     saw: tuple[Recording, ...],
     record: Record | Path | str | None,
     given: GivenSteps,
-    program: ExternalProgram | None,
+    program: Program | None,
 ) -> Validation:
     """Return the comparisons, by a program where one is given; a fit ``saw`` some records."""
     fitted = tuple(_fitted(case, recording, own, program) for recording in saw)
@@ -123,8 +122,7 @@ def _compared(
     if not recordings:
         raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
     unseen = [
-        (each, as_by_program(program, case, build_experiment(case, each, own), own))
-        for each in recordings
+        (each, by_program(program, build_experiment(case, each, own), own)) for each in recordings
     ]
     validated = (_validated(case, matches, *pair, own) for pair in unseen)
     return Validation(case, own, (*fitted, *validated))
@@ -152,10 +150,10 @@ def _with_records(case: Case, recordings: tuple[Recording, ...]) -> Case:
 
 
 def _fitted(
-    case: Case, recording: Recording, values: Values, program: ExternalProgram | None
+    case: Case, recording: Recording, values: Values, program: Program | None
 ) -> ComparedTest:
     setup = build_experiment(case, recording, values).with_enough_substeps(values)
-    setup = as_by_program(program, case, setup, values)
+    setup = by_program(program, setup, values)
     moves = None
     if program is None:  # a run of it for each would be many
         residuals = residuals_of(case, [setup])
@@ -203,7 +201,7 @@ def _validated_by_hand(
     values: Values,
     record: Record | Path | str,
     given: GivenSteps,
-    program: ExternalProgram | None,
+    program: Program | None,
 ) -> tuple[Case, ComparedTest]:
     """Return how values do on a record that the case does not name, judged by ``fitted`` ones.
 
@@ -219,7 +217,7 @@ def _validated_by_hand(
     if isinstance(record, Record):
         case = replace(case, given_records={**case.given_records, recording.name: record})
     test = with_steps_of_record(case, recording, values, given)
-    setup = as_by_program(program, case, test.setup, values)
+    setup = by_program(program, test.setup, values)
     setup, own_values = aligned(case, setup, values)
     comparison = validation_of(case, fitted, setup, own_values)
     best = fitted_to_record(case, setup, own_values) if instants_of(setup) else own_values

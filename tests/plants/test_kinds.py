@@ -64,6 +64,9 @@ def test_a_record_may_hold_what_drives_and_what_is_compared(kind):
     assert {*kind.required_if_used} <= {*kind.driving}
 
 
+PLUGS = ("PLANTS", "PROGRAMS")  # by the names of plants
+
+
 def test_no_room_but_that_of_the_plants_and_the_schema_knows_a_plant_by_its_name():
     names = KINDS.keys() - {"none"}  # which is a word of other things too
     knowing = {
@@ -73,7 +76,7 @@ def test_no_room_but_that_of_the_plants_and_the_schema_knows_a_plant_by_its_name
     }
     of_features = {
         str(Path(*path.partition(":")[0].split(".")[1:-1]))
-        for path in (part.path for part in parts("PLANTS").values())
+        for path in (part.path for plug in PLUGS for part in parts(plug).values())
     }
     rest = {path for path in knowing if not path.startswith(("plants/", *of_features))}
     assert rest == {"case/schema/plants.py"}

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from exfit import registry
 from exfit.case.checks.as_found import as_found_faults
 from exfit.case.checks.breaker import breaker_faults, driving_signals
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
@@ -31,11 +32,10 @@ from exfit.case.checks.recorded_reference import (
     stabiliser_channel_faults,
 )
 from exfit.case.checks.sources import source_faults
-from exfit.case.parts import Parts, kind_of
+from exfit.case.parts import ANY_PLANT, Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import LONGEST_WHOLE, Fault
-from exfit.features.external.checks import external_faults
-from exfit.plants import PlantKind
+from exfit.plants import KINDS, PlantKind
 from exfit.util.strategies import DEFAULT_SEARCH
 
 WITH_PARAMETERS = ("parameters", "plant", "stabiliser", "governor")
@@ -65,7 +65,8 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
         yield from limiter_faults(content, parts, kind)
     yield from source_faults(content, parts, kind)
     yield from plants_of_records_faults(content, kind)
-    yield from external_faults(content, parts)
+    if not KINDS.get(str(content.at("plant", "type").value), ANY_PLANT).has_equations:
+        yield from _faults_elsewhere(content, parts)
     yield from _missing_test_faults(content, kind)
     if "records" not in content:
         yield from _recording_faults(content, content, kind)
@@ -80,6 +81,16 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from _starts_faults(content, parts)
     yield from as_found_faults(content, parts)
     yield from _fact_faults(content.at("about"))
+
+
+def _faults_elsewhere(content: ContentNode, parts: Parts) -> Iterator[Fault]:
+    """Yield what contradicts itself in a plant that exfit does not simulate."""
+    kind = content.at("plant", "type")
+    faults = registry.parts("FAULTS").get(str(kind.value))
+    if faults is None:
+        yield kind.fault(f"{kind.value}: nothing here can run it: that feature is not installed")
+    else:
+        yield from faults.load()(content, parts)
 
 
 def _fact_faults(about: ContentNode) -> Iterator[Fault]:

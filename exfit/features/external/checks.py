@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from exfit.case.checks.node import ContentNode
-from exfit.case.parts import ANY_PLANT, OF_RECORD, Parts, kind_of, plants_of_records
+from exfit.case.parts import OF_RECORD, Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.plants import KINDS
 from exfit.util.text import near
@@ -15,8 +15,6 @@ def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     """Yield keys that the twin does not have, names that are none, and what takes many runs."""
     plant = content.at("plant")
     kind = plant.at("type").value
-    if KINDS.get(str(kind), ANY_PLANT).has_equations:
-        return
     yield from _twin_faults(plant) if "twin" in plant else _named_faults(content, plant, parts)
     symbols = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
     yield from _unknown(plant.at("names"), [*symbols, OF_RECORD[0]], "a parameter")

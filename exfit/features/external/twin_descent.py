@@ -11,17 +11,18 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.estimate import half_square
-from exfit.features.external.simulator import QUOTIENT_STEP, TwinSimulator
+from exfit.features.external.responders import QUOTIENT_STEP
 from exfit.fitting.descents import Announce, following
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals
+from exfit.simulation.simulator import EQUATIONS
 
 Array = NDArray[np.float64]
 
@@ -141,7 +142,7 @@ def _rms(errors: Array) -> float:
 def twin_of(residuals: Residuals) -> Residuals:
     """Return the residuals of the twin alone."""
     experiments = [
-        replace(experiment, simulator=cast(TwinSimulator, experiment.simulator).twin)
+        replace(experiment, simulator=experiment.simulator.with_responder(EQUATIONS))
         for experiment in residuals.experiments
     ]
     return replace(residuals, experiments=experiments, counter=None)

@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from exfit.case.case import Case
 from exfit.case.parts import Part
+from exfit.case.program_files import program_files
 from exfit.case.schema import (
     AngleTable,
     BumpTest,
@@ -18,7 +19,6 @@ from exfit.case.schema import (
     ReferenceTable,
     Unknown,
 )
-from exfit.features.external.program_files import program_files
 from exfit.fitting.nuisances.parameters import OPENING, prefix_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import driving_after_opening

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from exfit.fitting.program import Program
 from exfit.results.description import RecordedTest
 from exfit.results.validation_result import ValidationResult
 from exfit.util.sources import NOT_STATED
@@ -28,6 +29,7 @@ def validation_result(
     validation: Validation,
     versions: Mapping[str, str],
     sources: Mapping[str, str] = MappingProxyType({}),
+    program: Program | None = None,
 ) -> ValidationResult:
     """Return a validation with all that a report shows of it.
 
@@ -53,7 +55,7 @@ def validation_result(
         behaviour=None if case.has_no_equations else behaviour_of(own),
         files=input_names(case, setups),
         case_text=text_of(case),
-        as_found=None if case.as_found is None else as_found_of(case, own),
+        as_found=None if case.as_found is None else as_found_of(case, own, program),
         criteria=criteria_of(case),
         other_program=other_program,
     )

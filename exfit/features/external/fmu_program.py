@@ -43,10 +43,11 @@ def fmu_program(case: Case, section: FmuPlant) -> Iterator[ExternalProgram]:
 
     Raises CaseError for a file that cannot be run.
     """
-    description = _description(case, section)
-    interface = _interface(case, section, description)
+    file = on_disk(case.folder / section.file)
     try:
-        with laid_out(_file(case, section)) as folder:
+        description = fmu_description(file)
+        interface = _interface(case, section, description)
+        with laid_out(file) as folder:
             settings = {
                 "folder": str(folder),
                 "interface": interface,
@@ -57,7 +58,8 @@ def fmu_program(case: Case, section: FmuPlant) -> Iterator[ExternalProgram]:
             with running(program):
                 yield program
     except FmuError as fault:
-        raise _fault_of_file(case, section, fault) from None
+        text = f"{case.path}: plant.file: {section.simulator} {fault}"
+        raise CaseError([text]) from None
 
 
 def refuse_unknown_variables(case: Case, program: ExternalProgram, tests: Sequence[Test]) -> None:
@@ -72,19 +74,12 @@ def refuse_unknown_variables(case: Case, program: ExternalProgram, tests: Sequen
             raise CaseError([f"{case.path}: {fault}" for fault in dict.fromkeys(faults)])
 
 
-def own_value_notes(case: Case, program: ExternalProgram | None = None) -> Iterator[str]:
-    """Yield which parameters of a case an FMU does not take, and has its own values of.
-
-    Raises CaseError for a file that cannot be run, where no program has read it before.
-    """
+def own_value_notes(case: Case, program: ExternalProgram) -> Iterator[str]:
+    """Yield which parameters of a case an FMU does not take, and has its own values of."""
     section = case.external
-    if not isinstance(section, FmuPlant):
+    if not isinstance(section, FmuPlant) or not isinstance(program, FmuProgram):
         return
-    if isinstance(program, FmuProgram):
-        description = program.description
-    else:
-        description = _description(case, section)
-    taken = description.usable_as("parameter")
+    taken = program.description.usable_as("parameter")
     symbols = [part.prefix + symbol for part in case.parts.all for symbol in part.symbols]
     missing = [
         name for name in (*symbols, OF_RECORD[0]) if section.names.get(name, name) not in taken
@@ -119,25 +114,10 @@ def _variable_faults(
             yield f"plant.{key}.{name}: {text}"
 
 
-def _description(case: Case, section: FmuPlant) -> FmuDescription:
-    try:
-        return fmu_description(_file(case, section))
-    except FmuError as fault:
-        raise _fault_of_file(case, section, fault) from None
-
-
 def _interface(case: Case, section: FmuPlant, description: FmuDescription) -> Interface:
-    """Return the interface by which an FMU is run; raises CaseError where it has not that one."""
+    """Choose the interface by which an FMU is run; raises CaseError where it has not that one."""
     interface = section.interface or description.interfaces[0]
     if interface not in description.interfaces:
         text = f"{section.simulator} has {' and '.join(description.interfaces)} only"
         raise CaseError([f"{case.path}: plant.interface: {interface}: {text}"])
     return interface
-
-
-def _file(case: Case, section: FmuPlant) -> Path:
-    return on_disk(case.folder / section.file)
-
-
-def _fault_of_file(case: Case, section: FmuPlant, fault: FmuError) -> CaseError:
-    return CaseError([f"{case.path}: plant.file: {section.simulator} {fault}"])
