@@ -59,7 +59,7 @@ class PartDescription:
     prefix: str
     title: str = ""
     drawing: str = ""
-    sheet: Mapping[str, SheetRow] | None = None
+    sheet: Mapping[str, SheetRow] = field(default_factory=dict)
     doubt: str = ""
 
     @property

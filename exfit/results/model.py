@@ -50,7 +50,7 @@ class Iteration:
     the trials that were rejected: cuts of a step, increases of nu; ``nfev`` and ``njev`` count
     residuals and Jacobians until now. ``capped``: the step that was tried first was held back (by
     the cap of dgn, by the damping of lm), and so was not the full Gauss-Newton step; None at a
-    start, and in results of an earlier version.
+    start.
     """
 
     DERIVED: ClassVar = {"trials": "trials"}
@@ -202,8 +202,8 @@ class FitResult:
     ``files`` its name. ``given_values`` are those in place of the case's. ``as_found`` is
     the model before the test, ``criteria`` are those by which a report judges;
     ``other_program`` is what simulated the records where exfit did not; ``windows`` is T'd0
-    over windows of its records, None unless it is fitted to several steps by playback. ``verdict``,
-    ``behaviour`` and ``as_found`` are None in results of an earlier version.
+    over windows of its records, None unless it is fitted to several steps by playback.
+    ``behaviour`` and ``as_found`` are None where the fit was interrupted.
     """
 
     DERIVED: ClassVar = {
@@ -245,7 +245,7 @@ class FitResult:
     validation: tuple[Comparison, ...]
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
-    verdict: Verdict | None = None
+    verdict: Verdict
     governor: Mapping[str, float] = field(default_factory=dict)
     governor_model: str | None = None
     limiters: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -352,20 +352,15 @@ class FitResult:
     def describes(self) -> bool:
         """Whether the response matches every record better than a constant would."""
         own = all(match.judged.describes for match in self.comparisons)
-        return own and (self.verdict is None or self.verdict.verdict != NO_MATCH)
+        return own and self.verdict.verdict != NO_MATCH
 
     @property
     def holds(self) -> bool:
         """Whether the fit matches its records, and its validations are accepted.
 
-        It then ends with exit code 0. Of a result of an earlier version, that its search converged
-        and the response is better than a constant.
+        It then ends with exit code 0.
         """
-        if self.interrupted or not self.accepted:
-            return False
-        if self.verdict is None:
-            return self.success and self.describes
-        return self.verdict.matches
+        return not self.interrupted and self.accepted and self.verdict.matches
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data: everything but the history, samples and descriptions.
@@ -395,6 +390,6 @@ class FitResult:
         values = ", ".join(
             f"{name}={each.rounded(each.value)}" for name, each in self.parameters.items()
         )
-        state = "" if self.verdict is None else f", {self.verdict.verdict}"
         to = ", ".join(match.record for match in self.comparisons)
-        return f"<FitResult {self.model} to {to}: rmse {self.rmse:.3g} pu{state}; {values}>"
+        match = f"rmse {self.rmse:.3g} pu, {self.verdict.verdict}"
+        return f"<FitResult {self.model} to {to}: {match}; {values}>"

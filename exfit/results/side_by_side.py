@@ -27,21 +27,19 @@ class ParameterValue(NamedTuple):
 
 
 def outcome_of(result: FitResult) -> str:
-    """Return the verdict on a fit in its words, or what speaks against one that matches."""
+    """Name the verdict on a fit in its words, or what speaks against one that matches."""
     if result.interrupted:
         return INTERRUPTED
-    if result.verdict is None:
-        return result.outcome if result.accepted else NOT_ACCEPTED
     if result.verdict.matches and not result.accepted:
         return NOT_ACCEPTED
     return result.verdict.verdict
 
 
 def explanation_of(result: FitResult) -> str:
-    """Return in a sentence why a fit ended so."""
+    """Explain in a sentence why a fit ended so."""
     if outcome_of(result) == NOT_ACCEPTED:
         return "; ".join(match.reason for match in result.validation if match.reason)
-    return result.message if result.verdict is None else result.verdict.reason
+    return result.verdict.reason
 
 
 def parameters_beside(

@@ -16,7 +16,7 @@ from exfit.util.files import regular_size
 from exfit.util.json_files import read_json
 from exfit.util.root import on_disk
 from exfit.util.text import to_json
-from exfit.util.typed import Reader, plain
+from exfit.util.typed import plain, read
 
 Content = TypeVar("Content")
 
@@ -54,7 +54,7 @@ def read_kept(
         data = read_json(file)
         if any(data.get(label) != value for label, value in labels.items()):
             return None
-        content: Content = Reader().read(kind, data if under is None else data[under])
+        content: Content = read(kind, data if under is None else data[under])
     except (ExfitError, LookupError, RecursionError):
         return None
     return content

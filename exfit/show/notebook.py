@@ -43,12 +43,12 @@ def fit_html(result: FitResult) -> str:
     from jinja2 import Environment
 
     template = Environment(autoescape=True, trim_blocks=True).from_string(TABLE)
-    causes = () if result.verdict is None else result.verdict.causes
-    no_interval = "" if result.verdict is None else result.verdict.in_place_of_interval
+    causes = result.verdict.causes
+    no_interval = result.verdict.in_place_of_interval
     unresolved = () if result.knowledge is None else result.knowledge.sentences
     return template.render(
         result=result,
-        verdict=result.outcome if result.verdict is None else result.verdict.sentence,
+        verdict=result.verdict.sentence,
         records=", ".join(comparison.record for comparison in result.comparisons),
         fit_percent=percentage(result.comparison.fit_percent),
         rows=[
@@ -80,13 +80,10 @@ def _cells(name: str, parameter: FittedParameter, no_interval: str) -> tuple[str
 def fit_figure(result: FitResult, record: str | None = None) -> Figure:
     """Return the fitted response beside a record, one of the fit or of its validation by name.
 
-    Raises ExfitError where there is no such record, or where a file of an earlier version holds no
-    samples.
+    Raises ExfitError where there is no such record.
     """
     comparisons = {match.name: match for match in (*result.comparisons, *result.validation)}
     name = next(iter(comparisons)) if record is None else record
     if name not in comparisons:
         raise ExfitError(f"{name}: not a record of this fit; {near(name, comparisons)}")
-    if not comparisons[name].overlays:
-        raise ExfitError(f"{name}: the result holds no samples of this record: fit again")
     return overlay(comparisons[name], f"{result.name}: {result.model}, record {name}")

@@ -7,7 +7,7 @@ is written and never read.
 """
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -33,13 +33,12 @@ class FormError(ExfitError):
 
 
 class Entry(NamedTuple):
-    """An entry of a class: its key in the data, its name, its type, what it is where missing."""
+    """An entry of a class: its key in the data, its name, its type, whether only a file has it."""
 
     key: str
     name: str
     kind: Any
     stored: bool
-    default: Any
 
 
 @cache
@@ -47,15 +46,16 @@ def entries(kind: type) -> tuple[Entry, ...]:
     """Return the entries of a data class or a NamedTuple."""
     hints = get_type_hints(kind, include_extras=True)
     if not is_dataclass(kind):
-        defaults = getattr(kind, "_field_defaults", {})
-        names = getattr(kind, "_fields", ())
-        return tuple(Entry(n, n, hints[n], False, defaults.get(n, MISSING)) for n in names)
-    described = []
-    for each in fields(kind):
-        default = each.default if each.default_factory is MISSING else each.default_factory()
-        key, stored = each.metadata.get(KEY, each.name), each.metadata.get(STORED, False)
-        described.append(Entry(key, each.name, hints[each.name], stored, default))
-    return tuple(described)
+        return tuple(Entry(n, n, hints[n], False) for n in getattr(kind, "_fields", ()))
+    return tuple(
+        Entry(
+            each.metadata.get(KEY, each.name),
+            each.name,
+            hints[each.name],
+            each.metadata.get(STORED, False),
+        )
+        for each in fields(kind)
+    )
 
 
 def _has_entries(value: Any) -> bool:
@@ -113,73 +113,68 @@ def _plain_array(samples: Any) -> Any:
 # ---- back from plain data
 
 
-class Reader(NamedTuple):
-    """Reads plain data as types describe it; ``complete``: nothing that has a default is missing.
+def read(kind: Any, data: Any, place: Place = ()) -> Any:
+    """Read plain data as a type describes it; nothing that the type has may be missing.
 
-    Every method raises FormError, which begins with the place, where data has another form.
+    Raises FormError, which begins with the place, where data has another form.
     """
+    origin, args = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _nullable(args[0], args[1], data, place)
+    if origin in (Union, UnionType):
+        return _one_of(args, data, place)
+    if origin is np.ndarray:
+        is_complex = args[1] == np.dtype[np.complex128]
+        return _complex_array(data, place) if is_complex else _array(data, place)
+    if _named_values(kind):
+        return tuple(_mapping(get_args(args[0])[1], data, place).items())
+    if origin is tuple:
+        return _tuple(args, data, place)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return _mapping(args[1], data, place)
+    return _entries(kind, data, place) if _has_entries(kind) else _scalar(kind, data, place)
 
-    complete: bool = True
 
-    def read(self, kind: Any, data: Any, place: Place = ()) -> Any:
-        """Return data as a type describes it."""
-        origin, args = get_origin(kind), get_args(kind)
-        if origin is Annotated:
-            return self._nullable(args[0], args[1], data, place)
-        if origin in (Union, UnionType):
-            return self._one_of(args, data, place)
-        if origin is np.ndarray:
-            is_complex = args[1] == np.dtype[np.complex128]
-            return _complex_array(data, place) if is_complex else _array(data, place)
-        if _named_values(kind):
-            return tuple(self._mapping(get_args(args[0])[1], data, place).items())
-        if origin is tuple:
-            return self._tuple(args, data, place)
-        if isinstance(origin, type) and issubclass(origin, Mapping):
-            return self._mapping(args[1], data, place)
-        return (
-            self._entries(kind, data, place) if _has_entries(kind) else _scalar(kind, data, place)
-        )
+def _nullable(kind: Any, null: Any, data: Any, place: Place) -> Any:
+    if get_origin(kind) is np.ndarray:
+        return _array(data, place, null)
+    return null if data is None else read(kind, data, place)
 
-    def _nullable(self, kind: Any, null: Any, data: Any, place: Place) -> Any:
-        if get_origin(kind) is np.ndarray:
-            return _array(data, place, null)
-        return null if data is None else self.read(kind, data, place)
 
-    def _one_of(self, kinds: tuple[Any, ...], data: Any, place: Place) -> Any:
-        if data is None and NoneType in kinds:
-            return None
-        *first, last = (kind for kind in kinds if kind is not NoneType)
-        for kind in first:
-            try:
-                return self.read(kind, data, place)
-            except FormError:
-                continue
-        return self.read(last, data, place)
+def _one_of(kinds: tuple[Any, ...], data: Any, place: Place) -> Any:
+    if data is None and NoneType in kinds:
+        return None
+    *first, last = (kind for kind in kinds if kind is not NoneType)
+    for kind in first:
+        try:
+            return read(kind, data, place)
+        except FormError:
+            continue
+    return read(last, data, place)
 
-    def _mapping(self, kind: Any, data: Any, place: Place) -> dict[str, Any]:
-        content = _of_type(dict, data, place, "a mapping")
-        return {key: self.read(kind, value, (*place, key)) for key, value in content.items()}
 
-    def _tuple(self, kinds: tuple[Any, ...], data: Any, place: Place) -> tuple[Any, ...]:
-        items = _of_type(list, data, place, "a list")
-        if kinds[1:] == (...,):
-            kinds = (kinds[0],) * len(items)
-        if len(kinds) != len(items):
-            raise FormError(f"{dotted(place)}: {len(items)} values, not {len(kinds)}")
-        pairs = enumerate(zip(kinds, items, strict=True))
-        return tuple(self.read(kind, value, (*place, k)) for k, (kind, value) in pairs)
+def _mapping(kind: Any, data: Any, place: Place) -> dict[str, Any]:
+    content = _of_type(dict, data, place, "a mapping")
+    return {key: read(kind, value, (*place, key)) for key, value in content.items()}
 
-    def _entries(self, kind: Any, data: Any, place: Place) -> Any:
-        content, values = _of_type(dict, data, place, "a mapping"), {}
-        for entry in entries(kind):
-            if entry.key in content:
-                values[entry.name] = self.read(entry.kind, content[entry.key], (*place, entry.key))
-            elif entry.default is MISSING or self.complete:
-                raise FormError(f"{dotted((*place, entry.key))}: missing")
-            else:
-                values[entry.name] = entry.default
-        return kind(**values)
+
+def _tuple(kinds: tuple[Any, ...], data: Any, place: Place) -> tuple[Any, ...]:
+    items = _of_type(list, data, place, "a list")
+    if kinds[1:] == (...,):
+        kinds = (kinds[0],) * len(items)
+    if len(kinds) != len(items):
+        raise FormError(f"{dotted(place)}: {len(items)} values, not {len(kinds)}")
+    pairs = enumerate(zip(kinds, items, strict=True))
+    return tuple(read(kind, value, (*place, k)) for k, (kind, value) in pairs)
+
+
+def _entries(kind: Any, data: Any, place: Place) -> Any:
+    content, values = _of_type(dict, data, place, "a mapping"), {}
+    for entry in entries(kind):
+        if entry.key not in content:
+            raise FormError(f"{dotted((*place, entry.key))}: missing")
+        values[entry.name] = read(entry.kind, content[entry.key], (*place, entry.key))
+    return kind(**values)
 
 
 def _of_type(kind: type, data: Any, place: Place, form: str) -> Any:

@@ -70,13 +70,6 @@ def test_a_fit_holds_by_its_verdict_and_its_validations(fitted, words, holds):
         assert outcome_of(worse) not in (GOOD, MATCHES)
 
 
-def test_a_result_without_a_verdict_holds_where_it_converged(fitted):
-    """As those of an earlier version."""
-    earlier = replace(fitted, verdict=None)
-    assert earlier.holds
-    assert not replace(earlier, success=False).holds
-
-
 def test_a_long_table_keeps_the_extremes_of_every_column(monkeypatch):
     monkeypatch.setattr("exfit.results.tables.MOST_ROWS", 1000)
     time = np.linspace(0.0, 1.0, 50_001)

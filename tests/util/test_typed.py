@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exfit.util.typed import IN_FILE, KEY, FormError, Reader, plain
+from exfit.util.typed import IN_FILE, KEY, FormError, plain, read
 
 
 class Pair(NamedTuple):
@@ -64,7 +64,7 @@ def data():
 
 
 def test_what_is_written_is_read_back():
-    found = Reader().read(Whole, data())
+    found = read(Whole, data())
     for name in ("name", "count", "side", "pair", "named", "by_name", "pole", "fact", "path"):
         assert getattr(found, name) == getattr(WHOLE, name), name
     assert isnan(found.share)
@@ -110,19 +110,18 @@ def test_what_has_another_form_is_refused_with_its_place(place, value, words):
         section = section[key]
     section[place[-1]] = value
     with pytest.raises(FormError) as refused:
-        Reader().read(Whole, content)
+        read(Whole, content)
     assert str(refused.value) == words
 
 
-def test_what_is_missing_is_refused_unless_it_has_a_default_and_may_be_missing():
+def test_what_is_missing_is_refused_though_it_has_a_default():
     content = data()
-    del content["fact"]
-    with pytest.raises(FormError, match=r"^fact: missing$"):
-        Reader().read(Whole, content)
-    assert Reader(complete=False).read(Whole, content).fact == 1.0
     del content["pair"]["low"]
     with pytest.raises(FormError, match=r"^pair\.low: missing$"):
-        Reader(complete=False).read(Whole, content)
+        read(Whole, content)
+    del content["fact"]
+    with pytest.raises(FormError, match=r"missing$"):
+        read(Whole, content)
 
 
 @pytest.mark.parametrize("key", ["pair", "long"])
@@ -130,8 +129,8 @@ def test_a_whole_number_too_large_for_a_double_is_no_number(key):
     content = data()
     content[key] = {"low": 10**400, "high": None} if key == "pair" else [0, 10**400]
     with pytest.raises(FormError, match="is not a number"):
-        Reader().read(Whole, content)
+        read(Whole, content)
 
 
 def test_whole_numbers_are_numbers():
-    assert Reader().read(Whole, {**data(), "long": [1, 2.5, None]}).long[:2].tolist() == [1.0, 2.5]
+    assert read(Whole, {**data(), "long": [1, 2.5, None]}).long[:2].tolist() == [1.0, 2.5]

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 
 import pytest
 from fleets import row
@@ -17,7 +16,6 @@ from exfit.features.fleet.sisters import sisters
 from exfit.features.fleet.summary import summary_of
 from exfit.features.fleet.table import fleet_table, parameter_table
 from exfit.features.report.page import html as report_html
-from exfit.results.io import VERSION, load_result, result_text
 from exfit.results.verdict import MISSES, NO_MATCH
 from exfit.show import terminal
 from exfit.show.figures import profiles as profile_figure
@@ -94,18 +92,6 @@ def test_no_table_of_a_batch_shows_one(result, tmp_path):
     text = Page(fleet_page(Fleet(tmp_path, tuple(cases)), groups)).text
     assert text.count(f"no interval: {result.verdict.verdict}") == len(lines)
     assert summary.unresolved == ()
-
-
-def test_a_result_of_an_earlier_version_is_read_without_them(result, tmp_path):
-    saved = json.loads(result_text(result))
-    for stored in (saved["parameters"], saved["knowledge"]["confidence"]["parameters"]):
-        for each in stored.values():
-            each |= {"interval": [1.0, 2.0], "why": None}
-    path = tmp_path / "result.json"
-    path.write_text(json.dumps({**saved, "version": VERSION - 1}), encoding="utf-8")
-    read = load_result(path)
-    assert read.parameters == result.parameters
-    assert read.knowledge.sentences == result.knowledge.sentences
 
 
 def test_no_profile_has_one(case, result):

@@ -174,7 +174,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
 
     Its name and path are those of its case until a batch gives others.
     """
-    from exfit.results.side_by_side import explanation_of, outcome_of
+    from exfit.results.side_by_side import explanation_of
 
     facts = _facts_of_result(result)
     return CaseSummary(
@@ -184,7 +184,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
         status="done",
         reason=explanation_of(result),
         **facts._asdict(),
-        verdict=result.verdict.verdict if result.verdict is not None else outcome_of(result),
+        verdict=result.verdict.verdict,
         holds=result.holds,
         rmse=_largest_rmse(result.comparisons),
         validation=_validation(result.validation),
@@ -231,7 +231,7 @@ def _unresolved(result: "FitResult") -> tuple[str, ...]:
     """
     from exfit.results.intervals.determination import NEEDS_PROFILE, UNFINISHED
 
-    if result.verdict is not None and result.verdict.misfit:
+    if result.verdict.misfit:
         return ()
     return tuple(
         name

@@ -21,7 +21,7 @@ from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import write
 from exfit.util.json_files import read_json
 from exfit.util.text import show_value, to_json
-from exfit.util.typed import FormError, Reader, plain
+from exfit.util.typed import FormError, plain, read
 
 KEY = "test"  # the label of the key among the inputs of a fit
 VERSION = 1  # of the file of a test that is no fit
@@ -132,7 +132,7 @@ def load_summary(folder: Path) -> ProgrammeResult:
     try:
         if content.get("version") != VERSION:
             raise FormError(f"version: {show_value(content.get('version'))} is not {VERSION}")
-        summary: KeptSummary = Reader().read(KeptSummary, content)
+        summary: KeptSummary = read(KeptSummary, content)
         for at, test in enumerate(summary.tests):
             if Path(test.name).name != test.name:
                 raise FormError(f"tests[{at}].name: {show_value(test.name)} is not that of a test")

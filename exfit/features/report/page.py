@@ -33,10 +33,7 @@ CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have
 LONG = 12  # lines of a history that a reader sees without asking for more
 MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
 GENERATOR = '<meta name="generator" content="exfit '
-NO_BEHAVIOUR = (
-    "The result does not hold this: the fit was interrupted, or an earlier version of exfit "
-    "wrote it."
-)
+NO_BEHAVIOUR = "The result does not hold this: the fit was interrupted."
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
 

@@ -35,8 +35,8 @@ def headline(result: FitResult) -> Headline:
     return Headline(
         word=f"{outcome[:1].upper()}{outcome[1:]}",
         sentence=f"{sentence[:1].upper()}{sentence[1:]}; rmse {rmse}.",
-        good={GOOD: True, MATCHES: None}.get(outcome, None if result.verdict is None else False),
-        causes=() if result.verdict is None else tuple(c.sentence for c in result.verdict.causes),
+        good={GOOD: True, MATCHES: None}.get(outcome, False),
+        causes=tuple(cause.sentence for cause in result.verdict.causes),
         criteria=judged.sentence,
         passed=judged.passed,
     )

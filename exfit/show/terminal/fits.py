@@ -74,13 +74,11 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
 
 def verdict(console: Console, result: FitResult) -> None:
     """Show in a line what a fit comes to, then why it may be so and what to do."""
-    if result.verdict is not None:
-        style = STYLES.get(result.verdict.verdict, "bold red")
-        remarks(console, "verdict:", [result.verdict.sentence], style)
+    style = STYLES.get(result.verdict.verdict, "bold red")
+    remarks(console, "verdict:", [result.verdict.sentence], style)
     rejections(console, result.validation)
-    if result.verdict is not None:
-        kind = "note:" if result.verdict.verdict == GOOD else "cause:"
-        remarks(console, kind, (cause.sentence for cause in result.verdict.causes))
+    kind = "note:" if result.verdict.verdict == GOOD else "cause:"
+    remarks(console, kind, (cause.sentence for cause in result.verdict.causes))
 
 
 def _phase_ends(console: Console, result: FitResult) -> None:
@@ -120,7 +118,7 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
     numbers = ("start", *former, "fitted", "95 % interval", "error")
     marks = {name: ", ".join(_marks(each)) for name, each in result.parameters.items()}
     remark = ("",) if any(marks.values()) else ()
-    no_interval = "" if result.verdict is None else result.verdict.in_place_of_interval
+    no_interval = result.verdict.in_place_of_interval
     table = plain_table("parameter", *numbers, "unit", *remark, numbers=numbers)
     for name, parameter in result.parameters.items():
         vague = result.knowledge is not None and parameter.why

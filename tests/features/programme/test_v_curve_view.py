@@ -17,7 +17,7 @@ from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.show import figures as plots
 from exfit.util.text import to_json
-from exfit.util.typed import Reader, plain
+from exfit.util.typed import plain, read
 
 P, Q = np.repeat([0.1, 0.8], 3), np.tile([-0.3, 0.0, 0.4], 2)
 MACHINE = MACHINES["GENSAL"]
@@ -59,5 +59,5 @@ def test_the_figure_has_a_curve_and_points_for_each_power(result):
 
 def test_the_result_is_read_back_as_it_was_written(result):
     text = to_json(plain(result, whole=True))
-    again = Reader().read(VCurve, json.loads(text))
+    again = read(VCurve, json.loads(text))
     assert to_json(plain(again, whole=True)) == text

@@ -508,29 +508,6 @@ def test_a_result_with_a_hole_is_refused_with_its_place(own, key):
         write_report(own)
 
 
-def test_a_result_of_the_version_before_is_reported_as_far_as_it_goes(own):
-    """It holds no samples, and nothing that would have to be simulated."""
-    page, saved = Page(page_of(own)), saved_of(own)
-    known = {"std_error", "interval", "why", "value", "start", "min", "max", "at_bound"}
-    parameters = {
-        name: {key: one[key] for key in (*known, "of_record")}
-        for name, one in saved["parameters"].items()
-    }
-    figures = load_result(own).to_dict()
-    history = saved["history"]
-    for match in (*figures["records"], *figures["validation"]):
-        del match["limit"]
-    before = {**figures, "parameters": parameters, "history": history}
-    (own / "result.json").write_text(json.dumps(before))
-    old = Page(page_of(own))
-    assert "No overlay: the result holds no samples." in old.text
-    assert "an earlier version of exfit wrote it" in old.text
-    for caption in ("Iterations; line 0 is the start", "Correlation of the estimates"):
-        assert old.tables[caption] == page.tables[caption]
-    ours, theirs = (each.tables["Fitted parameters"][1:] for each in (old, page))
-    assert [row[1:6] for row in ours] == [row[1:6] for row in theirs]
-
-
 def test_a_report_is_replaced_and_another_file_is_not(own):
     path = write_report(own)
     assert path == own / "report.html"

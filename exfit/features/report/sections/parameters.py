@@ -4,12 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from exfit.case.saturation import MEANINGS
-from exfit.results.description import PartDescription, SheetRow
+from exfit.results.description import SheetRow
 from exfit.results.model import FittedParameter
 from exfit.results.typical_values import DEVIATION, by_weight, moved_parameters
 from exfit.results.validation_result import Reported
-
-NO_ROW = SheetRow()  # of a result that holds no data sheet
 
 
 @dataclass(frozen=True)
@@ -82,22 +80,15 @@ def _of_parts(result: Reported) -> Iterator[FixedGroup]:
         values = result.values_of(part.prefix)
         rows = (
             _fixed(result, part.prefix, symbol, values[symbol], row)
-            for symbol, row in _sheet(result, part).items()
+            for symbol, row in part.sheet.items()
             if symbol in values and part.prefix + symbol not in result.parameters
         )
         yield FixedGroup(part.heading, tuple(rows))
 
 
-def _sheet(result: Reported, part: PartDescription) -> Mapping[str, SheetRow]:
-    """Return the data sheet of a part: where the result holds none, its symbols alone."""
-    if part.sheet is not None:
-        return part.sheet
-    return dict.fromkeys(result.values_of(part.prefix), NO_ROW)
-
-
 def _helpers(result: Reported) -> Iterator[FixedGroup]:
     """Yield what is listed among the exciter's parameters and is none of them."""
-    own = {symbol for part in result.parts if not part.prefix for symbol in _sheet(result, part)}
+    own = {symbol for part in result.parts if not part.prefix for symbol in part.sheet}
     rows = (
         _fixed(result, "", name, value, SheetRow(meaning=MEANINGS.get(name, "used by ties")))
         for name, value in result.fixed.items()

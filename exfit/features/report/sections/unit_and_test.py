@@ -16,10 +16,7 @@ class UnitAndTest:
 
     about: tuple[tuple[str, str], ...]
     tests: tuple[RecordedTest, ...]
-    missing: str = (
-        "The result does not hold this: the fit was interrupted, or an earlier version of exfit "
-        "wrote it."
-    )
+    missing: str = "The result does not hold this: the fit was interrupted."
 
 
 def unit_and_test(result: Reported) -> UnitAndTest:

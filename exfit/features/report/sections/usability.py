@@ -8,7 +8,7 @@ from exfit.features.report.sections.other_program import NO_TWIN, has_no_equatio
 from exfit.results.description import Behaviour
 from exfit.results.validation_result import Reported
 
-NOT_HELD = "not stated: the fit was interrupted, or an earlier version of exfit wrote the result"
+NOT_HELD = "not stated: the fit was interrupted"
 
 RESTING = 1e-9  # 1/s: a pole within it is at zero but for rounding
 CHECKS = ("Initialises without error", "No-disturbance run", "Positive damping")

@@ -10,7 +10,7 @@ from exfit.features.programme.steady.saturation import FieldWinding, directions,
 from exfit.features.programme.steady.saturation_forms import EXCESS
 from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH
-from exfit.util.typed import Reader, plain
+from exfit.util.typed import plain, read
 
 FORMS = tuple(EXCESS)
 BASE, S10, S12 = 850.0, 0.12, 0.42
@@ -151,7 +151,7 @@ def test_a_misread_point_is_named():
 def test_a_result_is_read_back_from_its_file():
     result = saturation_curve(*noisy_loop())
     stored = plain(result, whole=True)
-    assert plain(Reader().read(SaturationResult, stored), whole=True) == stored
+    assert plain(read(SaturationResult, stored), whole=True) == stored
 
 
 @pytest.mark.parametrize(
