@@ -12,18 +12,13 @@ from exfit.cli.completion import noises
 from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
-from exfit.plants import (
-    BREAKER,
-    DRIVING,
-    SATURATION,
-    SPEED,
-    UnitOnLoad,
-    alone,
-    machine_on_load,
-    machine_playback,
-    open_circuit,
-    playback,
-)
+from exfit.plants import BREAKER, SATURATION, SPEED
+from exfit.plants.alone import alone
+from exfit.plants.machine_on_load import machine_on_load
+from exfit.plants.machine_playback import machine_playback
+from exfit.plants.open_circuit import open_circuit
+from exfit.plants.playback import DRIVING, playback
+from exfit.plants.unit import UnitOnLoad
 from exfit.records.channel_recognition import guess_signals
 from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from exfit.case.assembly import CheckedContent, check_content, plain_content
 from exfit.case.bounds import is_held
-from exfit.case.given_records import with_record_sections
 from exfit.case.parts import Part, Parts, in_plant
 from exfit.case.schema import (
     SINGLE,
@@ -137,6 +136,8 @@ class Case:
             >>> record = exfit.Record.from_arrays(time, {"vt": vt})
             >>> case = exfit.Case.from_dict({"model": "SEXS", ...}, record)
         """
+        from exfit.case.given_records import with_record_sections
+
         path, faults = Path(folder) / name, list[Fault]()
         records = {SINGLE: record} if isinstance(record, Record) else record or {}
         plain = with_record_sections(plain_content(content, faults), records, faults)

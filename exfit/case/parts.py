@@ -15,19 +15,8 @@ from exfit.models import GOVERNORS, LIMITERS, STABILISERS, Catalogue, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
-from exfit.models.speed_multiplier import times_speed
-from exfit.plants import (
-    EVENTS,
-    GOVERNOR,
-    KINDS,
-    MACHINE,
-    NETWORK,
-    OPEN_CIRCUIT,
-    STABILISER,
-    Attached,
-    PlantKind,
-    model_of_names,
-)
+from exfit.plants import EVENTS, GOVERNOR, KINDS, MACHINE, NETWORK, STABILISER, Attached, PlantKind
+from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.signals import RECORDED
 from exfit.util.text import Place, near
 
@@ -325,6 +314,8 @@ def _places(section: str, fixed: str) -> tuple[Place, Place, Place]:
 
 
 def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Model | None:
+    from exfit.models.speed_multiplier import times_speed
+
     name = data.get("model")
     if not isinstance(name, str) or not name:
         return None
@@ -338,6 +329,8 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
 
 def _named(plant: Data, data: Data) -> Model:
     """Return what stands for a model elsewhere: the parameters that a case names."""
+    from exfit.plants.outside import model_of_names
+
     command = plant.get("command")
     words = [str(word) for word in command] if isinstance(command, list) else []
     files = [word for word in words[1:] if not word.startswith("-")]

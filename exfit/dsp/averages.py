@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.filtering import Filtering
+if TYPE_CHECKING:
+    from exfit.dsp.filtering import Filtering
 
 Array = NDArray[np.float64]
 
@@ -35,7 +37,7 @@ class Averages:
         return np.moveaxis(means, [0, 1], [axis, axis + 1])
 
 
-def averages_of(filterings: Sequence[Filtering | None]) -> Averages | None:
+def averages_of(filterings: "Sequence[Filtering | None]") -> Averages | None:
     """Return the averages of signals whose windows hold few samples, None where none has such."""
     windows = [0.0 if each is None else each.window_between for each in filterings]
     if not any(windows):

@@ -15,6 +15,8 @@ NEIGHBOURS = 3  # samples whose median is free of a lone spike
 SECOND_DIFFERENCE = sqrt(6.0)  # spread of x[k-1] - 2 x[k] + x[k+1] over that of white x
 MEDIAN_DEVIATION = NormalDist().inv_cdf(0.75)  # median of |x|, over the spread of a normal x
 UNIFORM_SPREAD = 1.0 / sqrt(12.0)  # over the width: of what rounding leaves, over its step
+FEWEST_IN_HALF = 4  # samples at rest, of each half
+UNSTEADY = 6.0  # standard errors between both halves of what is at rest
 
 
 def noise(samples: Array, order: int = 2) -> float:
@@ -51,3 +53,14 @@ def _quantum(samples: Array) -> float:
     lasting = median(sliding_window_view(samples, NEIGHBOURS), axis=-1)
     steps = np.diff(distinct(lasting))
     return float(np.min(steps)) if len(steps) else 0.0
+
+
+def drift_at_rest(samples: Array) -> float:
+    """Return by how much the second half of samples at rest (M,) is off the first; 0 by chance."""
+    half = len(samples) // 2
+    if half < FEWEST_IN_HALF:
+        return 0.0
+    # noise from neighbours: a drift does not pass for it
+    scatter = float(np.std(np.diff(samples))) / sqrt(2.0)
+    drift = float(samples[half:].mean() - samples[:half].mean())
+    return drift if abs(drift) > UNSTEADY * scatter * sqrt(2.0 / half) else 0.0

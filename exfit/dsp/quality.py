@@ -1,6 +1,6 @@
 """What a recorder did to a channel: spikes, rounding, intervals in which it was stuck."""
 
-from math import log, sqrt
+from math import log
 from statistics import NormalDist
 
 import numpy as np
@@ -26,8 +26,6 @@ STUCK_RUN, FEWEST_STUCK = 3.0, 20  # times the longest run by chance, and sample
 WAVE_POWER = 0.9  # of the power of a waveform, near its mains frequency
 LARGEST_MEAN = 0.2  # of the standard deviation: the mean of a waveform is smaller
 WAVE_SAMPLES = 4096  # the first ones, from which the frequency is taken
-FEWEST_IN_HALF = 4  # samples at rest, of each half
-UNSTEADY = 6.0  # standard errors between both halves of what is at rest
 FEWEST_CYCLES = 3.0  # that a waveform must show
 
 
@@ -146,17 +144,6 @@ def mains_frequency(time: Array, samples: Array) -> float | None:
     if not MAINS_FREQUENCIES[0] <= frequency <= MAINS_FREQUENCIES[1] or top < FEWEST_CYCLES:
         return None
     return frequency if np.sum(power[lobe]) > WAVE_POWER * np.sum(power) else None
-
-
-def drift_at_rest(samples: Array) -> float:
-    """Return by how much the second half of samples at rest (M,) is off the first; 0 by chance."""
-    half = len(samples) // 2
-    if half < FEWEST_IN_HALF:
-        return 0.0
-    # noise from neighbours: a drift does not pass for it
-    scatter = float(np.std(np.diff(samples))) / sqrt(2.0)
-    drift = float(samples[half:].mean() - samples[:half].mean())
-    return drift if abs(drift) > UNSTEADY * scatter * sqrt(2.0 / half) else 0.0
 
 
 def _excerpt(samples: Array) -> Array:

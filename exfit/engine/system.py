@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from exfit.engine.tangents import tangents
 from exfit.engine.trace import Graph, Node, Signal
 
 Signals = Mapping[str, Signal]
@@ -110,6 +109,8 @@ def differentiate(
     traced: Trace, system: System, free: Sequence[str], moving: Sequence[str] = ()
 ) -> Tangents:
     """Return the derivatives of a trace where the free parameters and the moving inputs move."""
+    from exfit.engine.tangents import tangents
+
     graph = traced.x[0].graph
 
     def symbols(nodes: Sequence[Node], varies: bool) -> tuple[Node, ...]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,13 @@ from exfit.case.schema import (
     PhasesSection,
     RecordFile,
 )
-from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage, outliers
 from exfit.errors import RecordError
 from exfit.fitting.experiment import Channel
 from exfit.fitting.recordings import column_of
-from exfit.inference.noise import effective_samples
 from exfit.records.record import Record
+
+if TYPE_CHECKING:
+    from exfit.dsp.filtering import Filtering, LowPass, Median
 
 Mask = NDArray[np.bool_]
 Section = ChannelSection | PhasesSection
@@ -68,6 +69,8 @@ def with_filter(record: Record, filter: Filter | None) -> Record:
 
     Raises RecordError where it cannot be filtered.
     """
+    from exfit.dsp.filtering import Filtering
+
     if filter is None:
         return record
     signals = {}
@@ -101,6 +104,8 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Cha
 
 def _kept(record: Record, signal: str, section: Section) -> Mask:
     """Return which samples of a channel are compared: numbers, and no outliers."""
+    from exfit.dsp.filtering import outliers
+
     samples = record.signals[signal]
     kept = np.isfinite(samples)
     if section.outliers is not None:
@@ -113,8 +118,10 @@ def _kept(record: Record, signal: str, section: Section) -> Mask:
     return kept
 
 
-def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> Filtering | None:
+def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> "Filtering | None":
     """Return what is done to the samples of a channel, None where nothing is."""
+    from exfit.dsp.filtering import Filtering, MovingAverage
+
     widest = len(kept) // LEAST_WINDOWS
     if isinstance(section.filter, MedianSection) and section.filter.median > widest:
         samples = f"{section.filter.median} samples; at most {widest}, a tenth of the record"
@@ -130,8 +137,12 @@ def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> Fil
         raise RecordError(f"{record.source}: {signal}: {what}: {fault}") from fault
 
 
-def filtering_of(place: str, time: NDArray[np.float64], filter: Filter | None) -> Filtering | None:
+def filtering_of(
+    place: str, time: NDArray[np.float64], filter: Filter | None
+) -> "Filtering | None":
     """Return the filter of a recorded signal (M,) that drives a simulation, None without one."""
+    from exfit.dsp.filtering import Filtering
+
     if filter is None:
         return None
     try:
@@ -140,7 +151,9 @@ def filtering_of(place: str, time: NDArray[np.float64], filter: Filter | None) -
         raise RecordError(f"{place}: filter: {fault}") from fault
 
 
-def _filter(section: Filter | None) -> LowPass | Median | None:
+def _filter(section: Filter | None) -> "LowPass | Median | None":
+    from exfit.dsp.filtering import LowPass, Median
+
     if section is None:
         return None
     if isinstance(section, MedianSection):
@@ -158,6 +171,8 @@ def finest_noise(case: Case, own: float) -> float:
 
 def noise_shape(channel: Channel) -> NoiseShape:
     """Return what the averages of a channel's record and its filter make of white noise."""
+    from exfit.inference.noise import effective_samples
+
     filtering = channel.filtering
     if filtering is None:
         return NoiseShape(1.0, 1)

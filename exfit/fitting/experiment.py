@@ -3,17 +3,20 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.averages import Averages, averages_of
-from exfit.dsp.filtering import Filtering
 from exfit.fitting.nuisances.kinds import OF_SYSTEM, Nuisance
 from exfit.fitting.nuisances.sine import Sine
-from exfit.inference.whitening import Whitening
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
+
+if TYPE_CHECKING:
+    from exfit.dsp.filtering import Filtering
+    from exfit.inference.whitening import Whitening
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -32,7 +35,7 @@ class Channel:
     signal: str
     measured: Array
     weight: float = 1.0
-    filtering: Filtering | None = None
+    filtering: "Filtering | None" = None
     noise: float | None = None
     scale: float = 1.0
     offset: float = 0.0
@@ -99,7 +102,7 @@ class Experiment:
     nuisances: tuple[Nuisance, ...] = ()
     name: str = ""
     sines: tuple[Sine, ...] = ()
-    whitening: Whitening | None = None
+    whitening: "Whitening | None" = None
 
     @property
     def signals(self) -> tuple[str, ...]:

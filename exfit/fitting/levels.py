@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, start_value
 from exfit.errors import RecordError
-from exfit.plants import DRIVING_SCALE, VT0, initial
+from exfit.plants import DRIVING_SCALE, VT0
+from exfit.plants.playback import initial
 from exfit.records.record import Record
 from exfit.util.text import show
 

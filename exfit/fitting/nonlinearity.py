@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from exfit.estimate import half_square
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference import CORRELATED
+from exfit.inference.confidence import CORRELATED
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +28,16 @@ from exfit.case.schema import (
 )
 from exfit.errors import CaseError, RecordError
 from exfit.records.clock import Clock
-from exfit.records.phasors import Phasor, Phasors
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
-from exfit.records.status import Status
 from exfit.records.units import base_of_own
 from exfit.signals import OF_EVENT, SIGNALS
 from exfit.util.sorting import median
 from exfit.util.text import show
+
+if TYPE_CHECKING:
+    from exfit.records.phasors import Phasor, Phasors
+    from exfit.records.status import Status
 
 Array = NDArray[np.float64]
 
@@ -189,21 +191,27 @@ def clock_of(time: Time) -> Clock:
     return Clock(time)
 
 
-def phasors_of(section: PhasorsSection | None) -> Phasors | None:
+def phasors_of(section: PhasorsSection | None) -> "Phasors | None":
     """Return the phasors of a record, None without any."""
+    from exfit.records.phasors import Phasors
+
     if section is None:
         return None
     current = None if section.current is None else _phasor(section.current)
     return Phasors(_phasor(section.voltage), current, section.kV, section.MVA)
 
 
-def _phasor(section: VoltagePhasor | CurrentPhasor) -> Phasor:
+def _phasor(section: VoltagePhasor | CurrentPhasor) -> "Phasor":
+    from exfit.records.phasors import Phasor
+
     connection = section.connection if isinstance(section, VoltagePhasor) else None
     return Phasor(section.magnitude, section.angle, section.unit, section.angle_unit, connection)
 
 
-def status_of(section: StatusSection | None) -> Status | None:
+def status_of(section: StatusSection | None) -> "Status | None":
     """Return the flags of a record, None without any."""
+    from exfit.records.status import Status
+
     if section is None:
         return None
     return Status(section.column, tuple(map(str, section.accept)))

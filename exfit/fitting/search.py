@@ -30,7 +30,7 @@ from exfit.fitting.residuals import CENTRAL_STEP, LEAST_NOISE, ONE_SIDED_STEP, R
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import linearisation
-from exfit.inference import confidence
+from exfit.inference.confidence import confidence
 from exfit.util.strategies import (
     DEFAULT_STRATEGY,
     FROM_FURTHER_STARTS,

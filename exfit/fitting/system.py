@@ -13,19 +13,16 @@ from exfit.errors import CaseError, ModelError
 from exfit.models.sheet import Model
 from exfit.plants import (
     BREAKER,
-    DRIVING,
-    PLAYBACK,
     REFERENCES,
     SATURATION,
     SPEED,
     Equipment,
     SaturationForm,
     Stabilised,
-    initial,
     inputs_at,
     inputs_for_limiters,
-    playback,
 )
+from exfit.plants.playback import DRIVING, PLAYBACK, initial, playback
 from exfit.simulation.kernels import parameters_used
 
 Values = Mapping[str, float]

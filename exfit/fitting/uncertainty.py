@@ -15,22 +15,17 @@ from exfit.fitting.experiment import Channel
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
-from exfit.inference import (
+from exfit.inference.confidence import (
     TIED,
     Confidence,
-    Identifiability,
-    Linearisation,
-    ParameterEffect,
-    PriorRow,
-    ResidualBlock,
-    Rounding,
     Uncertainty,
     confidence,
-    effects,
-    identifiability,
     partners_on_bounds,
     rises,
 )
+from exfit.inference.identifiability import Identifiability, identifiability
+from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
+from exfit.inference.sensitivity import ParameterEffect, effects
 from exfit.inference.wording import listed
 from exfit.util.typed import IN_FILE, KEY
 

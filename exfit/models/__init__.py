@@ -11,7 +11,6 @@ from types import ModuleType
 from exfit.errors import ModelError
 from exfit.models import exciters, governors, limiters, stabilisers
 from exfit.models.sheet import Model, model
-from exfit.models.user_code import run_user_code
 
 
 class Catalogue(Mapping[str, Model]):
@@ -95,4 +94,6 @@ def from_file(path: Path, sha256: str = "") -> Model:
     Raises ModelError where the file cannot be read, has another hash, fails as Python, or defines
     no model.
     """
+    from exfit.models.user_code import run_user_code
+
     return model(path.stem.upper(), run_user_code(path, sha256))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.noise import UNIFORM_SPREAD
-from exfit.dsp.quality import drift_at_rest, quantum, spikes, stuck
+from exfit.dsp.noise import UNIFORM_SPREAD, drift_at_rest
+from exfit.dsp.quality import quantum, spikes, stuck
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import DetectedStep
 from exfit.records.ripple import Ripple, ripple_at_rest

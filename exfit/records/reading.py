@@ -4,13 +4,11 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.resampling import resampled
-from exfit.dsp.three_phase import Connection, vt_of_rms, vt_of_waveforms
 from exfit.errors import RecordError
 from exfit.records.clock import (
     Clock,
@@ -21,12 +19,15 @@ from exfit.records.clock import (
 )
 from exfit.records.formats import open_table
 from exfit.records.formats.table import NONE, Table, column_error, read_bytes, refuse_uneven
-from exfit.records.phasors import Phasors, PhasorTable, smooth_angle
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
-from exfit.records.status import Status, bad_rows, status_error
 from exfit.records.units import alike, needs_base, unit_of, usual
 from exfit.signals import unit_of_signal
 from exfit.util.magnitude import LARGEST, SMALLEST
+
+if TYPE_CHECKING:
+    from exfit.dsp.three_phase import Connection
+    from exfit.records.phasors import Phasors
+    from exfit.records.status import Status
 
 Rows = NDArray[np.intp]
 Repeats = Literal["refuse", "first", "last"]
@@ -69,7 +70,7 @@ class ThreePhases(NamedTuple):
     kind: Literal["waveform", "rms"]
     unit: str
     base: float
-    connection: Connection
+    connection: "Connection"
     cycles: int
 
 
@@ -93,8 +94,8 @@ def read_record(
     rate: float | None = None,
     per_unit: frozenset[str] = NONE,
     memory: float | None = None,
-    phasors: Phasors | None = None,
-    status: Status | None = None,
+    phasors: "Phasors | None" = None,
+    status: "Status | None" = None,
     repeats: Repeats = "refuse",
 ) -> Record:
     """Return the record of a file: each signal is ``column / base * scale + offset``.
@@ -123,6 +124,8 @@ def read_record(
             any, waveforms that are none, a record that cannot be resampled, a row that its flags
             call bad where no sample may be missing, or an angle whose turns cannot be counted.
     """
+    from exfit.records.phasors import PhasorTable
+
     file = open_table(path, sheet, memory)
     table = file if phasors is None else PhasorTable(file, phasors)
     _check_units(table, channels, per_unit)
@@ -232,17 +235,21 @@ def _smooth_angle(
     table: Table, channel: ChannelLike | ThreePhases, angle: Array, rows: Rows
 ) -> Array:
     """Return the angle (M,) in the given rows without jumps by whole turns."""
+    from exfit.records.phasors import smooth_angle
+
     label = f"column {_column_names(channel)[0]!r}"
     return smooth_angle(lambda row: table.place(int(rows[row])), label, angle)
 
 
 def _leave_out(
-    table: Table, status: Status, columns: dict[str, Array], rows: Rows, missing: bool
+    table: Table, status: "Status", columns: dict[str, Array], rows: Rows, missing: bool
 ) -> None:
     """Put nan into those of the given rows that their flags call bad.
 
     Raises RecordError where no sample may be missing.
     """
+    from exfit.records.status import bad_rows, status_error
+
     considered = {*map(int, rows)}
     bad = [row for row in bad_rows(table, status) if row.row in considered]
     if not bad:
@@ -261,6 +268,8 @@ def _of_phases(
 
     Raises RecordError where the columns are not the three phases of one voltage.
     """
+    from exfit.dsp.three_phase import vt_of_rms, vt_of_waveforms
+
     phases = np.stack([columns[name][rows] for name in channel.columns], axis=1)
     huge = np.argwhere(np.isfinite(phases) & (np.abs(phases) > LARGEST))
     if huge.size:
@@ -284,6 +293,8 @@ def _resampled(
     path: Path, time: Array, signals: Mapping[str, Array], rate: float
 ) -> tuple[Array, dict[str, Array]]:
     """Return a record on a slower, even clock; raises RecordError where that cannot be."""
+    from exfit.dsp.resampling import resampled
+
     try:
         return resampled(time, signals, rate)
     except ValueError as fault:

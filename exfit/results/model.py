@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference import Interval, IntervalMethod, closed
+from exfit.inference.confidence import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import (
     Behaviour,

@@ -4,18 +4,19 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from math import floor, log10
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import kept_rows
-from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
-from exfit.results.model import FitResult
-from exfit.results.other_values import PhaseEnd
-from exfit.results.side_by_side import outcome_of
 from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import yaml_number
+
+if TYPE_CHECKING:
+    from exfit.inference.sensitivity import ParameterEffect
+    from exfit.results.model import FitResult
+    from exfit.results.other_values import PhaseEnd
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
     Of more than MOST_ROWS those stay that hold the least and greatest of each column in each of
     many segments.
     """
+    from exfit.dsp.decimation import kept_rows
+
     signals = columns[1:]
     rows = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
     return whole_table(header, [column[rows] for column in columns])
@@ -82,7 +85,7 @@ def iteration_responses_table(responses: IterationResponses) -> str:
     return table(header, [responses.time, *responses.samples])
 
 
-def history_table(result: FitResult) -> str:
+def history_table(result: "FitResult") -> str:
     """Return the history as CSV, a line per iteration."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -124,7 +127,7 @@ def yes_or_no(value: bool | None) -> str:
     return "" if value is None else "yes" if value else "no"
 
 
-def effects_table(effects: Sequence[ParameterEffect]) -> str:
+def effects_table(effects: "Sequence[ParameterEffect]") -> str:
     """Return what 1 % of each parameter does to the records as CSV, the strongest first."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -138,8 +141,10 @@ def effects_table(effects: Sequence[ParameterEffect]) -> str:
     return out.getvalue()
 
 
-def parameter_file(result: FitResult) -> str:
+def parameter_file(result: "FitResult") -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
+    from exfit.results.side_by_side import outcome_of
+
     state = outcome_of(result)
     matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in result.comparisons)
     lines = [
@@ -158,13 +163,13 @@ def parameter_file(result: FitResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _code_hashes(result: FitResult) -> list[str]:
+def _code_hashes(result: "FitResult") -> list[str]:
     """Return the lines with the hashes of code that was run: of a user's model, of a program."""
     labels = (label for label in ("model", "program") if label in result.inputs)
     return [f"{label}_sha256: {result.inputs[label]}" for label in labels]
 
 
-def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
+def phase_end_file(result: "FitResult", end: "PhaseEnd") -> str:
     """Return the values at the end of a phase as YAML, to be read as those of `parameter_file`."""
     matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in end.comparisons)
     own = [name for name in result.own_values if name in end.values]
@@ -183,7 +188,7 @@ def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _remark(result: FitResult, name: str) -> str:
+def _remark(result: "FitResult", name: str) -> str:
     """Return what must be known beside a value and its source."""
     parameter = result.parameters.get(name)
     if parameter is None:
@@ -192,7 +197,7 @@ def _remark(result: FitResult, name: str) -> str:
     return ", ".join([*marks, *([] if parameter.physical else ["not physical"])])
 
 
-def _sources(result: FitResult, names: Iterable[str]) -> Iterator[str]:
+def _sources(result: "FitResult", names: Iterable[str]) -> Iterator[str]:
     """Yield the lines that say where values come from, as far as that is stated."""
     stated = {name: result.sources.get(name, NOT_STATED) for name in names}
     lines = [f"  {name}: {word}" for name, word in stated.items() if word in SOURCES]

@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from exfit.case.case import Case
 from exfit.fitting.system import system_of
-from exfit.inference.wording import digits, listed
 from exfit.simulation.kernels import parameters_used
+
+if TYPE_CHECKING:
+    pass
 
 DEVIATION = 0.2  # of a typical value: as far as units of one kind lie apart
 MOST_NAMED = 3  # parameters, and values, of a sentence
@@ -55,6 +58,8 @@ def by_weight(values: Mapping[str, TypicalValue]) -> dict[str, TypicalValue]:
 
 def first_of(names: Sequence[str]) -> str:
     """Return the first few names as "A, B and 3 more"."""
+    from exfit.inference.wording import listed
+
     others = len(names) - MOST_NAMED
     if others <= 1:  # one more is as short as its name
         return listed(names)
@@ -66,6 +71,8 @@ def _share(shift: float, value: float) -> str:
 
     One of the first order that exceeds the value itself says no more than that it is large.
     """
+    from exfit.inference.wording import digits
+
     if not value:
         return digits(abs(shift))
     share = abs(shift / value)

@@ -11,7 +11,9 @@ from exfit.features.drawings.letters import diagram_and_remarks
 from exfit.models import GOVERNORS
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, typical
-from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
+from exfit.plants import MACHINE, SATURATION, VT0
+from exfit.plants.alone import alone
+from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Response, Simulator
 from exfit.util.files import write

@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING
 
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
-from exfit.results.fit_files import comparison_files, files_of_fit
-from exfit.results.io import validation_text
-from exfit.results.model import FitResult
-from exfit.results.tables import (
-    DIGITS,
-    parameter_file,
-    whole_table,
-)
+from exfit.results.tables import DIGITS, whole_table
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.cache import keep_private, private_cache, read_private
 from exfit.util.file_names import (
@@ -34,7 +27,6 @@ from exfit.util.file_names import (
 )
 from exfit.util.files import write_together
 from exfit.util.interrupts import deferred_interrupts
-from exfit.util.json_files import read_json
 from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
 
@@ -42,6 +34,7 @@ if TYPE_CHECKING:
     from exfit.fitting.uncertainty import UncertaintyAnalysis
     from exfit.records.inspection import Inspection
     from exfit.results.comparisons import Comparison
+    from exfit.results.model import FitResult
     from exfit.results.validation_result import ValidationResult
     from exfit.runs.fits import FitSeries
     from exfit.workflows.profiles import Profiles
@@ -109,12 +102,14 @@ def refuse_inputs(
             )
 
 
-def write_fit(result: FitResult, folder: Path) -> FigureFiles:
+def write_fit(result: "FitResult", folder: Path) -> FigureFiles:
     """Write a fit's numbers, and remember where they are; return its figures, still to be drawn.
 
     Raises ExfitError where the folder cannot be written, and KeyboardInterrupt at an interruption:
     the numbers are whole then.
     """
+    from exfit.results.fit_files import files_of_fit
+
     with deferred_interrupts():
         numbers = dict(files_of_fit(result))
         write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
@@ -212,6 +207,7 @@ def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
     Of each case the values of the fit with the lowest cost are remembered as those of its last fit.
     """
     from exfit.results.side_by_side import results_table
+    from exfit.results.tables import parameter_file
 
     runs = {run.name: (run.case_name, run.result) for run in series.runs}
     with deferred_interrupts():
@@ -238,6 +234,8 @@ def _figure_of_series(series: "FitSeries") -> PlannedFigures:
 
 def _of_records(main: Path) -> set[str]:
     """Return the names of the files that a former run wrote for its records, by its main file."""
+    from exfit.util.json_files import read_json
+
     try:
         content = read_json(main)
         matches = [*content.get("records", ()), *content.get("validation", ())]
@@ -257,6 +255,9 @@ def write_validation(result: "ValidationResult", folder: Path) -> FigureFiles:
 
     As every function here: raises ExfitError where the folder cannot be written.
     """
+    from exfit.results.fit_files import comparison_files
+    from exfit.results.io import validation_text
+
     main = folder / VALIDATION
     with deferred_interrupts():
         numbers = {**dict(comparison_files(result.matches)), VALIDATION: validation_text(result)}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.dsp.quality import drift_at_rest
+from exfit.dsp.noise import drift_at_rest
 from exfit.fitting.experiment import Channel
 from exfit.fitting.recorded.switchings import MASKED
 from exfit.fitting.setup import ExperimentSetup

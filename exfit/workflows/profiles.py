@@ -21,7 +21,7 @@ from exfit.fitting.search import fitted, names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
-from exfit.inference import LEVEL, Interval
+from exfit.inference.confidence import LEVEL, Interval
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.intervals.profile_hull import (
     FoundMinimum,

@@ -21,7 +21,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference import Uncertainty
+from exfit.inference.confidence import Uncertainty
 from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison

@@ -19,7 +19,7 @@ from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import problem_of, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import uncertainty_at
-from exfit.inference import LEVEL
+from exfit.inference.confidence import LEVEL
 from exfit.workflows import fit
 
 # percent, of the record as it is kept; how they come about is tested against SciPy

@@ -12,8 +12,9 @@ from scipy.stats import chi2, kstest
 from scipy.stats import t as student
 
 from exfit.dsp.rounding import noise_before_rounding, rounding_waves
-from exfit.inference import PriorRow, ResidualBlock, Rounding, confidence, partners_on_bounds, rises
+from exfit.inference.confidence import confidence, partners_on_bounds, rises
 from exfit.inference.factors import factored
+from exfit.inference.linear import PriorRow, ResidualBlock, Rounding
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 from exfit.util import typed
 

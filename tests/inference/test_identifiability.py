@@ -8,8 +8,11 @@ import pytest
 from linearised import autoregressive, decay, linearised, std_errors
 from scipy.linalg import qr
 
-from exfit.inference import WEAK, PriorRow, ResidualBlock, confidence, identifiability
+from exfit.inference.combinations import WEAK
+from exfit.inference.confidence import confidence
 from exfit.inference.factors import pivots
+from exfit.inference.identifiability import identifiability
+from exfit.inference.linear import PriorRow, ResidualBlock
 from exfit.inference.wording import digits, listed, move
 from exfit.util.typed import plain
 

@@ -13,7 +13,9 @@ from records import SAMPLES, case_of, config
 from exfit.case.load import load_case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import linearisation
-from exfit.inference import ResidualBlock, confidence, effects
+from exfit.inference.confidence import confidence
+from exfit.inference.linear import ResidualBlock
+from exfit.inference.sensitivity import effects
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
 from exfit.show.terminal.fits import ranking

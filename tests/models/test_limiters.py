@@ -27,10 +27,10 @@ from exfit.plants import (
     VT0,
     Attached,
     Names,
-    infinite_bus,
     inputs_at,
     inputs_for_limiters,
 )
+from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.parts import motion, values_named
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.limit_hits import limiter_actions, limits_hit

@@ -33,15 +33,8 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
 from exfit.models.sheet import model as build
-from exfit.plants import (
-    MACHINE,
-    SATURATION,
-    VT0,
-    Names,
-    exciter_inputs,
-    exciter_parameters,
-    open_circuit,
-)
+from exfit.plants import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
+from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator
@@ -481,7 +474,7 @@ def rest(v, u, p, x):
 
 
 def test_a_user_s_file_is_a_model_like_any_other(tmp_path):
-    from exfit.plants import alone
+    from exfit.plants.alone import alone
 
     (tmp_path / "mine.py").write_text(USER)
     mine = find("mine.py", tmp_path)
@@ -526,7 +519,7 @@ def test_a_missing_file_is_refused_by_name(tmp_path):
     ],
 )
 def test_equations_that_do_not_fit_their_declarations_are_refused(tmp_path, change, says):
-    from exfit.plants import alone
+    from exfit.plants.alone import alone
 
     assert change[0] in USER
     (tmp_path / "mine.py").write_text(USER.replace(*change))

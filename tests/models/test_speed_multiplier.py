@@ -12,7 +12,10 @@ from exfit.fitting.system import system_of as system_in
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.speed_multiplier import times_speed
-from exfit.plants import NETWORK, infinite_bus, initial, open_circuit, playback
+from exfit.plants import NETWORK
+from exfit.plants.infinite_bus import infinite_bus
+from exfit.plants.open_circuit import open_circuit
+from exfit.plants.playback import initial, playback
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 

@@ -16,17 +16,9 @@ from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.models.speed_multiplier import times_speed
-from exfit.plants import (
-    GOVERNOR,
-    MACHINE,
-    NETWORK,
-    SATURATION,
-    STABILISER,
-    VT0,
-    Stabilised,
-    UnitOnLoad,
-    infinite_bus,
-)
+from exfit.plants import GOVERNOR, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
+from exfit.plants.infinite_bus import infinite_bus
+from exfit.plants.unit import UnitOnLoad
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.splines import SplinedInput

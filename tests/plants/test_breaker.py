@@ -10,7 +10,9 @@ from exfit.engine.system import trace
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import MACHINE, NETWORK, VT0, machine_on_load, open_circuit
+from exfit.plants import MACHINE, NETWORK, VT0
+from exfit.plants.machine_on_load import machine_on_load
+from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 

@@ -9,7 +9,9 @@ from exfit.engine.kernel import LinearKernel
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import BREAKER, GOVERNOR, NETWORK, infinite_bus, rests_at
+from exfit.plants import BREAKER, GOVERNOR, NETWORK
+from exfit.plants.governing import rests_at
+from exfit.plants.infinite_bus import infinite_bus
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator

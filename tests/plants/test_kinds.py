@@ -94,3 +94,8 @@ def test_the_page_of_the_plants_lists_each_kind_with_its_signals(kind):
     page = (Path(__file__).parents[2] / "docs" / "plants.md").read_text(encoding="utf-8")
     row = next(line for line in page.splitlines() if line.startswith(f"| `{kind.name}` |"))
     assert row.endswith(f"| {', '.join(kind.compared)} |")
+
+
+def test_each_kind_stands_under_its_name_and_the_events_are_those_of_all():
+    assert all(kind.name == name for name, kind in KINDS.items())
+    assert {event for kind in KINDS.values() for event in kind.events} == {*EVENTS}

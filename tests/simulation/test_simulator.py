@@ -20,7 +20,8 @@ from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
-from exfit.plants import SATURATION, VT0, open_circuit
+from exfit.plants import SATURATION, VT0
+from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.grid import GridSegment
 from exfit.simulation.inputs import (
     Direction,

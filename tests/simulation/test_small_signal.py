@@ -15,7 +15,8 @@ from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import MACHINE, MEASURED, SATURATION, playback
+from exfit.plants import MACHINE, MEASURED, SATURATION
+from exfit.plants.playback import playback
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import StateSpace, linearised, margins, poles_of, small_signal

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from exfit.inference import Linearisation, ResidualBlock
+from exfit.inference.linear import Linearisation, ResidualBlock
 
 
 def linearised(values, errors, jacobian, **changes):

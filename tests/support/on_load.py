@@ -4,7 +4,8 @@ from oracle import MACHINE_SATURATION
 
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.plants import MACHINE, NETWORK, SATURATION, VT0, flow_sheet, infinite_bus
+from exfit.plants import MACHINE, NETWORK, SATURATION, VT0
+from exfit.plants.infinite_bus import flow_sheet, infinite_bus
 
 QUADRATIC = SATURATION["quadratic"]
 ALL_INPUTS = ("vref", "vs", "E", "angle", "R", "X")

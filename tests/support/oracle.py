@@ -14,7 +14,9 @@ from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Parameter, typical
-from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
+from exfit.plants import MACHINE, SATURATION, VT0
+from exfit.plants.alone import alone
+from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.kernels import parameters_used
 
 WITHOUT_PLANT = ("FIRST_ORDER",)

@@ -20,10 +20,10 @@ from exfit.features.planner.unit import read_unit
 from exfit.models import GOVERNORS
 from exfit.models.blocks import Limited
 from exfit.models.machines import Axes
-from exfit.plants import GOVERNOR, MACHINE, SATURATION, STABILISER, Stabilised, UnitOnLoad
+from exfit.plants import GOVERNOR, MACHINE, SATURATION, STABILISER, Stabilised
 from exfit.plants.loaded_machine import Flow
 from exfit.plants.parts import Names, named_parameters, values_named
-from exfit.plants.unit import Controls, Terminals, UnitState, unit_at_rest, unit_motion
+from exfit.plants.unit import Controls, Terminals, UnitOnLoad, UnitState, unit_at_rest, unit_motion
 
 MACHINE_RECORD = """\
 1 'GENROU' 1 6.0 0.033 0.54 0.078 6.4 0.0 0.8958 0.8645 0.1189 0.1969 0.089 0.0521 0.0 0.0 /

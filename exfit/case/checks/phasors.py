@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
-from exfit.records.phasors import OF_POWER, PREFIX, SIGNALS_OF_PHASORS
 from exfit.records.units import alike, quantity_of
 
 COLUMNS_OF_A_PHASOR = (1, 3)
@@ -56,6 +55,8 @@ def _rating_faults(phasors: ContentNode) -> Iterator[Fault]:
 
 def _column_faults(record: ContentNode) -> Iterator[Fault]:
     """Yield the channels of computed columns that the phasors do not give."""
+    from exfit.records.phasors import OF_POWER, PREFIX, SIGNALS_OF_PHASORS
+
     for _, channel in record.at("channels").sections:
         name = channel.text if channel.text is not None else channel.at("column").text
         if name is None or not name.startswith(PREFIX):

@@ -8,7 +8,6 @@ from exfit.case.parts import Parts, kind_of, network_part, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
 from exfit.plants import (
-    HEARD,
     KINDS,
     Attached,
     PlantKind,
@@ -16,9 +15,9 @@ from exfit.plants import (
     acts_without_load,
     inputs_at,
     inputs_for_limiters,
-    rests_at,
-    rests_with_output,
 )
+from exfit.plants.governing import rests_at
+from exfit.plants.stabilising import HEARD, rests_with_output
 from exfit.util.text import show, show_value
 
 PROGRAM_HAS_IT = "the program has its own"

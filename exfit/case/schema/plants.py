@@ -22,7 +22,8 @@ from exfit.case.schema.values import (
     nothing,
 )
 from exfit.models import MACHINE_NAMES
-from exfit.plants import HEARD, PLACES, PowerAt, Swing
+from exfit.plants import PLACES, PowerAt, Swing
+from exfit.plants.stabilising import HEARD
 
 if TYPE_CHECKING:
     Heard = str

@@ -25,7 +25,7 @@ from exfit.fitting.problem import free_parameters, problem_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncertainty_of
-from exfit.inference import Confidence
+from exfit.inference.confidence import Confidence
 from exfit.plants import REFERENCES
 from exfit.signals import NOISE
 from exfit.simulation.inputs import grid_segments

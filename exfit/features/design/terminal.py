@@ -7,7 +7,7 @@ from rich.console import Console
 from exfit.features.design.designed_test import DesignedTest
 from exfit.features.design.experiment_design import Design
 from exfit.features.design.files import sheet_lines
-from exfit.inference import ParameterEffect
+from exfit.inference.sensitivity import ParameterEffect
 from exfit.show.terminal.terminal import (
     NO_BREAK,
     error_of,

@@ -11,7 +11,9 @@ from exfit.features.translate.case import translated_case
 from exfit.features.translate.result import Translation
 from exfit.features.translate.steps import network_of
 from exfit.models.sheet import Model
-from exfit.plants import INFINITE_BUS, MACHINE, NETWORK, OPEN_CIRCUIT
+from exfit.plants import MACHINE, NETWORK
+from exfit.plants.infinite_bus import INFINITE_BUS
+from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.results.model import FitResult
 from exfit.results.tables import table
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures

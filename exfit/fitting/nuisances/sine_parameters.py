@@ -16,7 +16,6 @@ from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.nuisances.sine import FREQUENCY, Sine
 from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.residuals import noise_of
 from exfit.fitting.setup import ExperimentSetup
 
 MOST_OF_LINE = 4.0  # times the amplitude of a line that was found: how large it may become
@@ -39,6 +38,8 @@ def with_sines(
     ``values`` or those given beside the case. Raises RecordError for a frequency that the record
     cannot show.
     """
+    from exfit.fitting.residuals import noise_of
+
     prefix, file = prefix_of(recording), recording.record
     given = {**values, **{name: each.value for name, each in case.given_values.items()}}
     for channel in setup.channels:

@@ -15,15 +15,12 @@ from exfit.case.schema import (
     Unknown,
     start_value,
 )
-from exfit.dsp.filtering import outliers
 from exfit.dsp.jumps import largest_jump
-from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.levels import initial_level
 from exfit.fitting.nuisances.parameters import finds_level, prefix_of
 from exfit.plants import REFERENCES
 from exfit.records.record import Record
-from exfit.records.steps import bounds_about, bounds_of_instant
 
 INSIDE_INTERVAL = 1e-6  # of it: a sample at its end would be on the other side of the jump
 LEVEL_WITHIN = 0.02  # of the mean of a record at rest: how far the voltage there may be from it
@@ -58,6 +55,8 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
 
 def _level(place: str, given: Unknown, test: BumpTest, record: Record) -> Unknown:
     """Return the voltage at rest that a fit finds, with the numbers that its record gives."""
+    from exfit.records.steps import bounds_about
+
     level = initial_level(test, record, "vt")
     return _with_bounds(place, given, level, *bounds_about(level, LEVEL_WITHIN))
 
@@ -120,6 +119,10 @@ def _lowest(value: float | Unknown) -> float:
 
 def _bounded(place: str, step: FindableStep, record: Record, limit: float | None) -> FindableStep:
     """Return a step of the reference, with numbers where it says auto; ``limit``: of outliers."""
+    from exfit.dsp.filtering import outliers
+    from exfit.dsp.step_detection import find_step
+    from exfit.records.steps import bounds_about, bounds_of_instant
+
     auto = [
         key
         for key in ("at", "step")

@@ -19,7 +19,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
-from exfit.inference import Uncertainty
+from exfit.inference.confidence import Uncertainty
 from exfit.inference.wording import listed
 from exfit.results.intervals.instants import decided_by_few_samples, minima_between_samples
 from exfit.results.intervals.profile_hull import (

@@ -12,8 +12,7 @@ from exfit.case.case import Case
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation
-from exfit.inference import UNDETERMINED, Uncertainty
-from exfit.inference.confidence import NORMAL
+from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals

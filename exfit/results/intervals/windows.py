@@ -24,8 +24,7 @@ from exfit.fitting.propagated_noise import carried_noise
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference import UNDETERMINED, Uncertainty
-from exfit.inference.confidence import NORMAL
+from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
 from exfit.plants.machine_playback import MACHINE_PLAYBACK

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from rich.console import Console
 from rich.table import Table
 
-from exfit.inference import ParameterEffect
+from exfit.inference.sensitivity import ParameterEffect
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES

@@ -14,7 +14,7 @@ from rich.segment import Segment, Segments
 from rich.table import Column, Table
 from rich.text import Text
 
-from exfit.inference import Interval, Uncertainty
+from exfit.inference.confidence import Interval, Uncertainty
 from exfit.util.text import printable, rounded
 
 if TYPE_CHECKING:

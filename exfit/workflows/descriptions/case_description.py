@@ -22,7 +22,7 @@ from exfit.case.schema import (
 from exfit.fitting.nuisances.parameters import OPENING, prefix_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import driving_after_opening
-from exfit.inference import Interval
+from exfit.inference.confidence import Interval
 from exfit.plants import NETWORK, REFERENCES
 from exfit.records.reading import file_hash
 from exfit.records.record import Record

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from exfit.case.case import Case
 from exfit.case.schema import Filter, MedianSection, Recording
 from exfit.fitting.setup import ExperimentSetup
-from exfit.plants import initial
+from exfit.plants.playback import initial
 from exfit.signals import COMPARED_IN_EVENT, unit_of_signal
 from exfit.util.text import show
 

@@ -16,7 +16,8 @@ from exfit.models import GOVERNORS, MODELS
 from exfit.models.blocks import field_demand, pi_rest
 from exfit.models.exciters import ac8b
 from exfit.models.machines import MACHINES
-from exfit.plants import GOVERNOR, MACHINE, NETWORK, VT0, UnitOnLoad
+from exfit.plants import GOVERNOR, MACHINE, NETWORK, VT0
+from exfit.plants.unit import UnitOnLoad
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.splines import SplinedInput

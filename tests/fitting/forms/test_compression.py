@@ -12,7 +12,7 @@ from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import search
 from exfit.fitting.uncertainty import linearisation, uncertainty_at
-from exfit.inference import confidence
+from exfit.inference.confidence import confidence
 from exfit.workflows import fit
 
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}, {"at": 2.0, "step": -0.03}]}

@@ -12,7 +12,7 @@ from scipy.stats import binom
 from tiers import few_of
 
 from exfit.fitting.simulation_counter import SimulationCounter
-from exfit.inference import LEVEL
+from exfit.inference.confidence import LEVEL
 from exfit.workflows.case_search import SearchTask, search_outcome
 
 RECORDS = 8

@@ -14,7 +14,7 @@ from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.search import fitted, names_of_records, search
-from exfit.inference import Uncertainty
+from exfit.inference.confidence import Uncertainty
 from exfit.results.intervals.determination import (
     FoundMinimum,
     determination,

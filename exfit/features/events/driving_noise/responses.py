@@ -12,7 +12,7 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.residuals import LEAST_NOISE
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.whitening import CarriedNoise
-from exfit.plants import initial
+from exfit.plants.playback import initial
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.splines import SplinedInput
 

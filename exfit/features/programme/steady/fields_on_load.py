@@ -12,7 +12,7 @@ from exfit.errors import ModelError
 from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.point_fit import FittedPoints, PointProblem, fit_points
 from exfit.fitting.parameters import FreeParameter
-from exfit.inference import ResidualBlock
+from exfit.inference.linear import ResidualBlock
 from exfit.models.machines import Machine
 from exfit.signals import NOISE
 

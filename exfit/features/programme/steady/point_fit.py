@@ -11,17 +11,9 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.fitting.uncertainty import shared_reason
-from exfit.inference import (
-    Confidence,
-    Identifiability,
-    Linearisation,
-    PriorRow,
-    ResidualBlock,
-    Uncertainty,
-    confidence,
-    identifiability,
-    rises,
-)
+from exfit.inference.confidence import Confidence, Uncertainty, confidence, rises
+from exfit.inference.identifiability import Identifiability, identifiability
+from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
 from exfit.inference.wording import listed
 
 Array = NDArray[np.float64]

@@ -8,7 +8,8 @@ import numpy as np
 from exfit.dsp.decimation import envelope
 from exfit.features.report.layout import BINS, LEVEL, MILLI, TALL, TIME, line_style
 from exfit.fitting.uncertainty import Sensitivity
-from exfit.inference import Correlation, ParameterEffect
+from exfit.inference.confidence import Correlation
+from exfit.inference.sensitivity import ParameterEffect
 from exfit.results.model import FitResult
 from exfit.results.typical_values import by_weight
 from exfit.show.blocks import Chart, Panel, Series
