@@ -7,8 +7,8 @@ feature is imported before it is used:
     PUBLIC    names of `exfit` itself
     CHECKS    what `exfit check` does with a file that has this key, given its path; False: unsound
     SECTIONS  keys of a case file that other commands read: a class of fields, and why not a case
+    SUGGESTIONS  sections of a case that an inspected file suggests, none where it is another kind
     PLANTS    kinds of plant, by the names that a case gives them
-    EVENT_DRAFT  lines of a case that a record of an event suggests: its plant, its record
     INPUT_NOISE  of the signals that drive a simulation: to weigh errors by it, to take out its bias
     CAUSES_BEFORE_FIT  causes of a misfit that a record shows before a fit, (case, recording)
     PROGRAMS  what simulates a case in place of exfit, by the kind of its plant: given the case, a

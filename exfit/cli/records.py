@@ -59,8 +59,9 @@ def inspect_(
     Suggests the record, test and estimate sections of a case; guesses are marked. Writes
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
+    from exfit.case.draft.case_draft import CaseDraft
     from exfit.case.draft.record_settings import RecordSettings
-    from exfit.case.draft.suggested_sections import suggested_sections
+    from exfit.case.draft.suggestion import suggested_sections
     from exfit.show import run_folder
 
     # files of one record in several formats have one stem
@@ -73,6 +74,7 @@ def inspect_(
         from exfit.show import terminal
 
         console = terminal.console()
-        terminal.inspection(console, inspection, suggested_sections(inspection, file.as_posix()))
+        suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
+        terminal.inspection(console, inspection, suggested.lines())
         terminal.written(console, folder)
     output.draw(figures)

@@ -6,6 +6,7 @@ import yaml
 from columns import Columns
 from step_records import step_record
 
+from exfit.case.draft.case_draft import CaseDraft
 from exfit.case.draft.suggestion import record_section
 from exfit.records.inspection import inspect
 
@@ -87,7 +88,7 @@ def test_a_frequency_that_wanders_is_no_step_of_the_test():
 def test_a_relative_field_voltage_has_its_scale_found_within_what_machines_have(factor, unit):
     units = {"Uf": unit} if unit else {}
     inspection = inspected(units, Ug=VT, Uf=factor * EFD)
-    section = yaml.safe_load("\n".join(record_section(inspection, "a.csv")))
+    section = yaml.safe_load(CaseDraft(record_section(inspection, "a.csv")).text)
     scale = section["record"]["channels"]["efd"]["scale"]
     assert scale["min"] < scale["start"] < scale["max"]
     assert scale["min"] < 1.0 / factor < scale["max"]
@@ -96,7 +97,7 @@ def test_a_relative_field_voltage_has_its_scale_found_within_what_machines_have(
 
 def test_power_in_per_unit_of_the_grid_needs_a_base():
     columns = {"ETRM 1[A 20.0]1": VT, "POWR 1[A 20.0]1": 0.5 + 10.0 * NOISE}
-    section = yaml.safe_load("\n".join(record_section(inspected(**columns), "a.csv")))
+    section = yaml.safe_load(CaseDraft(record_section(inspected(**columns), "a.csv")).text)
     assert section["record"]["channels"]["p"] == {
         "column": "POWR 1[A 20.0]1", "unit": "pu", "base": "?"
     }  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 from columns import Columns
 from tiers import few_of
 
-from exfit.case.draft.starting_tests import starting_tests
+from exfit.features.start.starting_tests import starting_tests
 from exfit.records.inspection import inspect
 from exfit.records.recorded_tests import tests_of as recorded_tests
 

@@ -15,7 +15,13 @@ from step_records import step_record
 from tables import read_columns
 from tiers import few_of
 
-from exfit.case.draft.suggestion import bump_section, record_section, weights_section
+from exfit.case.draft.case_draft import CaseDraft
+from exfit.case.draft.suggestion import (
+    bump_section,
+    record_section,
+    suggested_sections,
+    weights_section,
+)
 from exfit.dsp.step_detection import DetectedStep
 from exfit.errors import RecordError
 from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
@@ -94,8 +100,10 @@ def test_a_recorded_reference_shows_its_steps_to_the_sample(name):
     assert [change.at for change in changes] == pytest.approx([1.0, 11.0], abs=0.005)  # one sample
     assert [change.size for change in changes] == pytest.approx([0.05, -0.05], rel=1e-6)
     assert [step.at for step in inspection.steps] == pytest.approx([1.0, 11.0], abs=0.005)
-    assert yaml.safe_load("\n".join(bump_section(inspection))) == {"test": {"vref": "recorded"}}
-    section = yaml.safe_load("\n".join(record_section(inspection, "a.csv", only=("vt",))))
+    assert yaml.safe_load(CaseDraft(bump_section(inspection)).text) == {
+        "test": {"vref": "recorded"}
+    }
+    section = yaml.safe_load(CaseDraft(record_section(inspection, "a.csv", only=("vt",))).text)
     assert section["record"]["channels"].keys() == {"vt", "vref"}
 
 
@@ -230,7 +238,7 @@ def test_the_steps_of_a_record_in_engineering_units_are_those_of_the_reference()
 
 
 def test_a_suggested_case_holds_no_base_that_nobody_gave():
-    section = yaml.safe_load("\n".join(record_section(INSPECTED, "dirty.csv")))["record"]
+    section = yaml.safe_load(CaseDraft(record_section(INSPECTED, "dirty.csv")).text)["record"]
     assert section["time"] == "t"
     assert section["gaps"] == "skip"
     assert section["channels"] == {
@@ -238,26 +246,22 @@ def test_a_suggested_case_holds_no_base_that_nobody_gave():
         "ifd": {"column": "Ifd [A]", "unit": "A", "base": "?"},
         "efd": {"column": "Field voltage (V)", "unit": "V", "base": "?"},
     }
-    (up, down) = yaml.safe_load("\n".join(bump_section(INSPECTED)))["test"]["vref"]
+    (up, down) = yaml.safe_load(CaseDraft(bump_section(INSPECTED)).text)["test"]["vref"]
     assert up["at"]["min"] < 1.0 < up["at"]["max"]
     assert (up["step"], down["step"]) == ("?", "?")
-    sizes = re.findall(r"vt changed by (\S+)", "\n".join(bump_section(INSPECTED)))
+    sizes = re.findall(r"vt changed by (\S+)", CaseDraft(bump_section(INSPECTED)).text)
     assert list(map(float, sizes)) == pytest.approx([0.0495, -0.0471], rel=0.06)
 
 
 def test_several_channels_are_to_be_balanced_and_a_single_one_is_not():
-    section = yaml.safe_load("\n".join(weights_section(INSPECTED)))
-    assert section == {"estimate": {"weights": "balanced"}}
-    assert weights_section(inspect(sample(SAMPLES / "first_order.csv"))) == []
+    section = weights_section(INSPECTED)
+    assert yaml.safe_load(CaseDraft(section).text) == {"estimate": {"weights": "balanced"}}
+    assert weights_section(inspect(sample(SAMPLES / "first_order.csv"))) == {}
 
 
 def test_every_suggestion_fits_a_terminal_of_80_columns_but_for_names():
-    lines = [
-        *record_section(INSPECTED, "dirty.csv"),
-        *bump_section(INSPECTED),
-        *weights_section(INSPECTED),
-    ]
-    assert max(map(len, lines)) <= 80
+    sections = suggested_sections(INSPECTED, "dirty.csv")
+    assert max(map(len, CaseDraft(sections).lines())) <= 80
 
 
 def test_time_that_repeats_or_goes_back_is_reported_by_place_and_left_out():
@@ -419,7 +423,7 @@ def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency
     (step,) = inspection.steps
     assert step.at == pytest.approx(1.0, abs=WITHIN)
     assert step.sizes[group.name] / group.level == pytest.approx(0.0495, rel=0.02)
-    text = "\n".join(record_section(inspection, "w.csv"))
+    text = CaseDraft(record_section(inspection, "w.csv")).text
     assert yaml.safe_load(text)["record"]["channels"]["vt"] == {
         "phases": ["UL1", "UL2", "UL3"], "kind": "waveform", "connection": "phase-to-ground",
         "unit": "kV", "base": "?"
@@ -471,7 +475,8 @@ def test_whatever_was_recorded_is_reported_as_valid_json_and_yaml(content):
     except RecordError:
         return
     json.dumps(inspection.as_json())
-    text = "\n".join([*record_section(inspection, "a: b.csv"), *bump_section(inspection)])
+    sections = {**record_section(inspection, "a: b.csv"), **bump_section(inspection)}
+    text = CaseDraft(sections).text
     assert set(yaml.safe_load(text)) == {"record", "test"}
 
 

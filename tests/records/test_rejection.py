@@ -10,9 +10,10 @@ from step_records import step_record
 from tiers import few_of
 from typed_rejection import Load, recorded_rejection
 
-from exfit.case.draft.starting_tests import starting_tests
+from exfit.case.draft.case_draft import CaseDraft
 from exfit.case.draft.suggestion import bump_section
 from exfit.errors import ExfitError
+from exfit.features.start.starting_tests import starting_tests
 from exfit.features.start.table_of_tests import TableRow
 from exfit.features.start.table_of_tests import tests_of_table as named_tests
 from exfit.records.formats import open_table
@@ -96,7 +97,7 @@ def test_a_step_of_the_reference_is_none(seed):
 def test_the_suggested_sections_are_those_of_a_rejection():
     load = LOADS[0]
     inspection = rejection(load, p=(load.P, 0.0), q=(load.Q, 0.0))
-    sections = yaml.safe_load("\n".join(bump_section(inspection)))
+    sections = yaml.safe_load(CaseDraft(bump_section(inspection)).text)
     assert sections["plant"]["type"] == "machine-on-load"
     powers = sections["plant"]["network"]
     assert powers == pytest.approx({"P": load.P, "Q": load.Q}, abs=3.0 * NOISE)

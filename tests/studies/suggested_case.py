@@ -32,6 +32,7 @@ from records import write
 
 import exfit
 from exfit.case.case import Case
+from exfit.case.draft.case_draft import CaseDraft
 from exfit.case.draft.suggestion import record_section, weights_section
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
@@ -129,13 +130,13 @@ def suggested(record, signals, folder):
     """Return channels and estimate section that the inspection of a record's file suggests."""
     file = write(folder / "record.csv", t=record.time, **record.signals)
     inspection = inspect(open_table(file))
-    section = yaml.safe_load("\n".join(record_section(inspection, file.name)))
+    section = yaml.safe_load(CaseDraft(record_section(inspection, file.name)).text)
     channels = {signal: section["record"]["channels"][signal] for signal in signals}
     comparison = {
         signal: {"column": signal, **(entry if isinstance(entry, dict) else {})}
         for signal, entry in channels.items()
     }
-    return comparison, yaml.safe_load("\n".join(weights_section(inspection)))
+    return comparison, yaml.safe_load(CaseDraft(weights_section(inspection)).text)
 
 
 def compare(number, repeats):

@@ -9,7 +9,7 @@ from loose_records import loose, sound
 from programme_files import FREE
 
 from exfit.case.load import parse_case
-from exfit.features.planner.import_case import case_text
+from exfit.features.planner.import_case import imported_case
 from exfit.features.planner.records import alternatives, contradictions, definition_of, definitions
 from exfit.features.planner.unit import read_unit
 from exfit.models import MODELS
@@ -104,7 +104,7 @@ def drawn(value, row, random, spread):
 def write_record(folder, bus, unit, random):
     """Write the record of a step of a unit with its true values."""
     text = "".join(loose(part, values, random, bus=bus) for part, values, _ in unit)
-    case = case_text(read_unit(text, "true.dyr"), "true.dyr")
+    case = imported_case(read_unit(text, "true.dyr"), "true.dyr").text
     case = case.replace("{at: 1.0, step: 0.05}", f"{{at: {AT}, step: {STEP}}}")
     case = case.replace("duration: 10.0", f"duration: {LENGTH}")
     case += "simulation: {output_step: 0.0005}\n"

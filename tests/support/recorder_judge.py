@@ -6,8 +6,9 @@ from pathlib import Path
 import yaml
 from recorder_files import SIGNALS, Column, RecorderFile
 
+from exfit.case.draft.case_draft import CaseDraft
 from exfit.case.draft.suggestion import bump_section, record_section
-from exfit.case.open_values import FILL_IN
+from exfit.case.open_values import QUESTION
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 
@@ -16,7 +17,7 @@ ORDER = (RIGHT, ASKED, MISSED, WRONG)
 SCALE = 0.02  # of a base: more is another one
 INSTANT = 0.05  # s: farther off, a step is another one
 LINE = 0.02  # of the frequency of a ripple
-TO_FILL_IN = FILL_IN.strip('"')
+TO_FILL_IN = QUESTION
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class Judged:
 def judged(file: RecorderFile, path: Path) -> Judged:
     """Return what is suggested of a file as it stands at a path, beside its truth."""
     inspection = inspect(open_table(path))
-    lines = [*record_section(inspection, path.name), *bump_section(inspection)]
+    sections = {**record_section(inspection, path.name), **bump_section(inspection)}
+    lines = CaseDraft(sections).lines()
     suggested = yaml.safe_load("\n".join(lines))
     texts = [*inspection.findings, *_comments(lines)]
     channels = suggested["record"]["channels"]

@@ -6,6 +6,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Parameter, SearchRange, typical
 
+ALONE = "FIRST_ORDER"  # the model whose output is vt itself
 BOUNDS = (0.1, 10.0)  # times the start
 WITHIN = 2.0  # a factor: a start is at least so far from the bounds that its sheet names
 

@@ -1,16 +1,14 @@
-"""The sections of a case that an inspected record suggests: record and test, with what to check."""
+"""The sections of a case that a recorder's file suggests, with what must be checked."""
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from textwrap import wrap
 from types import MappingProxyType
-
-import yaml
+from typing import Any
 
 from exfit.case.draft.bases import Base
-from exfit.case.open_values import FILL_IN
-from exfit.case.templates import commented, in_comment, quoted
+from exfit.case.draft.case_draft import Noted, Remark, Section, in_braces
+from exfit.case.open_values import QUESTION
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
 from exfit.records.channel_recognition import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
@@ -18,230 +16,218 @@ from exfit.records.inspection import Inspection
 from exfit.records.rejection import POWERS, BreakerOpening
 from exfit.records.steps import RecordedStep, bounds_of_instant
 from exfit.records.units import unit_of
+from exfit.registry import parts
 from exfit.signals import COMPARED, OF_EVENT, RECORDED, SIGNALS
-from exfit.util.text import yaml_number
 
 NO_BASES: Mapping[str, Base] = MappingProxyType({})
 DIGITS = 4
-WIDTH = 80  # columns of a comment
 BASE_ON_LOAD = "; check its base: on load the level does not show whether it is the air-gap line"
 SPEED = "speed"  # which no plant with the breaker open has
 COLUMNS_LISTED = 6  # among which the voltage may be
 
 
-def record_section(
+def record_section(inspection: Inspection, file: str, only: tuple[str, ...] = COMPARED) -> Section:
+    """Suggest the ``record`` of a file; signals that are not in ``only`` are comments.
+
+    A channel in engineering units has a base that is to be filled in.
+    """
+    channels = channels_section(inspection, only, NO_BASES)
+    return {"record": record_of(inspection, file, channels)}
+
+
+def record_of(
     inspection: Inspection,
     file: str,
-    only: tuple[str, ...] = COMPARED,
-    bases: Mapping[str, Base] = NO_BASES,
+    channels: Any,
     window: tuple[float, float] | None = None,
-) -> list[str]:
-    """Return the lines of a ``record:`` section; signals that are not in ``only`` as comments.
+    extra: Section | None = None,
+) -> Section:
+    """Make the section of a record with some channels: what its file needs to be read again.
 
-    A channel in engineering units without one of the ``bases`` has a base that is to be filled in:
-    no number, so that a case with it is refused.
+    ``extra`` are sections between the time and the channels.
     """
-    lines = ["record:", f"  file: {plain_text(file)}", f"  time: {clock_text(inspection)}"]
-    lines += ["  channels:", *channel_lines(inspection, only, bases)]
-    return [*lines, *window_lines(window), *gap_lines(inspection), *reading_lines(inspection)]
-
-
-def channel_lines(
-    inspection: Inspection, only: tuple[str, ...], bases: Mapping[str, Base]
-) -> list[str]:
-    """Return the entries of all channels, those that are not compared as comments."""
-    channels = [
-        channel
-        for signal in RECORDED
-        if (channel := inspection.channel_of(signal)) and (signal not in OF_EVENT or signal in only)
-    ]
-    return [
-        *_voltage_lines(inspection, bases.get("vt")),
-        *_channel_lines(channels, only, inspection, bases),
-    ]
-
-
-def window_lines(window: tuple[float, float] | None) -> list[str]:
-    """Return the line of a window (s), if there is one."""
-    return (
-        []
-        if window is None
-        else [f"  window: [{number_text(window[0])}, {number_text(window[1])}]"]
-    )
-
-
-def gap_lines(inspection: Inspection) -> list[str]:
-    """Return the line that a record with missing samples needs."""
+    clock = inspection.clock
+    columns = clock.columns[0] if len(clock.columns) == 1 else list(clock.columns)
     signals = (inspection.channel_of(signal) for signal in RECORDED)
-    if not any(channel.missing for channel in signals if channel is not None):
-        return []
-    return ["  gaps: skip            # samples without a number are left out"]
+    missing = any(channel.missing for channel in signals if channel is not None)
+    gaps = Noted("skip", "samples without a number are left out")
+    return {
+        "file": file,
+        "time": columns if clock.unit is None else {"column": clock.columns[0], "unit": clock.unit},
+        **(extra or {}),
+        "channels": channels,
+        **({} if window is None else {"window": [*map(rounded, window)]}),
+        **({"gaps": gaps} if missing else {}),
+        **({} if inspection.sheet is None else {"sheet": inspection.sheet}),
+        **({} if inspection.memory is None else {"memory": rounded(inspection.memory)}),
+    }
 
 
-def reading_lines(inspection: Inspection) -> list[str]:
-    """Return the lines that the file of a record needs to be read again: its sheet, its memory."""
-    sheet, memory = inspection.sheet, inspection.memory
-    return [
-        *([] if sheet is None else [f"  sheet: {plain_text(sheet)}"]),
-        *([] if memory is None else [f"  memory: {number_text(memory)}"]),
-    ]
+def suggested_sections(
+    inspection: Inspection, file: str, bases: Mapping[str, Base] = NO_BASES
+) -> Section:
+    """Suggest the sections of a case for an inspected file: of a bump test, or of an event."""
+    return suggested_event(inspection, file, bases) or {
+        **record_section(inspection, file),
+        **bump_section(inspection),
+        **weights_section(inspection),
+    }
 
 
-def _voltage_lines(inspection: Inspection, base: Base | None) -> Iterator[str]:
-    """Yield the entry of vt where no channel is vt by itself: three phases, or an open question."""
-    if inspection.channel_of("vt") is not None:
-        return
-    for group in inspection.phases[:1]:
-        yield from (f"    # {in_comment(line)}" for line in _about_phases(inspection, group))
-        yield f"    vt: {_phases(inspection, group, base)}"
-    if not inspection.phases:
-        columns = ", ".join(plain_text(c.name) for c in inspection.channels[:COLUMNS_LISTED])
-        more = ", ..." if len(inspection.channels) > COLUMNS_LISTED else ""
-        yield "    # the terminal voltage: which column is it?"
-        yield f"    # {columns}{more}"
-        yield f"    vt: {{column: {FILL_IN}}}"
+def suggested_event(inspection: Inspection, file: str, bases: Mapping[str, Base]) -> Section:
+    """Suggest the sections of a case for a record that is no bump test; {} for one that is."""
+    suggestions = (part.load() for part in parts("SUGGESTIONS").values())
+    sections = (suggest(inspection, file, bases) for suggest in suggestions)
+    return next(filter(None, sections), {})
 
 
-def _channel_lines(
-    channels: Sequence[InspectedChannel],
-    only: tuple[str, ...],
-    inspection: Inspection,
-    bases: Mapping[str, Base],
-) -> Iterator[str]:
-    """Yield the entry of each channel, with what to check above it.
+def channels_section(
+    inspection: Inspection, only: tuple[str, ...], bases: Mapping[str, Base]
+) -> Section:
+    """Suggest the entries of all channels, with what to check above each.
 
-    A recorded reference drives the simulation: it is not compared.
+    What is not compared is a comment; a recorded reference drives the simulation.
     """
     loaded = is_on_load(inspection.channels)
-    for channel in channels:
+    section = _voltage(inspection, bases.get("vt"))
+    for signal in RECORDED:
+        channel = inspection.channel_of(signal)
+        if channel is None or (signal in OF_EVENT and signal not in only):
+            continue
         drives = channel is inspection.reference
-        compared = channel.signal in only and (channel.signal != SPEED or loaded)
-        mark = "" if drives or compared else "# "
-        base = bases.get(str(channel.signal))
+        compared = signal in only and (signal != SPEED or loaded)
+        base = bases.get(signal)
         scale = None if base is not None else scale_to_find(channel, inspection.channels)
-        about = in_comment(_about(channel, scale, loaded))
-        yield from wrap(about, WIDTH, initial_indent="    # ", subsequent_indent="    #   ")
-        yield f"    {mark}{channel.signal}: {_channel(channel, drives, base, scale)}"
+        entry = channel_entry(channel, base, scale, drives)
+        about = _about(channel, scale, loaded)
+        if drives or compared:
+            section[signal] = Noted(entry, above=about)
+        else:
+            section[Remark(f"{about}\n{signal}: {in_braces(entry)}")] = None
+    return section
 
 
-def weights_section(inspection: Inspection) -> list[str]:
-    """Return the lines of an ``estimate:`` section; none where a single channel is compared.
+def _voltage(inspection: Inspection, base: Base | None) -> Section:
+    """Suggest vt where no channel is vt by itself: three phases, or an open question."""
+    if inspection.channel_of("vt") is not None:
+        return {}
+    for group in inspection.phases:
+        first = _first_phase(inspection, group)
+        unit, value = _unit_and_base(first, base)
+        phases = {
+            "phases": list(group.columns),
+            "kind": group.kind,
+            "connection": connection_of(group.columns),
+            "unit": unit,
+            "base": value,
+        }
+        level = (
+            f"{first.name} rests at {first.level:.5g}"
+            if group.kind == "rms"
+            else f"waveforms of {first.frequency:.4g} Hz, crest {max(first.high, -first.low):.5g}"
+        )
+        about = (
+            "three phases by their names; base: rated voltage, line to line, in "
+            f"{first.unit or 'the unit of the columns'}; check connection, a factor of sqrt(3): "
+            f"phase-to-ground or phase-to-phase; {level}"
+        )
+        return {"vt": Noted(phases, above=about)}
+    columns = ", ".join(channel.name for channel in inspection.channels[:COLUMNS_LISTED])
+    more = ", ..." if len(inspection.channels) > COLUMNS_LISTED else ""
+    about = f"the terminal voltage: which column is it? {columns}{more}"
+    return {"vt": Noted({"column": QUESTION}, above=about)}
+
+
+def weights_section(inspection: Inspection) -> Section:
+    """Suggest the ``estimate`` of a case; nothing where a single channel is compared.
 
     The noise of each channel from sample to sample is no weight: what a model does not match, as
     the ripple of a bridge, is more.
     """
     signals = {"vt", *(signal for signal in COMPARED if inspection.channel_of(signal))}
     if len(signals) < 2:
-        return []
+        return {}
     text = "each channel by how well the model matches it"
-    return ["estimate:", commented("  weights: balanced", text)]
+    return {"estimate": {"weights": Noted("balanced", text)}}
 
 
-def bump_section(inspection: Inspection) -> list[str]:
-    """Return the lines of a ``test:`` section: a breaker that opens, the recorded reference, steps.
+def bump_section(inspection: Inspection) -> Section:
+    """Suggest the ``test``: a breaker that opens, the recorded reference, or steps.
 
     The instants of steps are found by the fit; their sizes are to be filled in: vt changes by less,
     and the gain of a regulator is what makes the difference.
     """
     if inspection.opening is not None:
         return _rejection_sections(inspection, inspection.opening)
-    return steps_section(inspection, inspection.steps, (None,) * len(inspection.steps))
+    return {"test": steps_section(inspection, inspection.steps, (None,) * len(inspection.steps))}
 
 
-def _rejection_sections(inspection: Inspection, opening: BreakerOpening) -> list[str]:
-    """Return the lines of the sections ``plant:`` and ``test:`` of a load rejection."""
-    levels = dict.fromkeys(POWERS, FILL_IN)
+def _rejection_sections(inspection: Inspection, opening: BreakerOpening) -> Section:
+    levels: Section = {signal.upper(): QUESTION for signal in POWERS}
     for signal, level in opening.levels.items():
         channel = inspection.channel_of(signal)
         if signal in POWERS and channel is not None and channel.unit in (None, "pu"):
-            levels[signal] = number_text(level)
-    powers = ", ".join(f"{signal.upper()}: {level}" for signal, level in levels.items())
-    return [
-        "plant:",
-        commented("  type: machine-on-load", "or infinite-bus, with the exciter in service"),
-        commented(f"  network: {{{powers}}}", "pu of the machine, until the breaker opens"),
-        "test:",
-        commented(
-            "  breaker: {opens: {start: auto}}", f"{opening.at:.4f} +- {opening.error:.1g} s"
-        ),
-    ]
+            levels[signal.upper()] = rounded(level)
+    opens = {"opens": {"start": "auto"}}
+    return {
+        "plant": {
+            "type": Noted("machine-on-load", "or infinite-bus, with the exciter in service"),
+            "network": Noted(levels, "pu of the machine, until the breaker opens"),
+        },
+        "test": {"breaker": Noted(opens, f"{opening.at:.4f} +- {opening.error:.1g} s")},
+    }
 
 
 def steps_section(
-    inspection: Inspection,
-    steps: Sequence[RecordedStep],
-    sizes: Sequence[float | None],
-    level: Sequence[str] = (),
-) -> list[str]:
-    """Return the lines of a ``test:`` section as ``bump_section``, of some steps of known sizes.
+    inspection: Inspection, steps: Sequence[RecordedStep], sizes: Sequence[float | None]
+) -> Section:
+    """Suggest the reference of a test with some steps of known sizes.
 
-    The size (pu) of a step is None where it is to be filled in; ``level`` is the line of vt0.
+    The size (pu) of a step is None where it is to be filled in.
     """
-    lines = ["test:", *level]
     if inspection.reference is not None:
         text = f"{inspection.reference.name}, from its level at rest on"
-        return [*lines, commented("  vref: recorded", text)]
+        return {"vref": Noted("recorded", text)}
     if not steps:
         at = "the record shows no step: when, s, and by how much, pu?"
-        return [*lines, f"  # {at}", f"  vref: [{{at: {FILL_IN}, step: {FILL_IN}}}]"]
-    lines.append("  vref:")
-    for step, size in zip(steps, sizes, strict=True):
-        lines += _step(inspection, step, size)
-    return lines
+        return {"vref": Noted([{"at": QUESTION, "step": QUESTION}], above=at)}
+    return {
+        "vref": [_step(inspection, *step) for step in zip(steps, sizes, strict=True)],
+    }
 
 
-def _step(inspection: Inspection, step: RecordedStep, given: float | None) -> Iterator[str]:
+def _step(inspection: Inspection, step: RecordedStep, given: float | None) -> Section:
     reference = inspection.channel_of("vref")
     if reference is not None and reference.name in step.seen_in:
         own = min((change.at for change in reference.steps), key=lambda at: abs(at - step.at))
         size = step.sizes.get(reference.name, 0.0)
-        yield f"    - at: {number_text(own)}"
-        if reference.seems_per_unit:
-            yield f"      step: {number_text(size)}"
-        else:
-            yield commented(f"      step: {FILL_IN}", f"pu; {reference.name} {size:+.4g}")
-        return
+        to_scale = Noted(QUESTION, f"pu; {reference.name} {size:+.4g}")
+        return {
+            "at": rounded(own),
+            "step": rounded(size) if reference.seems_per_unit else to_scale,
+        }
     if step.from_start:
         text = "the record moves from its first sample: made then, or before?"
-        yield commented(f"    - at: {number_text(step.at)}", text)
+        at = Noted(rounded(step.at), text)
     else:
         bounds = bounds_of_instant(step.at, inspection.time)
-        yield commented(f"    - at: {_range(step.at, *bounds)}", f"+- {step.error:.1g} s")
+        at = Noted(_range(step.at, *bounds), f"+- {step.error:.1g} s")
     share = inspection.change_of_voltage(step)
-    change = "" if share is None else f"; vt changed by {number_text(share)}"
-    keyed_in = FILL_IN if given is None else yaml_number(given)
-    yield commented(f"      step: {keyed_in}", f"pu, as it was keyed in{change}")
+    change = "" if share is None else f"; vt changed by {rounded(share)}"
+    keyed_in = QUESTION if given is None else given
+    return {"at": at, "step": Noted(keyed_in, f"pu, as it was keyed in{change}")}
 
 
-def _phases(inspection: Inspection, group: InspectedPhases, base: Base | None) -> str:
-    columns = ", ".join(plain_text(name) for name in group.columns)
-    kind = f"kind: {group.kind}, connection: {connection_of(group.columns)}"
-    unit, value = _unit_and_base(_first_phase(inspection, group), base)
-    return f"{{phases: [{columns}], {kind}, unit: {unit}, base: {value}}}"
-
-
-def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, str]:
-    """Return the unit and the base of a channel that needs both, as far as they are known."""
+def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, str | float]:
+    """Find the unit and the base of a channel that needs both, as far as they are known."""
     known = channel.unit if channel.unit and unit_of(channel.unit) else None
     if base is None:
-        return plain_text(known) if known else FILL_IN, FILL_IN
-    unit = known or base.unit
-    return plain_text(unit) if unit else FILL_IN, yaml_number(base.in_unit(known, channel.name))
+        return known or QUESTION, QUESTION
+    return known or base.unit or QUESTION, base.in_unit(known, channel.name)
 
 
 def _first_phase(inspection: Inspection, group: InspectedPhases) -> InspectedChannel:
     return next(channel for channel in inspection.channels if channel.name == group.columns[0])
-
-
-def _about_phases(inspection: Inspection, group: InspectedPhases) -> Iterator[str]:
-    first = _first_phase(inspection, group)
-    unit = first.unit or "the unit of the columns"
-    yield f"three phases by their names; base: rated voltage, line to line, in {unit};"
-    yield "check connection, a factor of sqrt(3): phase-to-ground or phase-to-phase"
-    if group.kind == "rms":
-        yield f"{first.name} rests at {first.level:.5g}"
-    else:
-        yield f"waveforms of {first.frequency:.4g} Hz, crest {max(first.high, -first.low):.5g}"
 
 
 def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) -> str:
@@ -261,71 +247,46 @@ def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) ->
     return f"{why}; {channel.level:.5g} {channel.unit or '?'} at rest; base: {base}"
 
 
-def channel_entry(channel: InspectedChannel, base: Base | None) -> str:
-    """Return the entry of a channel that is compared, as a case has it."""
-    return _channel(channel, drives=False, base=base, scale=None)
-
-
-def _channel(
-    channel: InspectedChannel, drives: bool, base: Base | None, scale: ScaleRange | None
-) -> str:
-    entries = {"column": plain_text(channel.name), **_scaling(channel, base, scale)}
+def channel_entry(
+    channel: InspectedChannel,
+    base: Base | None,
+    scale: ScaleRange | None = None,
+    drives: bool = False,
+) -> Any:
+    """Make the entry of a channel: its column, and what makes its numbers per unit."""
+    entries = {"column": channel.name, **_scaling(channel, base, scale)}
     if channel.spikes and not drives:
-        entries["outliers"] = f"{SPIKE_LIMIT:g}"
-    if len(entries) == 1:
-        return entries["column"]
-    return "{" + ", ".join(f"{key}: {value}" for key, value in entries.items()) + "}"
+        entries["outliers"] = SPIKE_LIMIT
+    return channel.name if len(entries) == 1 else entries
 
 
-def _scaling(
-    channel: InspectedChannel, base: Base | None, scale: ScaleRange | None
-) -> dict[str, str]:
-    """Return what makes the numbers of a channel per unit."""
+def _scaling(channel: InspectedChannel, base: Base | None, scale: ScaleRange | None) -> Section:
     percent = channel.unit == "%"
     if base is not None and (channel.seems_per_unit or percent):
-        value = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
-        return {"unit": plain_text("%" if percent else "pu"), "base": value}
+        value = base.in_unit(channel.unit or "pu", channel.name)
+        return {"unit": "%" if percent else "pu", "base": value}
     if scale is not None:
         return {"scale": _range(scale.start, scale.low, scale.high)}
     if channel.system_base:
-        return {"unit": "pu", "base": FILL_IN}
+        return {"unit": "pu", "base": QUESTION}
     if percent:
-        return {"scale": "0.01"}
+        return {"scale": 0.01}
     if channel.seems_per_unit:
         return {}
     return dict(zip(("unit", "base"), _unit_and_base(channel, base), strict=True))
 
 
-def clock_text(inspection: Inspection) -> str:
-    """Return the columns of the time as a case has them."""
-    names = [plain_text(name) for name in inspection.clock.columns]
-    if inspection.clock.unit is not None:
-        return f"{{column: {names[0]}, unit: {inspection.clock.unit}}}"
-    return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
+def _range(start: float, low: float, high: float) -> Section:
+    return {"start": rounded(start), "min": rounded(low), "max": rounded(high)}
 
 
-def _range(start: float, low: float, high: float) -> str:
-    return f"{{start: {number_text(start)}, min: {number_text(low)}, max: {number_text(high)}}}"
-
-
-def number_text(value: float) -> str:
-    """Return a number in a few digits, of an instant no fewer than 0.1 ms."""
-    rounded = float(f"{value:.{DIGITS}g}")
-    return yaml_number(round(value, DIGITS) if abs(value) >= 1.0 else rounded)
-
-
-def plain_text(name: str) -> str:
-    """Return a text as YAML has it, in quotes where it would be read as something else."""
-    plain = re.fullmatch(r"[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
-    if plain and yaml.safe_load(name) == name:
-        return name
-    return quoted(name)
+def rounded(value: float) -> float:
+    """Round to a few digits, an instant to no fewer than 0.1 ms."""
+    return round(value, DIGITS) if abs(value) >= 1.0 else float(f"{value:.{DIGITS}g}")
 
 
 def relative(file: Path, folder: Path) -> str:
-    """Return the path of a record as a case in a folder names it."""
-    import os
-
+    """Name a record as a case in a folder does."""
     try:
         return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
     except ValueError:  # on another drive

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
+from exfit.case.draft.case_draft import CaseDraft
 from exfit.features.design.designed_test import DesignedTest
 from exfit.features.design.experiment_design import Design
 from exfit.results.tables import effects_table
@@ -105,12 +106,15 @@ def sheet_table(design: DesignedTest) -> str:
 
 
 def case_section(design: DesignedTest) -> str:
-    """Return the section ``test`` of a case file that makes this test."""
-    steps = "".join(
-        f"    - {{at: {step.at:.9g}, step: {step.step:.9g}}}\n" for step in design.best.steps
-    )
+    """Write the section ``test`` of a case file that makes this test."""
     channels = ", ".join(design.best.channels)
-    return (
-        f"# the test that makes {', '.join(design.of)} best known; to be recorded: {channels}\n"
-        f"test:\n  vt0: {design.vt0:.9g}\n  duration: {design.best.duration:.9g}\n  vref:\n{steps}"
-    )
+    steps = [{"at": _digits(step.at), "step": _digits(step.step)} for step in design.best.steps]
+    test = {"vt0": _digits(design.vt0), "duration": _digits(design.best.duration), "vref": steps}
+    return CaseDraft(
+        {"test": test},
+        (f"the test that makes {', '.join(design.of)} best known; to be recorded: {channels}",),
+    ).text
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.9g}")

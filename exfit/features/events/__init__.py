@@ -1,7 +1,7 @@
 """Grid events: a unit played back, the noise that drives it, PMU channels, causes of a misfit."""
 
+SUGGESTIONS = {"grid event": "suggestion:event_sections"}
 PLANTS = {"grid-playback": "grid_playback:GRID_PLAYBACK"}
-EVENT_DRAFT = {"plant": "suggestion:event_plant", "record": "suggestion:event_section"}
 INPUT_NOISE = {
     "weighed search": "driving_noise.weighing:weighed_search",
     "without bias": "driving_noise.weighing:without_bias",

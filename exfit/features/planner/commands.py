@@ -78,13 +78,13 @@ def _import_one(
     """Write the case of one unit."""
     from exfit.case.draft.suggestion import relative
     from exfit.features.planner.fields import located
-    from exfit.features.planner.import_case import case_text, import_unit
+    from exfit.features.planner.import_case import import_unit, imported_case
 
     if output is not None:
         refuse_existing(output, force)
     imported = import_unit(dyr, bus, machine_id)
     file = relative(dyr, Path() if output is None else output.parent)
-    write_text(case_text(imported, file), output, located(imported.warnings, str(dyr)))
+    write_text(imported_case(imported, file).text, output, located(imported.warnings, str(dyr)))
     if output is not None:
         echo(f"written to {output}; next: exfit simulate {output}")
 

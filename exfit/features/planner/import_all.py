@@ -11,9 +11,8 @@ from exfit.case.draft.record_settings import RecordSettings
 from exfit.case.draft.suggestion import relative
 from exfit.errors import ExfitError
 from exfit.features.planner.fields import DynamicsFault, located, text_of
-from exfit.features.planner.import_case import case_text, read_file
+from exfit.features.planner.import_case import imported_case, read_file, unit_data
 from exfit.features.planner.unit import Unit
-from exfit.features.planner.unit_data import unit_data
 from exfit.features.planner.units import DynamicsUnits, RefusedUnit, read_units
 from exfit.features.start.made_case import MadeCase, case_of_plan, case_of_records
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
@@ -130,7 +129,7 @@ def import_all(plan: ImportPlan, folder: Path, options: RecordOptions) -> Import
         except ExfitError as fault:
             rows.append(_row(unit, plan, "", str(fault).splitlines()))
             continue
-        texts[name] = made.text
+        texts[name] = made.draft.text
         doubts += made.doubts
         used.update(made.sizes)
         rows.append(_row(unit, plan, name, _in_words(unit.warnings)))
@@ -164,7 +163,7 @@ def _made(
     if key in plan.rows:
         return case_of_plan(plan.rows[key], unit_data(unit, file), folder, bases)
     if key not in plan.files:
-        return MadeCase(case_text(unit, file), ())
+        return MadeCase(imported_case(unit, file), ())
     inspections = [options.settings.inspect(path) for path in plan.files[key]]
     return case_of_records(inspections, unit_data(unit, file), folder, options.sizes, bases)
 

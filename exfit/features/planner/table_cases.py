@@ -5,20 +5,19 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from exfit.case.draft.starting_unit import UnitData, unit_with
 from exfit.case.draft.suggestion import relative
-from exfit.case.open_values import open_values
 from exfit.errors import DynamicsError, ExfitError
 from exfit.features.planner.fields import located, text_of
 from exfit.features.planner.import_all import key_of
-from exfit.features.planner.import_case import read_file
+from exfit.features.planner.import_case import read_file, unit_data
 from exfit.features.planner.unit import Unit
-from exfit.features.planner.unit_data import unit_data
 from exfit.features.planner.units import DynamicsUnits, RefusedUnit, read_units
 from exfit.features.start.made_case import case_of_plan
 from exfit.features.start.record_files import UnitKey, unit_named
+from exfit.features.start.starting_unit import UnitData, unit_with
 from exfit.features.start.table_of_cases import CaseOfTable, read_case_table
 from exfit.util.files import write
+from exfit.util.text import dotted
 
 CASES = "cases"  # the folder of the cases in that of a batch
 
@@ -37,7 +36,8 @@ class CaseMaker:
     def __call__(self) -> str:
         """Write the case, unless the file exists; return why it cannot be used, or ""."""
         try:
-            text = case_of_plan(self.case, self._unit(), self.file.parent, {}).text
+            draft = case_of_plan(self.case, self._unit(), self.file.parent, {}).draft
+            text = draft.text
             if self._is_other(text):
                 return (
                     f"{self.file} exists and is not what the table makes: remove it, or give it "
@@ -46,7 +46,7 @@ class CaseMaker:
             write(self.file, text)
         except ExfitError as fault:
             return "; ".join(str(fault).splitlines())
-        missing = [f"{value.place} (line {value.line})" for value in open_values(text)]
+        missing = [f"{dotted(value.place)} (line {value.line})" for value in draft.open_values()]
         if missing:
             return f"{self.case.place}: the table lacks what {self.file} has as ?: " + ", ".join(
                 missing

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from exfit.case.case import Case
-from exfit.case.draft.starting_case import ALONE
+from exfit.case.draft.free_parameters import ALONE
 from exfit.case.load import CaseOrPath
 from exfit.case.other_model import with_exciter
 from exfit.errors import CaseError

@@ -21,14 +21,14 @@ from exfit.cli.records import (
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 from exfit.features.planner.commands import BUSES
-from exfit.util.text import printable
+from exfit.util.text import dotted, printable
 
 if TYPE_CHECKING:
     from exfit.case.draft.bases import Base
+    from exfit.case.draft.case_draft import CaseDraft, OpenValue
     from exfit.case.draft.record_settings import RecordSettings
-    from exfit.case.draft.starting_tests import StartingTest
-    from exfit.case.draft.starting_unit import UnitData
-    from exfit.case.open_values import OpenValue
+    from exfit.features.start.starting_tests import StartingTest
+    from exfit.features.start.starting_unit import UnitData
 
 
 RATING = click.FloatRange(min=0.0, min_open=True)
@@ -138,9 +138,8 @@ def new(
     """
     from exfit.case.draft.bases import bases_of, rated_bases
     from exfit.case.draft.record_settings import RecordSettings
-    from exfit.case.draft.starting_case import starting_case
-    from exfit.case.draft.starting_tests import doubtful_bases
-    from exfit.case.open_values import open_values
+    from exfit.features.start.starting_case import starting_case
+    from exfit.features.start.starting_tests import doubtful_bases
 
     if output is not None:
         refuse_existing(output, force)
@@ -150,11 +149,11 @@ def new(
     reading = RecordSettings(clock, unit, sheet, memory=memory)
     tests = _tests(file, table, sizes, rated_bases(bases_of(bases), kv, mva), reading)
     warn(doubtful_bases(tests))
-    text = starting_case(data, tests, folder, _facts(facts))
+    draft = starting_case(data, tests, folder, _facts(facts))
     if is_terminal():
-        text = _asked(text)
-    still_open = open_values(text)  # refuses what no command would read, before it is written
-    write_text(text, output, ())
+        draft = _asked(draft)
+    still_open = draft.open_values()  # refuses what no command would read, before it is written
+    write_text(draft.text, output, ())
     if output is not None:
         echo(f"written to {output}; next: exfit check {output}")
         for value in still_open:
@@ -174,7 +173,7 @@ def _tests(
     reading: "RecordSettings",
 ) -> "tuple[StartingTest, ...]":
     """Return the tests of a record, or those that a table names."""
-    from exfit.case.draft.starting_tests import starting_tests
+    from exfit.features.start.starting_tests import starting_tests
     from exfit.features.start.table_of_tests import read_test_table, tests_of_table
 
     if table is None:
@@ -195,7 +194,7 @@ def _unit(given: UnitSources, folder: Path) -> "UnitData":
     """Return the data of the unit: typical, a planner's, with the machine of another case."""
     from dataclasses import replace
 
-    from exfit.case.draft.starting_unit import machine_of_case, unit_with
+    from exfit.features.start.starting_unit import machine_of_case, unit_with
 
     _refuse_unused(given)
     planner = None
@@ -221,8 +220,7 @@ def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -
     """Return the data of a unit of a planner's file; what of it is left out is reported."""
     from exfit.case.draft.suggestion import relative
     from exfit.features.planner.fields import located
-    from exfit.features.planner.import_case import import_unit
-    from exfit.features.planner.unit_data import unit_data
+    from exfit.features.planner.import_case import import_unit, unit_data
 
     unit = import_unit(dyr, bus, machine_id)
     warn(located(unit.warnings, str(dyr)))
@@ -240,31 +238,25 @@ def _facts(texts: tuple[str, ...]) -> dict[str, str]:
     return facts
 
 
-def _asked(text: str) -> str:
-    """Return the text of a case with what the user gives for open values; Enter leaves one open."""
-    from exfit.case.open_values import filled, open_values
-
+def _asked(draft: "CaseDraft") -> "CaseDraft":
+    """Fill in what the user gives for the open values of a case; Enter leaves one open."""
     given = {}
-    for value in open_values(text):
+    for value in draft.open_values():
         answer = click.prompt(printable(_question(value)), default="", show_default=False, err=True)
         if answer.strip():
-            given[value] = _answer(answer.strip(), value.place)
-    return filled(text, given)
+            given[value] = _answer(answer.strip(), value)
+    return draft.filled(given)
 
 
 def _question(value: "OpenValue") -> str:
-    """Return the place of an open value, with what to know of it."""
-    return f"{value.place} ({value.hint})" if value.hint else value.place
+    return f"{dotted(value.place)} ({value.hint})" if value.hint else dotted(value.place)
 
 
-def _answer(answer: str, place: str) -> str:
-    """Return an answer as a case has it; raises ExfitError where a number is needed."""
-    from exfit.case.draft.suggestion import plain_text
-
-    if place.rpartition(".")[2] in ("column", "unit"):
-        return plain_text(answer)
+def _answer(answer: str, value: "OpenValue") -> str | float:
+    """Read an answer: a name, or a number; raises ExfitError where it is none."""
+    if value.place[-1] in ("column", "unit"):
+        return answer
     try:
-        float(answer)
+        return float(answer)
     except ValueError:
-        raise ExfitError(f"{place}: {answer!r} is not a number") from None
-    return answer
+        raise ExfitError(f"{dotted(value.place)}: {answer!r} is not a number") from None

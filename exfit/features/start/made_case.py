@@ -5,29 +5,27 @@ from pathlib import Path
 from typing import NamedTuple
 
 from exfit.case.draft.bases import Base
-from exfit.case.draft.starting_case import starting_case
-from exfit.case.draft.starting_tests import (
+from exfit.case.draft.case_draft import CaseDraft, OpenValue
+from exfit.errors import ExfitError
+from exfit.features.start.starting_case import starting_case
+from exfit.features.start.starting_tests import (
     StartingTest,
     doubtful_bases,
     refuse_other_size,
     sizes_in_use,
     starting_tests,
 )
-from exfit.case.draft.starting_unit import UnitData
-from exfit.case.draft.suggestion import plain_text
-from exfit.case.open_values import OpenValue, filled, open_values
-from exfit.errors import ExfitError
+from exfit.features.start.starting_unit import UnitData
 from exfit.features.start.table_of_cases import CaseOfTable
 from exfit.features.start.table_of_tests import TableRow, tests_of_table
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import tests_of
-from exfit.util.text import yaml_number
 
 
 class MadeCase(NamedTuple):
-    """The text of a new case, what is doubtful in it, and the sizes of steps that it uses."""
+    """A new case, what is doubtful in it, and the sizes of steps that it uses."""
 
-    text: str
+    draft: CaseDraft
     doubts: tuple[str, ...]
     sizes: tuple[str, ...] = ()
 
@@ -59,9 +57,9 @@ def case_of_plan(
     """
     inspections = {file: settings.inspect(file) for file, settings in case.settings.items()}
     tests = _tests(case.tests, inspections, bases)
-    text = starting_case(unit, tests, folder, case.about)
-    given = dict(_given_values(case, open_values(text)))
-    return MadeCase(filled(text, given), tuple(doubtful_bases(tests)))
+    draft = starting_case(unit, tests, folder, case.about)
+    given = dict(_given_values(case, draft.open_values()))
+    return MadeCase(draft.filled(given), tuple(doubtful_bases(tests)))
 
 
 def _tests(
@@ -98,12 +96,12 @@ def _of_each_test(
 
 def _given_values(
     case: CaseOfTable, values: Sequence[OpenValue]
-) -> Iterator[tuple[OpenValue, str]]:
+) -> Iterator[tuple[OpenValue, str | float]]:
     """Yield the open values of a case that its table gives, as a case has them."""
     voltages = {settings.voltage for settings in case.settings.values() if settings.voltage}
     for value in values:
-        *_, section, key = ["", *value.place.split(".")]
+        *_, section, key = ("", *value.place)
         if section == "network" and key in case.network:
-            yield value, yaml_number(case.network[key])
-        elif value.place.endswith("channels.vt.column") and len(voltages) == 1:
-            yield value, plain_text(next(iter(voltages)))
+            yield value, case.network[str(key)]
+        elif value.place[-3:] == ("channels", "vt", "column") and len(voltages) == 1:
+            yield value, next(iter(voltages))

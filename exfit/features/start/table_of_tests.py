@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from exfit.case.draft.bases import Base, base_of
-from exfit.case.draft.starting_tests import StartingTest, renamed, started
 from exfit.errors import ExfitError, FileError
 from exfit.features.start.cells import Cells, read_cells
+from exfit.features.start.starting_tests import StartingTest, renamed, started
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, tests_of
 

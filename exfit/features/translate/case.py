@@ -1,18 +1,15 @@
 """A case with another exciter in place of its own: the same tests and records, other parameters."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from exfit.case.draft.case_draft import CaseDraft, Noted, Section, with_sources
 from exfit.case.draft.free_parameters import BOUNDS, bounds_of, free_of
 from exfit.case.draft.suggestion import relative
-from exfit.case.templates import commented, source_lines
 from exfit.case.yaml import read_yaml
 from exfit.models.sheet import Model, Parameter
 from exfit.util.sources import FITTED
-from exfit.util.text import yaml_number
 
 TEST: Mapping[str, Any] = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}
 EXCITER = ("model", "parameters")  # the sections that change
@@ -41,14 +38,15 @@ def translated_case(
     sections = {key: value for key, value in content.items() if key not in EXCITER}
     sections = _moved(sections, case.parent, folder)
     sections["plant"] = _with_values(sections.get("plant", {}), plant.get("parameters", {}))
-    dumped = yaml.safe_dump(
-        sections, sort_keys=False, default_flow_style=None, allow_unicode=True, width=100
+    case_draft = CaseDraft(
+        {
+            "model": name,
+            **sections,
+            "parameters": with_sources(_parameters(sheet, values, provenance), sources),
+        },
+        tuple(heading.splitlines()),
     )
-    lines = [f"# {line}" for line in heading.splitlines()]
-    lines += [f"model: {name}", *dumped.splitlines()]
-    lines += ["parameters:", *_parameters(sheet, values, provenance)]
-    lines += source_lines(sources, "  ")
-    return "\n".join(lines) + "\n"
+    return case_draft.text
 
 
 def _moved(content: Any, before: Path, now: Path) -> Any:
@@ -86,26 +84,30 @@ def _with_values(plant: Mapping[str, Any], values: Mapping[str, float]) -> dict[
 
 def _parameters(
     model: Model, values: Mapping[str, float], provenance: Mapping[str, str]
-) -> Iterator[str]:
+) -> Section:
     free = free_of(model, values)
-    yield "  fixed:"
-    for row in model.sheet:
-        if row not in free:
-            line = f"    {row.symbol}: {yaml_number(values[row.symbol])}"
-            yield commented(line, f"{row.unit}, {provenance[row.symbol]}")
+    section: Section = {
+        "fixed": {
+            row.symbol: Noted(values[row.symbol], f"{row.unit}, {provenance[row.symbol]}")
+            for row in model.sheet
+            if row not in free
+        }
+    }
     if free:
-        yield "  free:"
-    for row in free:
-        yield f"    # {row.unit}, {row.meaning}; {provenance[row.symbol]}"
-        yield f"    {row.symbol}: {{{_section(row, values[row.symbol])}}}"
+        section["free"] = {
+            row.symbol: Noted(
+                _start(row, values[row.symbol]),
+                above=f"{row.unit}, {row.meaning}; {provenance[row.symbol]}",
+            )
+            for row in free
+        }
+    return section
 
 
-def _section(row: Parameter, value: float) -> str:
-    """Return a start within the bounds of a fit, also where it is not physical."""
+def _start(row: Parameter, value: float) -> Section:
+    """Make a start within the bounds of a fit, also where it is not physical."""
     low, high = bounds_of(row, value)
     if not row.low <= value <= row.high:
         low, high = sorted(share * value for share in BOUNDS)
-    bounds = float(f"{min(low, value):.6g}"), float(f"{max(high, value):.6g}")
-    start, low_text, high_text = (yaml_number(number) for number in (value, *bounds))
-    scale = "" if value > 0.0 else ", scale: linear"
-    return f"start: {start}, min: {low_text}, max: {high_text}{scale}"
+    bounds = {"min": float(f"{min(low, value):.6g}"), "max": float(f"{max(high, value):.6g}")}
+    return {"start": value, **bounds, **({} if value > 0.0 else {"scale": "linear"})}

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.draft.starting_case import ALONE
+from exfit.case.draft.free_parameters import ALONE
 from exfit.errors import ExfitError, SimulationError
 from exfit.features.translate.result import (
     EXACT,

@@ -6,14 +6,15 @@ import yaml
 from pmu_records import KV, MVA, pmu_columns, smooth_course, write_table
 
 from exfit.case.draft.bases import rated_bases
+from exfit.case.draft.case_draft import CaseDraft
 from exfit.case.draft.record_settings import RecordSettings
-from exfit.case.draft.starting_case import starting_case
-from exfit.case.draft.starting_tests import starting_tests
-from exfit.case.draft.starting_unit import unit_with
-from exfit.case.open_values import open_values
 from exfit.case.record_section import record_section
-from exfit.features.events.suggestion import event_section
+from exfit.features.events.suggestion import event_sections
+from exfit.features.start.starting_case import starting_case
+from exfit.features.start.starting_tests import starting_tests
+from exfit.features.start.starting_unit import unit_with
 from exfit.fitting.recordings import read_section
+from exfit.util.text import dotted
 
 RATED = rated_bases({}, KV, MVA)
 
@@ -24,22 +25,22 @@ def inspected(folder, **changes):
 
 
 def section(inspection, bases):
-    text = "\n".join(event_section(inspection, "event.csv", bases))
-    return text, yaml.safe_load(text)["record"]
+    draft = CaseDraft(event_sections(inspection, "event.csv", bases))
+    return draft, yaml.safe_load(draft.text)["record"]
 
 
 def test_with_the_ratings_of_the_unit_the_suggested_record_can_be_read(tmp_path):
-    text, content = section(inspected(tmp_path), RATED)
-    assert not open_values(text)
+    draft, content = section(inspected(tmp_path), RATED)
+    assert not draft.open_values()
     del content["channels"]["angle"]  # of no plant with a bump test
     record = read_section(record_section(content), tmp_path, per_unit=True)
     assert record.signals["p"][0] == pytest.approx(0.8, abs=1e-6)
 
 
 def test_the_connection_is_that_of_the_rated_voltage_and_its_comment_says_so(tmp_path):
-    text, content = section(inspected(tmp_path), RATED)
+    draft, content = section(inspected(tmp_path), RATED)
     assert content["phasors"]["voltage"]["connection"] == "phase-to-ground"
-    assert "rests at 0.583 = 1.01 / sqrt(3) of the rated kV" in text
+    assert "rests at 0.583 = 1.01 / sqrt(3) of the rated kV" in draft.text
     line_to_line = {"UNIT1-PM1 (V)": 1e3 * KV * smooth_course().vt}
     _, content = section(inspected(tmp_path, **line_to_line), RATED)
     assert content["phasors"]["voltage"]["connection"] == "phase-to-phase"
@@ -47,8 +48,8 @@ def test_the_connection_is_that_of_the_rated_voltage_and_its_comment_says_so(tmp
 
 @pytest.mark.parametrize("bases", [{}, rated_bases({}, 2.0 * KV, MVA)])
 def test_without_a_fitting_rating_the_connection_is_asked_for(tmp_path, bases):
-    text, _ = section(inspected(tmp_path), bases)
-    places = {value.place for value in open_values(text)}
+    draft, _ = section(inspected(tmp_path), bases)
+    places = {dotted(value.place) for value in draft.open_values()}
     assert "record.phasors.voltage.connection" in places
     assert ("record.phasors.kV" in places) == (not bases)
 
@@ -92,7 +93,7 @@ def test_rows_that_the_flags_call_bad_are_named_with_their_line(tmp_path):
 
 def test_a_case_of_an_event_has_no_test_and_plays_its_record_back(tmp_path):
     tests = starting_tests([inspected(tmp_path)], (), RATED)
-    text = starting_case(unit_with("AC8B", None, None, tmp_path), tests, tmp_path)
+    text = starting_case(unit_with("AC8B", None, None, tmp_path), tests, tmp_path).text
     content = yaml.safe_load(text)
     assert content["plant"]["type"] == "grid-playback"
     assert content["plant"]["network"]["f0"] == 60

@@ -19,7 +19,7 @@ from exfit.case.load import parse_case
 from exfit.features.planner.export import export
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.fitted_file import FittedUnit, fitted_file, number_text
-from exfit.features.planner.import_case import case_text
+from exfit.features.planner.import_case import imported_case
 from exfit.features.planner.psse.files import record_text
 from exfit.features.planner.records import (
     PSLF,
@@ -352,7 +352,7 @@ def test_what_its_program_does_without_is_0_in_a_case_and_stays_in_the_file(name
     unit, full = unit_of(text.encode(), 7), PREFIXES[own.kind] + symbol
     (warning,) = [w.text for w in unit.warnings if f"{name}: {symbol}: 0.4 does not act" in w.text]
     assert warning.endswith("; 0 is taken")
-    case = case_text(unit, "units.dyr")
+    case = imported_case(unit, "units.dyr").text
     found = yaml.safe_load(case)["as_found"]
     assert found["unused"] == {full: 0.4}
     assert found["parameters"][full] == values_of(unit)[full] == 0.0
@@ -383,7 +383,7 @@ def test_the_rating_of_a_turbine_is_named_at_import_and_stays_in_the_file(fit):
     unit = unit_of(text.encode(), 7)
     (warning,) = warned(unit)
     assert warning.endswith("where it must be 390.24 over that base")
-    case = case_text(unit, "units.dyr")
+    case = imported_case(unit, "units.dyr").text
     assert parse_case(case, Path("unit.yaml")).as_found.unused == {"governor.Trate": 390.24}
     values = {**values_of(unit), "KA": 321.0, "governor.Trate_Mbase": 3.9024}
     result = verified(fit, unit, values, case_text=case, case=Path("unit.yaml"))

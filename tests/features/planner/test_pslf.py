@@ -9,7 +9,7 @@ from loose_records import sound
 from tiers import few_of
 
 from exfit.errors import DynamicsError
-from exfit.features.planner.import_case import case_text, import_unit
+from exfit.features.planner.import_case import import_unit, imported_case
 from exfit.features.planner.pslf.files import PSLF_FILES, heads, record_text
 from exfit.features.planner.records import PSLF, definition_of, definitions, read_values
 from exfit.features.planner.unit import read_unit
@@ -87,7 +87,7 @@ def test_a_sample_is_read_and_its_case_names_what_it_rests_on():
     assert (unit.machine.line, unit.exciter.line) == (5, 9)
     assert unit.machine.values["S12"] == 0.4
     assert unit.exciter.values["KA"] == 150.0
-    case = case_text(unit, "unit.dyd")
+    case = imported_case(unit, "unit.dyd").text
     assert "model: EXAC4" in case
     assert "# exac4 on line 9" in case
     assert "Ka" not in case
@@ -116,10 +116,10 @@ def test_efd_is_multiplied_by_the_speed_where_the_record_says_so():
         + record_text(DEFINITIONS["exac1"], values, 1, "1")
         + "\n"
     )
-    assert "efd_times_speed" not in case_text(read_unit(text, "a.dyd", 1), "a.dyd")
+    assert "efd_times_speed" not in imported_case(read_unit(text, "a.dyd", 1), "a.dyd").text
     text = PSLF_UNIT[: PSLF_UNIT.index("exac4")]
     text += record_text(DEFINITIONS["exac1"], values | {"SPDMLT": 1.0}, 1, "1") + "\n"
-    assert "efd_times_speed: true" in case_text(read_unit(text, "a.dyd", 1), "a.dyd")
+    assert "efd_times_speed: true" in imported_case(read_unit(text, "a.dyd", 1), "a.dyd").text
 
 
 # ---- damage
@@ -162,7 +162,7 @@ def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
         for line in str(error).splitlines():
             assert re.match(rf"{re.escape(str(path))}(:\d+)?: |  bus \d+", line), line
     else:
-        assert case_text(unit, "unit.dyd")
+        assert imported_case(unit, "unit.dyd").text
 
 
 def test_a_fault_of_one_unit_leaves_the_others():

@@ -16,7 +16,7 @@ from exfit.case.load import parse_case
 from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
 from exfit.features.planner.fields import text_of
-from exfit.features.planner.import_case import case_text, import_unit
+from exfit.features.planner.import_case import import_unit, imported_case
 from exfit.features.planner.psse.files import record_text
 from exfit.features.planner.psse.free_format import sound_records
 from exfit.features.planner.records import (
@@ -122,7 +122,7 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
     random = np.random.default_rng(seed)
     records = partners(definition, random)
     text = "".join(loose(*one, random, bus=7, machine_id="G1") for one in records)
-    case = case_text(read_unit(text, "unit.dyr", 7, "g1"), "unit.dyr")
+    case = imported_case(read_unit(text, "unit.dyr", 7, "g1"), "unit.dyr").text
     assert max(map(len, case.splitlines())) <= 100
     mine, theirs = read_yaml(case, Path("case.yaml"))[0].value, yaml.safe_load(case)
     places = {"machine": ("plant", "parameters"), "exciter": ("parameters", "fixed")}
@@ -155,7 +155,9 @@ def test_the_codes_of_a_stabiliser_s_inputs_are_its_signals(code, signal):
             f"{record_text(other, typical(other.model.sheet), 7, '1')}\n"
             for other in (GENROU, ESAC1A)
         )
-        case = yaml.safe_load(case_text(read_unit(f"{unit}{text}\n", "unit.dyr"), "unit.dyr"))
+        case = yaml.safe_load(
+            imported_case(read_unit(f"{unit}{text}\n", "unit.dyr"), "unit.dyr").text
+        )
         given = case["stabiliser"].get("inputs", [*definition.model.inputs])
         assert given == [signal] * len(definition.model.inputs)
 
@@ -178,7 +180,7 @@ def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
         assert several or re.search(r"unit\.dyr:\d+: ", text) or "no record" in text
         assert text.replace("\n", "").isprintable()
     else:
-        parse_case(case_text(unit, path.name), tmp_path / "case.yaml")
+        parse_case(imported_case(unit, path.name).text, tmp_path / "case.yaml")
 
 
 def fault_of(text, *given):
@@ -321,7 +323,9 @@ def test_a_record_that_multiplies_by_the_speed_makes_a_case_that_does():
     )
     machine, _, exciter = SOUND.partition("\n")
     texts = f"{machine}\n1 EXDC2 1 {values} /\n", f"{machine}\n{exciter}"
-    cases = [yaml.safe_load(case_text(read_unit(text, "u.dyr"), "u.dyr")) for text in texts]
+    cases = [
+        yaml.safe_load(imported_case(read_unit(text, "u.dyr"), "u.dyr").text) for text in texts
+    ]
     assert [case.get("efd_times_speed") for case in cases] == [True, None]
 
 
@@ -361,7 +365,9 @@ def test_what_other_units_and_devices_hold_is_no_fault():
 def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
     unit = read_unit(SOUND + record, "unit.dyr")
     assert unit.warnings == ((5, words),)
-    remarks = " ".join(case_text(unit, "unit.dyr").split("model:")[0].replace("#", "").split())
+    remarks = " ".join(
+        imported_case(unit, "unit.dyr").text.split("model:")[0].replace("#", "").split()
+    )
     assert f"Line 5: {' '.join(words.split())}." in remarks
 
 

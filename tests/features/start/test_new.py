@@ -11,11 +11,11 @@ from step_records import step_record
 from tiers import few_of
 
 from exfit.case.draft.free_parameters import bounds_of, free_of
-from exfit.case.draft.starting_case import starting_case
-from exfit.case.draft.starting_tests import starting_tests
-from exfit.case.draft.starting_unit import PartData, UnitData
 from exfit.case.load import load_case
 from exfit.errors import CaseError
+from exfit.features.start.starting_case import starting_case
+from exfit.features.start.starting_tests import starting_tests
+from exfit.features.start.starting_unit import PartData, UnitData
 from exfit.fitting.build import build_experiments
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
@@ -62,7 +62,7 @@ def text_of(name, inspection, folder, machine="GENROU", sizes=()):
     exciter, around = PartData.typical(MODELS[name]), PartData.typical(MACHINES[machine])
     return starting_case(
         UnitData(name, exciter, around), starting_tests([inspection], sizes), folder
-    )
+    ).text
 
 
 def started(name, table, folder, machine="GENROU", step=STEP):

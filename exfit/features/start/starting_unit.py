@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from exfit.case.draft.case_draft import Section
 from exfit.case.draft.suggestion import relative
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
@@ -40,15 +41,15 @@ class PartData:
 class UnitData:
     """The exciter, behind the ``name`` that the case gives it, its machine, and what is ``added``.
 
-    That are the stabiliser and the governor, each under the key of its section; ``as_found`` are
-    lines of the case on what was in the planner's base.
+    That are the stabiliser and the governor, each under the key of its section; ``as_found``
+    is the section of what was in the planner's base.
     """
 
     name: str
     exciter: PartData
     machine: PartData
     added: Mapping[str, PartData] = field(default_factory=dict)
-    as_found: tuple[str, ...] = ()
+    as_found: Section = field(default_factory=dict)
 
 
 def unit_with(

@@ -1,0 +1,265 @@
+"""A case that is made for a user to edit: its values with comments, and its text in YAML."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from textwrap import wrap
+from typing import Any, NamedTuple
+
+import yaml
+
+from exfit.case.open_values import QUESTION
+from exfit.case.yaml import read_yaml
+from exfit.models.sheet import Parameter
+from exfit.util.sources import SOURCES
+from exfit.util.text import Place, yaml_number
+
+COMMENTS_AT = 24  # the column of comments behind short lines
+WIDTH = 80  # columns of a case
+NO_BREAK = "\N{NO-BREAK SPACE}"  # within a pair of a name and a word
+
+Section = dict[str, Any]  # values, sections and lists of these, each as it is or `Noted`
+
+
+@dataclass(frozen=True)
+class Noted:
+    """A value of a case with comments: ``behind`` it in its line, and ``above`` it."""
+
+    value: Any
+    behind: str = ""
+    above: str = ""
+
+
+class Remark(str):
+    """A key of a section that is a comment in lines of its own; its value is None."""
+
+
+class OpenValue(NamedTuple):
+    """A value of a draft that is to be filled in: its place and line, what to know of it."""
+
+    place: Place
+    line: int
+    hint: str
+
+
+@dataclass(frozen=True)
+class CaseDraft:
+    """A case to be edited: its sections, with comments, below the paragraphs of its heading."""
+
+    sections: Section
+    heading: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """The text of the case; a section that stands in two places has an anchor."""
+        return "".join(f"{line}\n" for line in self.lines())
+
+    def lines(self) -> list[str]:
+        """Write the lines of the case: sections in lines, what is short in braces."""
+        heading = [line for text in self.heading for line in _comment(text, "", "")]
+        return [*heading, *_Writer(self.sections).mapping(self.sections, "")]
+
+    def open_values(self) -> tuple[OpenValue, ...]:
+        """Find the values that are to be filled in; one that stands in two places counts once.
+
+        Raises CaseError for a text that no command would read.
+        """
+        root, _ = read_yaml(self.text, Path())
+        return tuple(
+            OpenValue(place, root.line_of(place), hint)
+            for place, hint in _open(self.sections, (), "", set())
+        )
+
+    def filled(self, given: Mapping[OpenValue, str | float]) -> "CaseDraft":
+        """Fill in open values."""
+        values = {value.place: answer for value, answer in given.items()}
+        return replace(self, sections=_filled(self.sections, values, (), {}))
+
+
+def parameter(row: Parameter, value: float, remark: str = "") -> Noted:
+    """Make the value of a parameter, with its unit and meaning behind it."""
+    return Noted(value, f"{row.unit}, {row.meaning}{remark}")
+
+
+def with_sources(section: Section, sources: Mapping[str, str]) -> Section:
+    """Add to a section where its values come from, as far as that is stated."""
+    stated = {name: word for name, word in sources.items() if word in SOURCES}
+    if not stated:
+        return section
+    return {**section, "sources": Noted(stated, above=f"each is from: {', '.join(SOURCES)}")}
+
+
+def plain_text(name: str) -> str:
+    """Write a text in YAML, in quotes where it would be read as something else."""
+    plain = re.fullmatch(r"[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
+    if plain and yaml.safe_load(name) == name:
+        return name
+    letters = json.dumps(name, ensure_ascii=False)
+    return "".join(x if x.isprintable() else f"\\U{ord(x):08x}" for x in letters)
+
+
+def in_braces(value: Any) -> str:
+    """Write a value in one line of YAML, without its comments."""
+    if isinstance(value, Noted):
+        return in_braces(value.value)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(_pairs(value)) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(in_braces, value)) + "]"
+    if isinstance(value, str):
+        return plain_text(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value) if isinstance(value, int) else yaml_number(value)
+
+
+class _Writer:
+    """Writes sections; a mapping that stands in several places has an anchor at the first."""
+
+    def __init__(self, content: Section) -> None:
+        self.times: dict[int, int] = {}
+        self.anchors: dict[int, str] = {}
+        self._count(content)
+
+    def _count(self, content: Any) -> None:
+        value = content.value if isinstance(content, Noted) else content
+        if isinstance(value, Mapping):
+            self.times[id(value)] = self.times.get(id(value), 0) + 1
+            if self.times[id(value)] > 1:
+                return
+        for entry in _entries(value).values():
+            self._count(entry)
+
+    def mapping(self, content: Mapping[str, Any], indent: str) -> Iterator[str]:
+        for key, given in content.items():
+            if isinstance(key, Remark):
+                for line in key.splitlines():
+                    yield from _comment(line, indent)
+            else:
+                yield from self._entry(key, given, indent)
+
+    def _entry(self, key: str, given: Any, indent: str) -> Iterator[str]:
+        noted = given if isinstance(given, Noted) else Noted(given)
+        value, head = noted.value, f"{indent}{plain_text(key)}:"
+        yield from _comment(noted.above, indent)
+        if id(value) in self.anchors:
+            yield _commented(f"{head} *{self.anchors[id(value)]}", noted.behind)
+            return
+        if self.times.get(id(value), 0) > 1:
+            self.anchors[id(value)] = f"{key}{len(self.anchors) + 1 if self.anchors else ''}"
+            head += f" &{self.anchors[id(value)]}"
+        text = in_braces(value)
+        short = len(head) + 1 + len(text) <= WIDTH
+        entries = _entries(value)
+        deep = any(_entries(entry) for entry in entries.values())
+        if not entries or (short and indent and not _has_comments(value)):
+            yield _commented(f"{head} {text}", noted.behind)
+        elif isinstance(value, Mapping) and (not indent or deep or _has_comments(value)):
+            yield _commented(head, noted.behind)
+            yield from self.mapping(value, f"{indent}  ")
+        elif deep:
+            yield _commented(head, noted.behind)
+            for entry in entries.values():
+                yield from self._item(entry, indent)
+        else:
+            yield _commented(head, noted.behind)
+            yield from _wrapped(value, f"{indent}  ")
+
+    def _item(self, entry: Mapping[str, Any], indent: str) -> Iterator[str]:
+        lines = [*self.mapping(entry, f"{indent}    ")]
+        first = next(k for k, line in enumerate(lines) if not line.lstrip().startswith("#"))
+        lines[first] = f"{indent}  - {lines[first].lstrip()}"
+        yield from lines
+
+
+def _entries(value: Any) -> Mapping[Any, Any]:
+    """List the entries of a section or list by key or index; none of a number or text."""
+    if isinstance(value, Noted):
+        return _entries(value.value)
+    if isinstance(value, Mapping):
+        return {key: entry for key, entry in value.items() if not isinstance(key, Remark)}
+    return dict(enumerate(value)) if isinstance(value, list | tuple) else {}
+
+
+def _has_comments(value: Any) -> bool:
+    if isinstance(value, Mapping) and any(isinstance(key, Remark) for key in value):
+        return True
+    return any(
+        isinstance(entry, Noted) or _has_comments(entry) for entry in _entries(value).values()
+    )
+
+
+def _pairs(value: Mapping[str, Any]) -> list[str]:
+    return [f"{plain_text(key)}: {in_braces(entry)}" for key, entry in _entries(value).items()]
+
+
+def _wrapped(value: Mapping[str, Any] | Sequence[Any], indent: str) -> Iterator[str]:
+    """Write a mapping or list in braces in several lines, none of its entries broken."""
+    mapped = isinstance(value, Mapping)
+    entries = _pairs(value) if isinstance(value, Mapping) else [*map(in_braces, value)]
+    text = ", ".join(entry.replace(" ", NO_BREAK) for entry in entries)
+    lines = wrap(
+        f"{{{text}}}" if mapped else f"[{text}]",
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=f"{indent} ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    yield from (line.replace(NO_BREAK, " ") for line in lines)
+
+
+def _comment(text: str, indent: str, hang: str = "  ") -> Iterator[str]:
+    """Write a paragraph as lines of comment."""
+    yield from wrap(
+        in_comment(text),
+        WIDTH,
+        initial_indent=f"{indent}# ",
+        subsequent_indent=f"{indent}# {hang}",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _commented(text: str, comment: str) -> str:
+    """Write a comment behind a line, at one place where the line is short."""
+    if not comment:
+        return text
+    short = f"{text:{COMMENTS_AT}}" if len(text) < COMMENTS_AT else f"{text}  "
+    return f"{short}# {in_comment(comment)}"
+
+
+def in_comment(text: str) -> str:
+    """Replace the characters that a comment in YAML, or a line, does not hold."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def _open(content: Any, place: Place, hint: str, visited: set[int]) -> Iterator[tuple[Place, str]]:
+    if isinstance(content, Noted):
+        hint, content = content.behind or content.above, content.value
+    if content == QUESTION:
+        yield place, hint
+    if id(content) in visited:
+        return
+    entries = _entries(content)
+    if entries:
+        visited.add(id(content))
+    for key, entry in entries.items():
+        yield from _open(entry, (*place, key), "" if _has_comments(content) else hint, visited)
+
+
+def _filled(content: Any, given: Mapping[Place, Any], place: Place, done: dict[int, Any]) -> Any:
+    if isinstance(content, Noted):
+        return replace(content, value=_filled(content.value, given, place, done))
+    if id(content) in done:
+        return done[id(content)]
+    if isinstance(content, Mapping):
+        done[id(content)] = {
+            key: _filled(entry, given, (*place, key), done) for key, entry in content.items()
+        }
+        return done[id(content)]
+    if isinstance(content, list | tuple):
+        return [_filled(entry, given, (*place, k), done) for k, entry in enumerate(content)]
+    return given.get(place, content)

@@ -1,0 +1,232 @@
+"""A case to start from: a model, records, and what is typical for all that is not known."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from exfit.case.draft.case_draft import (
+    CaseDraft,
+    Noted,
+    Remark,
+    Section,
+    in_braces,
+    parameter,
+    with_sources,
+)
+from exfit.case.draft.free_parameters import ALONE, bounds_of, free_of
+from exfit.case.draft.suggestion import (
+    channels_section,
+    record_of,
+    relative,
+    rounded,
+    steps_section,
+    suggested_event,
+    weights_section,
+)
+from exfit.case.open_values import QUESTION
+from exfit.features.start.starting_tests import StartingTest
+from exfit.features.start.starting_unit import PartData, UnitData
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model
+from exfit.records.field_base import shows_power
+from exfit.records.inspection import Inspection
+from exfit.util.sources import TYPICAL
+from exfit.util.text import first_texts
+
+VALIDATION_TO_COME = Remark("""\
+validate:               # a record that the fit does not see, as the step down
+  - name: down
+    test: {vref: [{at: 1.0, step: -0.05}]}
+    record: {file: down.csv, time: t, channels: {vt: vt}}""")
+FACTS_TO_COME = Remark("about: {Plant: ..., Unit: ..., Rated: ..., Tested by: ...}  # for reports")
+
+
+def starting_case(
+    unit: UnitData,
+    tests: Sequence[StartingTest],
+    folder: Path,
+    about: Mapping[str, str] | None = None,
+) -> CaseDraft:
+    """Make the case of a unit with the tests of one or more records.
+
+    ``folder`` is where the case will be written, ``about`` what its report shows. What must be
+    filled in is no number, so that the case is refused until it is.
+    """
+    names = {test.inspection.path: relative(test.inspection.path, folder) for test in tests}
+    first = tests[0]
+    event = suggested_event(first.inspection, names[first.inspection.path], first.bases)
+    recordings, validations = (
+        _events(tests, names) if event else _bump_tests(tests, names, unit.exciter.model.name)
+    )
+    sections: Section = {
+        **({"about": about} if about else {FACTS_TO_COME: None}),
+        "model": unit.name,
+        **({"efd_times_speed": True} if unit.exciter.times_speed else {}),
+        "plant": _event_plant(event, unit.machine) if event else _plant(unit, first.inspection),
+        **{key: added_section(part) for key, part in unit.added.items()},
+        **recordings,
+        "parameters": _parameters(unit.exciter),
+        **weights_section(first.inspection),
+        **validations,
+        **({"as_found": unit.as_found} if unit.as_found else {}),
+    }
+    return CaseDraft(sections, _heading(unit, tests))
+
+
+def added_section(part: PartData) -> Section:
+    """Make the section of a stabiliser or a governor."""
+    values = {row.symbol: parameter(row, part.values[row.symbol]) for row in part.model.sheet}
+    model = Noted(part.model.name, part.origin)
+    section = {"model": model, **inputs_section(part.model, part.inputs), "parameters": values}
+    return with_sources(section, part.sources)
+
+
+def inputs_section(model: Model | Machine, inputs: tuple[str, ...]) -> Section:
+    """Name the input signals of a stabiliser where they are not those of its model."""
+    if isinstance(model, Model) and inputs and inputs != model.inputs:
+        return {"inputs": Noted(list(inputs), "as the codes of its record say")}
+    return {}
+
+
+def _heading(unit: UnitData, tests: Sequence[StartingTest]) -> tuple[str, ...]:
+    """Say what a case is made of, what to do with its values, and what must be known of it."""
+    inspections = list({test.inspection.path: test.inspection for test in tests}.values())
+    records = "the record" if len(inspections) == 1 else "the records"
+    files = ", ".join(inspection.path.name for inspection in inspections)
+    parts = [unit.exciter, unit.machine, *unit.added.values()]
+    given = list(dict.fromkeys(part.origin for part in parts if part.origin))
+    advice = f"Values are {' and '.join(given)}. " if given else ""
+    if any(TYPICAL in part.sources.values() for part in parts):
+        those = "Replace those that are typical" if given else "Values are typical: replace them"
+        advice += f"{those} by those of the unit, and the words under `sources`. "
+    return (
+        f"{unit.exciter.model.name} on {records} {files}: a case to start from.",
+        f"{advice}`exfit check` tries the case, `exfit identify` shows what its test resolves, "
+        "`exfit fit` fits.",
+        *(
+            f"note: {text}."
+            for inspection in inspections
+            for text in first_texts(inspection.findings)
+        ),
+    )
+
+
+def _events(tests: Sequence[StartingTest], names: Mapping[Path, str]) -> tuple[Section, Section]:
+    """Make the sections of grid events: the first, or every other one, is fitted."""
+    records = [
+        suggested_event(test.inspection, names[test.inspection.path], test.bases)["record"]
+        for test in tests
+    ]
+    if len(tests) == 1:
+        return {"record": records[0]}, {}
+    return _recordings(
+        (test, {"name": test.name, "record": record})
+        for test, record in zip(tests, records, strict=True)
+    )
+
+
+def _recordings(entries: Iterable[tuple[StartingTest, Section]]) -> tuple[Section, Section]:
+    fitted, validating = list[Section](), list[Section]()
+    for test, entry in entries:
+        (validating if test.validates else fitted).append(entry)
+    return {"records": fitted}, {"validate": validating} if validating else {}
+
+
+def _bump_tests(
+    tests: Sequence[StartingTest], names: Mapping[Path, str], exciter: str
+) -> tuple[Section, Section]:
+    """Make the sections of what is fitted, and of what validates.
+
+    Channels stand once, at the first record of a file that has them; others refer to them.
+    """
+    known: dict[str, Section] = {}
+    entries = list[tuple[StartingTest, Section]]()
+    for test in sorted(tests, key=lambda test: test.validates):
+        inspection = test.inspection
+        level = _voltage_before(exciter, test)
+        steps = {**level, **steps_section(inspection, test.steps, test.sizes)}
+        own = channels_section(inspection, ("vt", *test.bases), test.bases)
+        text = in_braces(own)
+        channels = known.setdefault(text, own)
+        shared = Noted(channels, "the records below have the same" if channels is own else "")
+        given = channels if len(tests) == 1 else shared
+        record = record_of(inspection, names[inspection.path], given, test.window)
+        entries.append((test, {"name": test.name, "test": steps, "record": record}))
+    if len(tests) == 1:
+        (_, entry), *_ = entries
+        return {"test": entry["test"], "record": entry["record"]}, {VALIDATION_TO_COME: None}
+    fitted, validating = _recordings(entries)
+    return fitted, validating or {VALIDATION_TO_COME: None}
+
+
+def _voltage_before(exciter: str, test: StartingTest) -> Section:
+    """Give the voltage before a test: a number where the exciter is alone."""
+    voltage = test.inspection.channel_of("vt")
+    if exciter == ALONE and test.window is None:
+        return {"vt0": Noted(rounded(voltage.level if voltage else 1.0), "at rest")}
+    if exciter == ALONE or not test.steps or test.steps[0].from_start:
+        return {}
+    return {"vt0": Noted({"start": "auto"}, "at rest: the noise of its mean counts")}
+
+
+def _event_plant(event: Section, machine: PartData) -> Section:
+    return {**event["plant"], **_machine(machine, {"R": TYPICAL, "X": TYPICAL})}
+
+
+def _plant(unit: UnitData, inspection: Inspection) -> Section:
+    if unit.exciter.model.name == ALONE:
+        return {"type": "none"}
+    power = inspection.channel_of("p")
+    if power is None or not shows_power(power):
+        kind = Noted("open-circuit", "the breaker is open, at rated speed")
+        return {"type": kind, **_machine(unit.machine, {})}
+    levels = {signal.upper(): _level(inspection, signal) for signal in ("p", "q")}
+    network = {
+        "f0": Noted(QUESTION, "Hz, rated frequency"),
+        "R": Noted(0.0, "pu, resistance to the source"),
+        "X": Noted(QUESTION, "pu, reactance to the source: transformer and grid"),
+        "P": Noted(levels["P"], "pu of the machine, before the step"),
+        "Q": Noted(levels["Q"], "pu, before the step"),
+    }
+    measured = {name: "measured" for name, level in levels.items() if level != QUESTION}
+    return {
+        "type": Noted("infinite-bus", f"{power.name} shows power"),
+        "network": network,
+        **_machine(unit.machine, {"R": TYPICAL, **measured}),
+    }
+
+
+def _machine(machine: PartData, sources: Mapping[str, str]) -> Section:
+    """Make the machine of a plant, and where its values and those of the network come from."""
+    model = machine.model
+    values = {row.symbol: parameter(row, machine.values[row.symbol]) for row in model.sheet}
+    section = {"machine": Noted(model.name, machine.origin or model.title), "parameters": values}
+    return with_sources(section, {**sources, **machine.sources})
+
+
+def _level(inspection: Inspection, signal: str) -> float | str:
+    """Find the level of a signal at rest; to be filled in where the record does not show it."""
+    channel = inspection.channel_of(signal)
+    if channel is None or channel.unit not in (None, "pu"):
+        return QUESTION
+    return float(f"{channel.level:.4g}")
+
+
+def _parameters(exciter: PartData) -> Section:
+    model, values = exciter.model, exciter.values
+    free = free_of(model, values)
+    section: Section = {}
+    fixed = {
+        row.symbol: parameter(row, values[row.symbol]) for row in model.sheet if row not in free
+    }
+    if fixed:
+        section["fixed"] = Noted(fixed, "stays as it is; move to free what a fit is to find")
+    if free:
+        starts = {}
+        for row in free:
+            numbers = (values[row.symbol], *bounds_of(row, values[row.symbol]))
+            short = (float(f"{number:.6g}") for number in numbers)
+            bounds = dict(zip(("start", "min", "max"), short, strict=True))
+            starts[row.symbol] = Noted(bounds, above=f"{row.unit}, {row.meaning}")
+        section["free"] = Noted(starts, "found between bounds about where it starts")
+    sources = {name: word for name, word in exciter.sources.items() if name in fixed}
+    return with_sources(section, sources)
