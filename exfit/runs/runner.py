@@ -24,7 +24,7 @@ class Planned(Protocol):
         """Its name."""
 
 
-class Run(Planned, Protocol):
+class EndedRun(Planned, Protocol):
     """A part of a plan that has been run."""
 
     @property
@@ -33,7 +33,7 @@ class Run(Planned, Protocol):
 
 
 PlannedT = TypeVar("PlannedT", bound=Planned)
-RunT = TypeVar("RunT", bound=Run)
+RunT = TypeVar("RunT", bound=EndedRun)
 
 
 class Runs(NamedTuple, Generic[RunT]):
