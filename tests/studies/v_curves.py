@@ -16,8 +16,11 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from exfit.features.programme.steady.field_on_load import field_on_load  # noqa: E402
-from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad  # noqa: E402
+from exfit.features.programme.steady.fields_on_load import (  # noqa: E402
+    FieldMeasurement,
+    PointsOnLoad,
+    field_on_load,
+)
 from exfit.features.programme.steady.v_curve import v_curve  # noqa: E402
 from exfit.fitting.parameters import FreeParameter  # noqa: E402
 from exfit.models.machines import MACHINES  # noqa: E402

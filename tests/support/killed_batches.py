@@ -13,7 +13,7 @@ from ended_commands import heeding_interrupts
 PROGRAM = """
 import sys
 import exfit
-from exfit.features.fleet.table_files import write_tables
+from exfit.features.fleet.table import write_tables
 
 class Log:
     def begun(self, cases, workers): print("begun", flush=True)

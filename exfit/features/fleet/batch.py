@@ -7,6 +7,7 @@ from math import inf
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
+from typing import Protocol
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import (
@@ -25,7 +26,6 @@ from exfit.features.fleet.folder import (
     write_outcome,
 )
 from exfit.features.fleet.local import Compute, in_this_process, local_workers
-from exfit.features.fleet.observer import BatchObserver, Unobserved
 from exfit.features.fleet.plan import (
     BatchSettings,
     PlannedCase,
@@ -35,6 +35,7 @@ from exfit.features.fleet.plan import (
     refused_case,
     share_of,
 )
+from exfit.features.fleet.summary import CaseSummary
 from exfit.features.fleet.task import FurtherFiles
 from exfit.runs.runner import FitSettings
 from exfit.util.interrupts import endings_as_interruptions
@@ -47,6 +48,42 @@ MOST_TABLES = 5  # until those are left to another run that goes on in the folde
 
 
 CaseMaking = Callable[[], str]  # writes a case and returns "", or why it cannot be made
+
+
+class BatchObserver(Protocol):
+    """Sees a batch go on; all calls come from one thread, in the order of the events.
+
+    Of each case of the run ``kept`` or ``finished`` is called once, unless the run is interrupted.
+    Cases are named by their paths as the index has them.
+    """
+
+    def begun(self, cases: int, workers: int) -> None:
+        """So many cases are to be done by so many workers; 0: by those of a cluster."""
+
+    def kept(self, case: str) -> None:
+        """A case is done already, or failed: by an earlier run, or as another of equal content."""
+
+    def started(self, case: str) -> None:
+        """A worker begins the fit of a case."""
+
+    def finished(self, summary: CaseSummary) -> None:
+        """A case has come to its end, whatever it is: done, failed, refused, no record ..."""
+
+
+class Unobserved:
+    """An observer that looks away."""
+
+    def begun(self, cases: int, workers: int) -> None:
+        """Ignore how much there is to do."""
+
+    def kept(self, case: str) -> None:
+        """Ignore a case that is done already."""
+
+    def started(self, case: str) -> None:
+        """Ignore the begin of a fit."""
+
+    def finished(self, summary: CaseSummary) -> None:
+        """Ignore the end of a case."""
 
 
 def _no_tables(_: Fleet) -> None:

@@ -14,9 +14,8 @@ from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRAT
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from exfit.features.fleet.batch import CaseMaking
+    from exfit.features.fleet.batch import BatchObserver, CaseMaking
     from exfit.features.fleet.folder import Fleet
-    from exfit.features.fleet.observer import BatchObserver
     from exfit.features.fleet.task import FurtherFiles
 
 FAILED = 1  # the exit code where cases are without a fit
@@ -130,7 +129,7 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from exfit.features.fleet.batch import batch as fit_all
-    from exfit.features.fleet.table_files import write_tables
+    from exfit.features.fleet.table import write_tables
 
     tables, others = _tables_among(cases)
     with _observer(shown=not (quiet or as_json)) as observer:
@@ -197,7 +196,7 @@ def _observer(shown: bool) -> "AbstractContextManager[BatchObserver | None]":
 
 
 def _reports() -> "Sequence[FurtherFiles]":
-    from exfit.features.fleet.table_files import report_file
+    from exfit.features.fleet.table import report_file
 
     return (report_file,)
 

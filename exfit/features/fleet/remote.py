@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from exfit import __version__
 from exfit.features.fleet.bundle import QUICKLY, BundledTask
 from exfit.features.fleet.folder import CaseOutcome, Failure
+from exfit.features.fleet.local import Answer, WorkerProcess
 from exfit.features.fleet.plan import PlannedCase
-from exfit.features.fleet.processes import Answer, WorkerProcess
 from exfit.features.fleet.worker import BEGUN, READY
 
 if TYPE_CHECKING:

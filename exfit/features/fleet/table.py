@@ -7,11 +7,23 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from exfit.features.fleet.sisters import SisterGroup, SisterParameter, SisterValue, missing_interval
+from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.page import REPORT, fleet_page
+from exfit.features.fleet.sisters import (
+    SisterGroup,
+    SisterParameter,
+    SisterValue,
+    missing_interval,
+    sisters,
+)
 from exfit.features.fleet.summary import CaseSummary, SummaryParameter
+from exfit.results.model import FitResult
 from exfit.results.tables import DIGITS
 from exfit.signals import SIGNALS
+from exfit.util.files import write_together
 from exfit.util.text import printable
 
 BYTE_ORDER_MARK = "\ufeff"  # Excel reads the letters of all languages behind it
@@ -124,3 +136,33 @@ def _csv(header: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
     writer.writerow(header)
     writer.writerows(rows)
     return BYTE_ORDER_MARK + out.getvalue()
+
+
+if TYPE_CHECKING:
+    from exfit.features.programme.result import ProgrammeResult
+
+TABLE, PARAMETERS, PAGE = "fleet.csv", "parameters.csv", "fleet.html"
+
+
+def write_tables(fleet: Fleet) -> None:
+    """Write the tables and the page of a fleet; raises ExfitError where they cannot be written."""
+    groups = sisters(fleet.cases)
+    contents = {
+        PARAMETERS: parameter_table(fleet.cases, groups),
+        PAGE: fleet_page(fleet, groups),
+        TABLE: fleet_table(fleet.cases),
+    }
+    write_together(fleet.folder, contents)
+
+
+def report_file(result: "FitResult | ProgrammeResult", folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield the report of a fit, or a programme, that will lie in a folder."""
+    from exfit.features.programme.result import ProgrammeResult
+    from exfit.features.programme.show.programme_page import programme_page
+    from exfit.features.report.page import fit_page, page_html
+
+    if isinstance(result, ProgrammeResult):
+        page = programme_page(result, folder)
+    else:
+        page = fit_page(result, folder)
+    yield REPORT, page_html(page)

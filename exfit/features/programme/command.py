@@ -98,7 +98,7 @@ def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
 def check(path: Path) -> bool:
     """Check each test of a programme and show what comes of it; False: something speaks against."""
     from exfit.features.programme.case.programme import load_programme
-    from exfit.features.programme.checked_programme import check_programme
+    from exfit.features.programme.run import check_programme
     from exfit.features.programme.show.programme_terminal import checked_step
     from exfit.show import terminal
 

@@ -1,8 +1,8 @@
-"""Programmes run: each test in its turn, with what those before it measured."""
+"""Programmes run: each test in its turn, with what those before it measured; or checked before."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -18,11 +18,9 @@ from exfit.features.programme.case.programme import (
     steps_of,
 )
 from exfit.features.programme.case.schema_at_rest import SaturationTest, SteadyTest
-from exfit.features.programme.kept import KEY, Keep, keep, key_of, result_kept
+from exfit.features.programme.kept import KEY, RESULTS, Keep, keep, key_of, result_kept
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
-from exfit.features.programme.steady.points import points_of
-from exfit.features.programme.steady.saturation_test import saturation
-from exfit.features.programme.steady.steady_test import steady
+from exfit.features.programme.steady.tests_at_rest import points_of, saturation, steady
 from exfit.features.programme.values import bases_of, errors_of_bases, values_given, with_values
 from exfit.fitting.recordings import record_of
 from exfit.plants import MACHINE
@@ -31,6 +29,7 @@ from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, Iteration
 from exfit.runs.runner import AS_CASES_SAY, FitSettings, run_in_turn
 from exfit.workflows.descriptions.case_description import parts_of
+from exfit.workflows.model_check import Check
 
 Progress = Iteration | estimate.Progress
 Values = tuple[EnteredValue, ...]
@@ -198,3 +197,40 @@ def _as_it_is_now(result: StepResult, programme: Programme) -> StepResult:
     with suppress(OSError):
         inputs["case"] = file_hash(programme.path)
     return replace(result, about=programme.about, case_text=programme.text, inputs=inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedStep:
+    """A test at rest with its result, or a fit with its check; ``fault``: why there is neither."""
+
+    step: ProgrammeStep
+    outcome: FinishedTest | Check | None
+    fault: str = ""
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing speaks against the run of the test."""
+        if isinstance(self.outcome, Check):
+            return self.outcome.agrees and self.outcome.flat
+        return self.outcome is not None and self.outcome.holds
+
+
+def check_programme(programme: Programme) -> Iterator[CheckedStep]:
+    """Yield the tests at rest with their results, and each fit with its check.
+
+    A fit is checked with what the tests at rest give it, and without what other fits will.
+    Raises CaseError where a file cannot be read.
+    """
+    refuse_unreadable(programme)
+    values: tuple[EnteredValue, ...] = ()
+    for step in steps_of(programme):
+        try:
+            if step.kind in RESULTS:
+                test = finished_test(programme, step, values, None)
+                values = (*values, *values_given(test, programme))
+                yield CheckedStep(step, test)
+            else:
+                case = case_of(programme.with_bases(bases_of(values)), step)
+                yield CheckedStep(step, workflows.check(with_values(case, values)))
+        except ExfitError as fault:
+            yield CheckedStep(step, None, str(fault))

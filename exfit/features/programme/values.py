@@ -14,7 +14,7 @@ from exfit.case.case import Case
 from exfit.features.programme.case.programme import Programme
 from exfit.features.programme.result import EnteredValue, FinishedTest
 from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
-from exfit.features.programme.steady.saturation_test import channel_bases, machine_values
+from exfit.features.programme.steady.tests_at_rest import channel_bases, machine_values
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.overrides import with_given_values
 from exfit.plants import MACHINE

@@ -8,7 +8,7 @@ from fleets import fleet, row
 from payloads import HOSTILE
 
 from exfit.features.fleet.folder import Fleet
-from exfit.features.fleet.table_files import PAGE, write_tables
+from exfit.features.fleet.table import PAGE, write_tables
 
 pytestmark = pytest.mark.long  # a browser is started for each page
 

@@ -11,8 +11,15 @@ from pages import Page
 from payloads import HARMLESS, HOSTILE, Structure
 
 from exfit.features.fleet.folder import Fleet
-from exfit.features.fleet.page import MOST_PICTURES, MOST_SISTERS, fleet_page
-from exfit.features.fleet.pictures import HEIGHT, MARGIN, WIDTH, picture
+from exfit.features.fleet.page import (
+    HEIGHT,
+    MARGIN,
+    MOST_PICTURES,
+    MOST_SISTERS,
+    WIDTH,
+    fleet_page,
+    picture,
+)
 from exfit.features.fleet.sisters import sisters
 from exfit.features.fleet.summary import SummaryCurve
 

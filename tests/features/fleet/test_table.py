@@ -11,8 +11,13 @@ from fleets import fleet, parameter, row
 
 from exfit.features.fleet.sisters import sisters
 from exfit.features.fleet.summary import SummaryValidation
-from exfit.features.fleet.table import BYTE_ORDER_MARK, fleet_table, parameter_table, text_cell
-from exfit.features.fleet.table_files import write_tables
+from exfit.features.fleet.table import (
+    BYTE_ORDER_MARK,
+    fleet_table,
+    parameter_table,
+    text_cell,
+    write_tables,
+)
 
 FIRST = [
     "name", "unit", "bus", "id", "model", "machine", "status", "verdict", "reason", "validation",

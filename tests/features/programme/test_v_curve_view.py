@@ -8,8 +8,11 @@ from rich.console import Console
 
 from exfit.features.programme.show import programme_figures
 from exfit.features.programme.show.programme_terminal import v_curve as show
-from exfit.features.programme.steady.field_on_load import field_on_load
-from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad
+from exfit.features.programme.steady.fields_on_load import (
+    FieldMeasurement,
+    PointsOnLoad,
+    field_on_load,
+)
 from exfit.features.programme.steady.v_curve import v_curve
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter

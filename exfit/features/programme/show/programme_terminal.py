@@ -10,8 +10,8 @@ from rich.text import Text
 
 from exfit.estimate import Progress
 from exfit.features.programme.case.programme import ProgrammeStep
-from exfit.features.programme.checked_programme import CheckedStep
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
+from exfit.features.programme.run import CheckedStep
 from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.results.model import FitResult, FittedParameter, Iteration

@@ -6,14 +6,15 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from exfit.errors import ModelError
-from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.point_fit import FittedPoints, PointProblem, fit_points
 from exfit.fitting.parameters import FreeParameter
 from exfit.inference.linear import ResidualBlock
 from exfit.models.machines import Machine
+from exfit.plants.loaded_machine import Flow, loaded_at_rest
+from exfit.plants.parts import Names
 from exfit.signals import NOISE
 
 Array = NDArray[np.float64]
@@ -151,3 +152,20 @@ def base_of(signal: str) -> str:
 def weight_of(signal: str, measurement: FieldMeasurement) -> float:
     """Return the weight of the errors of a field signal: one over its noise, or a typical one."""
     return 1.0 / (NOISE[signal] if measurement.noise is None else measurement.noise)
+
+
+def field_on_load(
+    machine: Machine, data: Mapping[str, float], p: ArrayLike, q: ArrayLike, vt: ArrayLike
+) -> Array:
+    """Return ifd (M,) that holds p, q and vt, each (M,), all per unit; efd at rest is the same.
+
+    ``data`` has a value for every symbol of the machine's sheet. It is nan where no rest exists.
+
+    Source: Kundur, Power System Stability and Control, 3.6.3 to 3.6.5 (steady state, on the
+    machine's rotor axes); saturation as the machine's model has it.
+    """
+    active, reactive, voltage = (np.asarray(signal, np.float64) for signal in (p, q, vt))
+    terminals = Flow(active / voltage, reactive / voltage, voltage, np.zeros_like(voltage))
+    with np.errstate(all="ignore"):
+        ifd = loaded_at_rest(voltage, terminals, machine, Names(**data)).ifd
+    return np.asarray(ifd, np.float64)

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.fields_on_load import (
     FieldsOnLoad,
     PointsOnLoad,
     base_of,
+    field_on_load,
     weight_of,
 )
 from exfit.features.programme.steady.point_errors import allowing_for_errors

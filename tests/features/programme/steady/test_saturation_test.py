@@ -7,10 +7,10 @@ from exfit.case.checks.node import ContentNode
 from exfit.errors import RecordError
 from exfit.features.programme.case.programme_checks import saturation_test_faults
 from exfit.features.programme.case.schema_at_rest import SaturationTest
-from exfit.features.programme.steady.points import points_of
-from exfit.features.programme.steady.saturation_test import (
+from exfit.features.programme.steady.tests_at_rest import (
     channel_bases,
     machine_values,
+    points_of,
     saturation,
 )
 from exfit.models.machines import MACHINES

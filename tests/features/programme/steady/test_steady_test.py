@@ -7,9 +7,8 @@ import pytest
 
 from exfit.errors import RecordError
 from exfit.features.programme.case.schema_at_rest import SteadyTest
-from exfit.features.programme.steady.field_on_load import field_on_load
-from exfit.features.programme.steady.points import points_of
-from exfit.features.programme.steady.steady_test import steady
+from exfit.features.programme.steady.fields_on_load import field_on_load
+from exfit.features.programme.steady.tests_at_rest import points_of, steady
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 

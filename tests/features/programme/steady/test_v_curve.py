@@ -5,11 +5,11 @@ import pytest
 from tiers import few_of
 
 from exfit.errors import ModelError
-from exfit.features.programme.steady.field_on_load import field_on_load
 from exfit.features.programme.steady.fields_on_load import (
     FieldMeasurement,
     FieldsOnLoad,
     PointsOnLoad,
+    field_on_load,
 )
 from exfit.features.programme.steady.v_curve import v_curve
 from exfit.fitting.parameters import FreeParameter

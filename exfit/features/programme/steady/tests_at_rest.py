@@ -1,7 +1,8 @@
-"""A steady test of a programme: its points read, and compared with the machine of the unit."""
+"""Tests at rest: their points, given in the programme or in a file, and what they measure."""
 
 from collections.abc import Mapping
 from math import isfinite
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -9,14 +10,26 @@ from numpy.typing import NDArray
 
 from exfit.case.schema import Unknown
 from exfit.errors import CaseError, RecordError
-from exfit.features.programme.case.schema_at_rest import PointColumn, SteadyTest
-from exfit.features.programme.steady.field_on_load import field_on_load
-from exfit.features.programme.steady.fields_on_load import FieldMeasurement, PointsOnLoad, base_of
+from exfit.features.programme.case.schema_at_rest import (
+    CURVE_SIGNALS,
+    POINT_SIGNALS,
+    PointColumn,
+    SaturationTest,
+    SteadyTest,
+)
+from exfit.features.programme.steady.fields_on_load import (
+    FieldMeasurement,
+    PointsOnLoad,
+    base_of,
+    field_on_load,
+)
+from exfit.features.programme.steady.saturation import FieldWinding, saturation_curve
+from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
 from exfit.features.programme.steady.v_curve import v_curve
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
-from exfit.records.points import Points
+from exfit.records.points import Points, given_points, read_points
 from exfit.records.units import needs_base
 from exfit.signals import FIELDS, TERMINALS
 
@@ -86,3 +99,76 @@ def measurement_of(
     high = start * FARTHEST_BASE if base.max is None else base.max
     free = FreeParameter(base_of(signal), min(max(start, low), high), low, high, logarithmic=True)
     return FieldMeasurement(measured, unit, free.start, column.noise, free)
+
+
+DEFAULT_UNITS = MappingProxyType({"vt": "pu", **dict(zip(FIELDS, ("A", "V"), strict=True))})
+
+
+def saturation(test: SaturationTest, points: Points, machine: Machine | None) -> SaturationResult:
+    """Return what a saturation test shows of a machine, whose model decides which form is used.
+
+    Raises ExfitError for input that cannot be used.
+    """
+    units = {signal: _unit(test, points, signal) for signal in CURVE_SIGNALS}
+    vt = points.columns["vt"]
+    section = test.columns.get("vt")
+    base = None if section is None else section.base
+    if base is None and needs_base(units["vt"]):
+        text = f"columns.vt.base: is missing: what is 1 pu in {units['vt']}, the unit of the file?"
+        raise RecordError(f"{points.source}: {text}")
+    winding = test.winding
+    return saturation_curve(
+        vt if base is None else vt / base,
+        points.columns["ifd"],
+        test.form or (machine.saturation if machine else "quadratic"),
+        unit=units["ifd"],
+        efd=points.columns.get("efd"),
+        efd_unit=units["efd"],
+        winding=FieldWinding(winding.resistance, winding.temperature, winding.hot),
+        exciter=test.brushless,
+    )
+
+
+def machine_values(result: SaturationResult) -> Mapping[str, MeasuredValue]:
+    """Return what the test gives the machine's section: S10 and S12, nothing of a brushless unit.
+
+    They enter it with ``sources: measured``.
+    """
+    if result.exciter:
+        return {}
+    return {"S10": result.curve.S10, "S12": result.curve.S12}
+
+
+def channel_bases(result: SaturationResult) -> Mapping[str, tuple[MeasuredValue, str]]:
+    """Return what 1 pu is of ifd and, where it is known, of efd, each with its unit.
+
+    It is the base of channels of later records that are in that unit and give none.
+    """
+    if result.exciter:
+        return {}
+    bases = {"ifd": (result.curve.ifd_base, result.unit)}
+    if result.efd_base is not None:
+        bases["efd"] = (result.efd_base, result.efd_unit)
+    return bases
+
+
+def _unit(test: SaturationTest, points: Points, signal: str) -> str:
+    section = test.columns.get(signal)
+    given = None if section is None else section.unit
+    return given or points.units.get(signal) or DEFAULT_UNITS[signal]
+
+
+def points_of(test: SaturationTest | SteadyTest, folder: Path) -> Points:
+    """Return the points of a test, by signal; its file lies in a folder. Raises RecordError."""
+    if test.file is None:
+        signals = CURVE_SIGNALS if isinstance(test, SaturationTest) else POINT_SIGNALS
+        return given_points(test.points or (), signals, Path(test.name))
+    names = {signal: column.column or signal for signal, column in test.columns.items()}
+    units = {names[signal]: column.unit for signal, column in test.columns.items()}
+    read = read_points(folder / test.file, units, test.sheet)
+    return Points(
+        {signal: read.columns[name] for signal, name in names.items()},
+        {signal: read.units[name] for signal, name in names.items() if name in read.units},
+        read.source,
+        read.sha256,
+    )
