@@ -4,16 +4,20 @@ Nothing here knows a terminal, a page or a picture: `exfit.show.terminal.render`
 a terminal, the report writes the same ones as HTML.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.inference import Interval, Uncertainty
+from exfit.util.text import rounded
+
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 
+NO_BREAK = "\N{NO-BREAK SPACE}"  # between words that stay in one line
 WIDE = 560.0  # units of a chart across: few, so that its text is read on a telephone
 
 Mark = Literal["", "ok", "doubt", "bad", "strong", "faint"]
@@ -198,11 +202,38 @@ def unresolved(texts: Iterable[str]) -> Iterator[Note]:
     return remarks("unresolved:", texts, kind="warning")
 
 
-def facts(*pairs: tuple[str, str], between: str = "   ") -> Facts:
-    """Make a line of figures by their names."""
-    return Facts(pairs, between)
-
-
-def listed_facts(texts: Sequence[str], between: str = ", ") -> Facts:
-    """Make a line of groups of words that belong together, as "12 iterations"."""
+def figures(*texts: str, between: str = "   ") -> Facts:
+    """Make a line of figures that say themselves what they are, as "12 iterations"."""
     return Facts(tuple(("", text) for text in texts), between)
+
+
+def paragraph(text: str, mark: Mark = "") -> Note:
+    """Make a sentence without a label."""
+    return Note(text, mark=mark)
+
+
+def number(value: float | None, digits: int = 5) -> str:
+    """Write a number in a few digits, a dash for None."""
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+def interval(limits: Interval | None, digits: Callable[[float], str] = rounded) -> str:
+    """Write an interval, its limits in some ``digits``; an open side by the other limit."""
+    low, high = limits or (None, None)
+    if low is not None and high is not None:
+        return f"{digits(low)} ... {digits(high)}"
+    if low is None:
+        return "-" if high is None else f"below {digits(high)}"
+    return f"above {digits(low)}"
+
+
+def percent(share: float) -> str:
+    """Write a share in percent, two digits of it."""
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def error_of(uncertainty: Uncertainty, of_record: bool = False) -> str:
+    """Write a standard error: in percent, but of a record in its own unit."""
+    if uncertainty.relative_error is not None and not of_record:
+        return percent(uncertainty.relative_error)
+    return "-" if uncertainty.std_error is None else f"{uncertainty.std_error:.1e}"

@@ -1,0 +1,233 @@
+"""The result of a fit as blocks: in brief, and whole; and the profiles of its parameters."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from exfit.inference import ParameterEffect
+from exfit.results.model import FitResult, FittedParameter
+from exfit.results.search_summary import search_summary
+from exfit.results.verdict import GOOD, MATCHES
+from exfit.show.blocks import (
+    NO_BREAK,
+    Block,
+    Mark,
+    Note,
+    Table,
+    TableColumn,
+    columns,
+    error_of,
+    figures,
+    interval,
+    notes,
+    number,
+    paragraph,
+    remarks,
+    row,
+    unresolved,
+)
+from exfit.show.validations import comparisons, in_a_line, played, rejections
+from exfit.util.sources import by_source
+from exfit.util.text import percentage
+
+if TYPE_CHECKING:
+    from exfit.workflows.profiles import Profiles
+
+MARKS: dict[str, Mark] = {GOOD: "ok", MATCHES: "doubt"}  # of verdicts; the others are bad
+
+
+def briefs(
+    result: FitResult, folder: Path, before: FitResult | None = None
+) -> Iterator[list[Block]]:
+    """Yield what is first read of a fit whose files are in a folder, each time in fewer lines.
+
+    Left out are the values of records, then causes from the last one on, then validations that
+    are accepted.
+    """
+    causes = 0 if result.verdict is None else len(result.verdict.causes)
+    accepted = sum(not match.reason for match in result.validation)
+    yield [*_brief(result, folder, before, causes, accepted, True)]
+    for most in range(causes, 0, -1):
+        yield [*_brief(result, folder, before, most, accepted, False)]
+    yield [*_brief(result, folder, before, min(causes, 1), 0, False)]
+
+
+def _brief(
+    result: FitResult,
+    folder: Path,
+    before: FitResult | None,
+    causes: int,
+    accepted: int,
+    of_records: bool,
+) -> Iterator[Block]:
+    yield fitted_table(result, before, of_records)
+    yield figures(f"cost {result.start_cost:.4e} -> {result.cost:.4e}", *_errors(result))
+    good = [match for match in result.validation if not match.reason]
+    for match in result.validation:
+        if match.reason or match in good[:accepted]:
+            yield in_a_line(match)
+    if accepted < len(good):
+        yield paragraph(f"{len(good) - accepted} further validations are accepted")
+    listed = [*_causes(result)]
+    yield from listed[:causes]
+    if causes < len(listed):
+        yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
+    yield paragraph(f"written to {folder}; all of it: `exfit show {folder} --all`")
+    yield verdict(result)
+
+
+def whole(result: FitResult, before: FitResult | None = None) -> Iterator[Block]:
+    """Yield all of a fit: values, effort, how well they are determined, records, the verdict.
+
+    The values of a fit ``before`` are beside the new ones.
+    """
+    yield fitted_table(result, before)
+    several = len(result.comparisons) > 1
+    if result.success:
+        yield Note(result.message, "info", f"{result.outcome}:", "strong")
+    yield figures(
+        f"cost {result.start_cost:.4e} -> {result.cost:.4e}", *([] if several else _errors(result))
+    )
+    yield figures(
+        f"{result.nit} iterations",
+        f"{result.nfev} residuals",
+        f"{result.njev} Jacobians",
+        f"{result.simulations} simulations",
+        f"{result.seconds:.2f} s",
+        between=", ",
+    )
+    for end in result.phase_ends:
+        errors = ", ".join(f"{match.rmse:.3e}" for match in end.comparisons)
+        yield figures(
+            f"end of {end.phase}: iteration {end.iteration}, cost {end.cost:.4e}",
+            f"rmse {errors} pu",
+            f"parameters_{end.phase}.yaml",
+        )
+    yield paragraph(f"sub-steps: {result.substeps}")
+    if result.sources:
+        counts = by_source(result.sources, result.sources).items()
+        text = ", ".join(f"{len(names)}{NO_BREAK}{source}" for source, names in counts)
+        yield Note(text, label="sources of the values:")
+    if result.minima is not None:
+        yield Note(search_summary(result.minima, result.cost), label="search:", mark="strong")
+    if result.knowledge is not None:
+        yield from remarks("sensitivity:", ranking(result.knowledge.effects), "strong")
+        yield from unresolved(result.knowledge.sentences)
+    yield from notes(result.notes)
+    if result.validation or several:
+        yield from comparisons([*result.comparisons, *result.validation])
+    else:
+        yield from played(result.comparisons)
+    yield from rejections(result.validation)
+    yield from _causes(result)
+    yield verdict(result)
+
+
+def _errors(result: FitResult) -> list[str]:
+    """Write how well the fitted records are met: of several each."""
+    errors = ", ".join(f"{match.rmse:.3e}" for match in result.comparisons)
+    percentages = ", ".join(percentage(match.fit_percent) for match in result.comparisons)
+    return [f"rmse {errors} pu", f"fit {percentages} %"]
+
+
+def verdict(result: FitResult) -> Note:
+    """Say in a sentence what a fit comes to."""
+    if result.verdict is None:
+        return Note(result.message, "verdict", f"{result.outcome}:", "strong")
+    mark = MARKS.get(result.verdict.verdict, "bad")
+    return Note(result.verdict.sentence, "verdict", "verdict:", mark)
+
+
+def _causes(result: FitResult) -> Iterator[Note]:
+    """Yield why a fit may be as it is, each with what to do."""
+    if result.verdict is not None:
+        label = "note:" if result.verdict.verdict == GOOD else "cause:"
+        sentences = (cause.sentence for cause in result.verdict.causes)
+        yield from remarks(label, sentences, kind="remedy")
+
+
+def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
+    """Yield in one sentence which parameter matters first."""
+    ranked = (f"{effect.label}{NO_BREAK}{number(effect.of_noise, 2)}" for effect in effects)
+    if effects:
+        yield f"1 % of each moves the response by, in units of the noise: {', '.join(ranked)}"
+
+
+def fitted_table(
+    result: FitResult, before: FitResult | None = None, of_records: bool = True
+) -> Table:
+    """Make the table of fitted values with their intervals; those of records come last."""
+    shown = {name: p for name, p in result.parameters.items() if of_records or not p.of_record}
+    marks = {name: ", ".join(_remarks(parameter)) for name, parameter in shown.items()}
+    linear = any(parameter.linear_error is not None for parameter in shown.values())
+    heads = (
+        TableColumn("parameter"),
+        TableColumn("start", number=True, expendable=1 if linear else 2),
+        *([] if before is None else [TableColumn("before", number=True)]),
+        TableColumn("fitted", number=True),
+        TableColumn("95 % interval", number=True),
+        TableColumn("error", number=True, expendable=2 if linear else 1),
+        TableColumn("unit"),
+        *([TableColumn("")] if any(marks.values()) else []),
+    )
+    no_interval = "" if result.verdict is None else result.verdict.in_place_of_interval
+    rows = []
+    for name, parameter in shown.items():
+        vague = result.knowledge is not None and parameter.why
+        doubtful = parameter.at_bound or not parameter.physical or vague
+        old = () if before is None else (parameter.rounded(before.values.get(name)),)
+        error = "-"  # where linear theory does not serve
+        if result.knowledge is not None and parameter.linear_error is not None:
+            confidence = result.knowledge.confidence.parameters[name]
+            error = error_of(confidence, parameter.of_record)
+        rows.append(
+            row(
+                name,
+                number(parameter.start),
+                *old,
+                parameter.rounded(parameter.value),
+                no_interval or interval(parameter.interval, parameter.rounded),
+                error,
+                parameter.unit,
+                *([marks[name]] if any(marks.values()) else []),
+                mark="doubt" if doubtful else "",
+            )
+        )
+    return Table(heads, tuple(rows))
+
+
+def _remarks(parameter: FittedParameter) -> Iterator[str]:
+    """Yield what must be seen beside a value."""
+    if parameter.at_bound:
+        yield f"on its {parameter.at_bound}"
+    if not parameter.physical:
+        yield "not physical"
+    if parameter.interval_note:
+        yield parameter.interval_note
+
+
+def profiles(result: "Profiles") -> Iterator[Block]:
+    """Yield the intervals that profiles give, beside those of the linear theory."""
+    heads = ("fitted", "min 95 %", "max 95 %", "linear min", "linear max")
+    rows = []
+    for profile in result.profiles:
+        linear = (None, None) if profile.linear is None else profile.linear
+        rows.append(
+            row(
+                profile.name,
+                profile.rounded(profile.value),
+                result.verdict.in_place_of_interval or profile.rounded(profile.low),
+                *map(profile.rounded, (profile.high, *linear)),
+                profile.unit,
+                mark="doubt" if any(profile.ends) else "",
+            )
+        )
+    yield Table(columns("parameter", *heads, "unit", numbers=heads), tuple(rows))
+    sides = ("no lower limit", "no upper limit")
+    yield from unresolved(
+        f"{profile.name} has {side}: {end}"
+        for profile in result.profiles
+        for side, end in zip(sides, profile.ends, strict=True)
+        if end and not result.verdict.misfit
+    )
+    yield from notes(result.notes)

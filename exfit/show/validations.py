@@ -1,0 +1,143 @@
+"""Records beside simulations, as blocks."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from exfit.dsp.features import LABELS
+from exfit.results.comparisons import Comparison
+from exfit.results.feature_digits import feature_cells
+from exfit.results.played_records import Excursion
+from exfit.show.blocks import (
+    Block,
+    Cell,
+    Note,
+    Table,
+    TableColumn,
+    columns,
+    notes,
+    paragraph,
+    remarks,
+    row,
+)
+from exfit.util.text import percentage
+
+FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interval
+
+
+def comparisons(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
+    """Yield how well each record is met, side by side, and its step measured beside simulated."""
+    if all_of_them:
+        yield _errors(all_of_them)
+    yield from played(all_of_them)
+    stepped = [
+        match for match in all_of_them if match.features.measured or match.features.simulated
+    ]
+    if stepped:
+        yield _features(stepped)
+        yield from remarks("-", _without(stepped), "faint")
+
+
+def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
+    """Yield what of records was played in, and how the signals that are compared depart."""
+    events = [match for match in all_of_them if match.played is not None]
+    rows: list[tuple[Cell, ...]] = []
+    for match in events:
+        driving = {} if match.played is None else match.played.driving
+        texts = (
+            name if signal.excursion is None else f"{name} ({signal.excursion.text(signal.unit)})"
+            for name, signal in driving.items()
+        )
+        yield from remarks(f"{match.name}: played in:", [", ".join(texts)], "")
+        for signal, error in ({} if match.played is None else match.played.errors).items():
+            cells = (f"{error.largest:+.2e}", f"{error.largest_at:.4g}", f"{error.at_rest:+.1e}")
+            peaks = (_peak(error.measured), _peak(error.simulated))
+            rmse = f"{match.channels[signal].rmse:.2e}"
+            rows.append(row(match.name, signal, rmse, *cells, *peaks))
+    if events:
+        yield Table(
+            (
+                *columns("record", "signal"),
+                TableColumn("rms", number=True),
+                TableColumn("largest", number=True),
+                TableColumn("at", number=True, expendable=2),
+                TableColumn("at rest", number=True, expendable=1),
+                TableColumn("peak rec.", number=True),
+                TableColumn("peak sim.", number=True),
+            ),
+            tuple(rows),
+            "simulated less recorded, pu, and the peaks of both from rest:",
+        )
+
+
+def rejections(all_of_them: Iterable[Comparison]) -> Iterator[Note]:
+    """Yield which records that were not fitted the response does not hold on, and why."""
+    return remarks("not accepted:", (match.reason for match in all_of_them), "bad")
+
+
+def in_a_line(match: Comparison) -> Note:
+    """Say in a line how well a record that was not fitted is met."""
+    if match.reason:
+        return Note(match.reason, "verdict", "not accepted:", "bad")
+    figures = f"rmse {match.rmse:.3e} pu, fit {percentage(match.fit_percent)} %"
+    return Note(f"{figures}, accepted", "verdict", f"validation {match.name}:", "ok")
+
+
+def validation(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
+    """Yield what is not accepted, which records were fitted, and each match."""
+    yield from rejections(all_of_them)
+    for role, chosen in (("fitted, not judged:", False), ("validated:", True)):
+        records = [f"{m.name} ({m.record})" for m in all_of_them if m.validation is chosen]
+        if records:
+            yield paragraph(f"{role} {', '.join(records)}")
+    for match in all_of_them:
+        yield from remarks("step:", (step.text for step in match.steps))
+        yield from notes(match.notes)
+    yield from comparisons(all_of_them)
+
+
+def _errors(matches: Sequence[Comparison]) -> Table:
+    signals = list(dict.fromkeys(signal for match in matches for signal in match.channels))
+    of_events = f" {matches[0].judged_by}" if matches[0].is_event else ""
+    rows = [row("cost", "pu²", *(f"{match.cost:.4e}" for match in matches))]
+    for signal in signals:
+        errors = (match.channels.get(signal) for match in matches)
+        cells = ("-" if error is None else f"{error.rmse:.3e}" for error in errors)
+        rows.append(row("rmse" if len(signals) == 1 else f"rmse {signal}", "pu", *cells))
+    largest = (f"{match.max_error:.3e}" for match in matches)
+    rows.append(row(f"maximum error{of_events}", "pu", *largest))
+    percentages = (percentage(match.fit_percent) for match in matches)
+    rows.append(row(f"fit{of_events}", "%", *percentages))
+    names = (TableColumn(match.name, number=True, folds=True) for match in matches)
+    return Table((*columns("", "unit"), *names), tuple(rows), leading=2)
+
+
+def _peak(excursion: Excursion | None) -> str:
+    return "-" if excursion is None else f"{excursion.value:+.4g}"
+
+
+def _features(matches: Sequence[Comparison]) -> Table:
+    beside = (
+        TableColumn(kind, number=True, group=match.name, folds=True)
+        for match in matches
+        for kind in FEATURE_COLUMNS
+    )
+    rows = (
+        row(
+            label,
+            unit,
+            *(cell for match in matches for cell in feature_cells(match.features, key)),
+        )
+        for label, key, unit in LABELS
+    )
+    return Table((*columns("step of vt", "unit"), *beside), tuple(rows), leading=2)
+
+
+def _without(matches: Iterable[Comparison]) -> Iterator[str]:
+    """Yield which lines features of records are read without, and which features are missing."""
+    measured = {match.name: match.features.measured for match in matches}
+    for name, features in measured.items():
+        if features is not None and features.removed:
+            yield f"{name}: measured without {features.removed}"
+    for name, features in measured.items():
+        for label, key, _ in LABELS if features is not None else ():
+            if features is not None and key in features.why:
+                yield f"{name}: {label}: {features.why[key]}"
