@@ -13,7 +13,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, chdir, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from html import unescape
 from importlib.metadata import version
@@ -43,7 +43,6 @@ BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 DPI = 84  # of the figures: 756 points wide, that of a page
 COLOURS = 96  # of a figure; its lines have a few, each with shades to white
 HEIGHT = 40  # lines of the terminal
-SECONDS = 0.09  # that a fit takes, which no two runs share; docs/performance.md
 FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that is seen
 # fonts of a server: a picture of its own has none
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
@@ -218,7 +217,6 @@ def ran(run: Run) -> bytes:
         changes.enter_context(patch.object(plots.style, "DPI", DPI))
         changes.enter_context(patch.object(terminal, "console", lambda: console))
         changes.enter_context(patch.object(terminal, "LiveIterations", Still))
-        changes.enter_context(patch.object(terminal, "fit", in_no_time(terminal.fit)))
         for name in DRAWN:
             if f"{name}.png" not in run.figures:
                 changes.enter_context(patch.object(plots, name, lambda *_: Figure()))
@@ -231,11 +229,6 @@ def ran(run: Run) -> bytes:
         title="", theme=DEFAULT_TERMINAL_THEME, code_format=FORMAT, unique_id=name
     )
     return svg.replace(*FRAME).encode()
-
-
-def in_no_time(show):
-    """Return a function that shows a fit, with the same seconds for each."""
-    return lambda console, result, *others: show(console, replace(result, seconds=SECONDS), *others)
 
 
 def smaller(png: bytes) -> bytes:

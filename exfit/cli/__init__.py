@@ -43,6 +43,7 @@ OF_CORE = {
         "examine", "Compare fitted values with records that were not fitted.", "responses:validate"
     ),
     "check": _command("examine", "Check a case before its fit.", "fitting:check"),
+    "show": _command("examine", "Print a stored result again.", "stored:show"),
     "profile": _command(
         "examine",
         "Find the intervals of parameters by their profile likelihood.",

@@ -28,6 +28,7 @@ def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
     from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
+    from exfit.show import models as shown
     from exfit.show import terminal
 
     exciters, machines = MODELS.values(), MACHINES.values()
@@ -45,9 +46,9 @@ def models(name: str | None, folder: Path | None) -> None:
         write_overview(folder, [_model(name)] if name else every)
         terminal.written(terminal.console(), folder)
     elif name is None:
-        terminal.catalogue(terminal.console(), exciters, machines, added)
+        terminal.show(terminal.console(), shown.catalogue(exciters, machines, added))
     else:
-        terminal.model(terminal.console(), _model(name))
+        terminal.show(terminal.console(), shown.model(_model(name)))
 
 
 def _model(name: str) -> "Model | Machine":

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 @set_option
 @parameters_option
 @click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
+@click.option("-v", "--verbose", is_flag=True, help="Print all of the result, as exfit show --all.")
 @output_options
 def fit(
     cases: tuple[Path, ...],
@@ -52,6 +53,7 @@ def fit(
     changes: tuple[str, ...],
     parameters: Path | None,
     watch: bool,
+    verbose: bool,
     output: Output,
 ) -> None:
     """Fit the free parameters of each CASE to its records.
@@ -62,11 +64,12 @@ def fit(
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
     runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far.
 
-    The first line of the result is the verdict: good | matches, not all determined | misses the
-    record | no match | not converged. The likeliest causes follow, at most five, each with what to
-    do. Exit code 0: the first two; 1: bad input; 3: the others, or a validation that is not
-    accepted: beyond the limit of accept in the case, without it no better than a constant or beyond
-    3 times the error of the fit.
+    The last line of the result is the verdict: good | matches, not all determined | misses the
+    record | no match | not converged. The likeliest causes stand above it, at most five, each with
+    what to do. What else the fit shows stands in the report, and is printed with --verbose or later
+    by exfit show. Exit code 0: the first two verdicts; 1: bad input; 3: the others, or a validation
+    that is not accepted: beyond the limit of accept in the case, without it no better than a
+    constant or beyond 3 times the error of the fit.
 
     --set overrides --parameters, and both override the case: they give the start of a free
     parameter, and the value of another. The result says which values they changed.
@@ -95,7 +98,7 @@ def fit(
         if not output.shown:
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
         folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
-        fit_again_and_again(case, given, folder, strategy, search, output)
+        fit_again_and_again(case, given, folder, strategy, search, output, verbose)
         return
     from exfit.verdict.causes.before_fit import case_warnings, event_warnings
 
@@ -104,7 +107,7 @@ def fit(
         echo(f"warning: {warning}", err=True)
     folder = output.folder_of(loaded, "fit", run_folder.OF_FIT, after_records=True)
     if output.shown:
-        result = fit_live(loaded, folder, strategy, search, output)
+        result = fit_live(loaded, folder, strategy, search, output, verbose)
     else:
         result = _fit(loaded, folder, strategy, search, output)
     if not result.holds:
@@ -141,7 +144,7 @@ def check(case: Path) -> None:
     """
     from exfit import workflows
     from exfit.case.peek import keys_of
-    from exfit.show import terminal
+    from exfit.show import checks, terminal
 
     keys = keys_of(case)
     for key, checked in parts("CHECKS").items():
@@ -150,6 +153,6 @@ def check(case: Path) -> None:
                 raise SystemExit(NOT_CONVERGED)
             return
     result = workflows.check(case)
-    terminal.check(terminal.console(), result)
+    terminal.show(terminal.console(), checks.check(result))
     if not (result.agrees and result.flat):
         raise SystemExit(NOT_CONVERGED)

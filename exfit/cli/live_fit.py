@@ -19,6 +19,7 @@ def fit_live(
     strategy: str | None,
     search: str | None,
     output: Output,
+    verbose: bool = False,
     before: "FitResult | None" = None,
 ) -> "FitResult":
     """Fit a case, show its iterations and its result beside a former one, write its files.
@@ -26,19 +27,22 @@ def fit_live(
     The figures come last: the result is written and shown before they are drawn.
     """
     from exfit import workflows
-    from exfit.show import run_folder, terminal
+    from exfit.show import fits, run_folder, terminal
 
-    console = terminal.console()
+    console, figures = terminal.console(), None
     title, most = terminal.task(case, strategy), case.estimate.most_iterations
     with terminal.LiveIterations(console, title, most).running() as shown:
         result = workflows.fit(case, strategy, shown, shown.starts, shown.live, search=search)
     try:
         figures = run_folder.write_fit(result, folder)
     finally:  # whatever becomes of the files
-        terminal.fit(console, result, before)
-    console.print()
-    terminal.written(console, folder)
-    output.draw(figures)
+        place = None if figures is None else folder
+        console.print()
+        if verbose:
+            terminal.show(console, fits.whole(result, place, before))
+        else:
+            terminal.show_shortest(console, fits.briefs(result, place, before))
+    output.draw(figures, listed=verbose)
     return result
 
 
@@ -49,6 +53,7 @@ def fit_again_and_again(
     strategy: str | None,
     search: str | None,
     output: Output,
+    verbose: bool = False,
 ) -> None:
     """Fit a case, and again whenever a file of it or of its given values changes, until Ctrl-C.
 
@@ -68,7 +73,7 @@ def fit_again_and_again(
             try:
                 loaded = given.load(case)
                 refuse_own_files(loaded, folder, run_folder.OF_FIT, True)
-                before = fit_live(loaded, folder, strategy, search, output, before)
+                before = fit_live(loaded, folder, strategy, search, output, verbose, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:

@@ -86,11 +86,11 @@ class Output:
         refuse_own_files(case, folder, files, after_records)
         return folder
 
-    def draw(self, figures: "FigureFiles") -> None:
-        """Draw the figures of a run, last of all it does, with a line for each."""
+    def draw(self, figures: "FigureFiles", listed: bool = True) -> None:
+        """Draw the figures of a run, last of all it does; ``listed``: with a line for each."""
         if not self.figures:
             return
-        if self.shown:
+        if self.shown and listed:
             from exfit.show import terminal
 
             warn(figures.draw(partial(terminal.figure, terminal.console())))

@@ -1,7 +1,6 @@
 """The command profile."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -14,9 +13,6 @@ from exfit.cli.options import (
     output_options,
     print_json,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command(short_help="Find the intervals of parameters by their profile likelihood.")
@@ -57,7 +53,10 @@ def profile(
     if output.as_json:
         print_json(profiles.as_json())
     elif output.shown:
-        terminal.profiles(console, profiles)
+        from exfit.show import fits
+
+        console.print()
+        terminal.show(console, fits.profiles(profiles))
         terminal.written(console, folder)
     output.draw(figures)
     if profiles.interrupted:

@@ -71,10 +71,11 @@ def inspect_(
     if output.as_json:
         print_json(inspection.as_json())
     elif output.shown:
-        from exfit.show import terminal
+        from exfit.show import inspections, terminal
 
         console = terminal.console()
         suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
-        terminal.inspection(console, inspection, suggested.lines())
+        terminal.show(console, inspections.inspection(inspection, suggested.lines()))
+        console.print()
         terminal.written(console, folder)
     output.draw(figures)

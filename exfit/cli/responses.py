@@ -58,13 +58,14 @@ def simulate(
     simulation = workflows.simulate(loaded, values)
     figures = run_folder.write_simulation(simulation, case.stem, folder)
     if output.shown:
-        from exfit.show import terminal
+        from exfit.show import terminal, validations
+        from exfit.show.blocks import notes, paragraph
 
-        console = terminal.console()
-        if simulation.comparison is not None:
-            terminal.comparisons(console, [simulation.comparison])
-        console.print(f"sub-steps: {simulation.response.substeps}")
-        terminal.notes(console, simulation.notes)
+        console, compared = terminal.console(), simulation.comparison
+        if compared is not None:
+            terminal.show(console, validations.comparisons([compared]))
+        substeps = paragraph(f"sub-steps: {simulation.response.substeps}")
+        terminal.show(console, [substeps, *notes(simulation.notes)])
         terminal.written(console, folder)
     output.draw(figures)
 
@@ -186,11 +187,11 @@ def _show(result: "ValidationResult", folder: Path, output: Output) -> None:
     if output.as_json:
         print_json({"validation": [plain(match) for match in result.matches]})
     elif output.shown:
-        from exfit.show import terminal
+        from exfit.show import terminal, validations
 
         console = terminal.console()
         console.print(result.origin, soft_wrap=True, markup=False)
-        terminal.validation(console, result.matches)
+        terminal.show(console, validations.validation(result.matches))
         console.print()
         terminal.written(console, folder)
 

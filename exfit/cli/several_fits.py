@@ -51,12 +51,13 @@ def fit_several(
             print_json(series.to_dict())
         elif output.shown:
             from exfit.show import terminal
+            from exfit.show.series import fit_series
 
-            terminal.fit_series(terminal.console(), series)
+            console = terminal.console()
+            console.print()
+            terminal.show(console, fit_series(series))
     if output.shown:
-        from exfit.show import terminal
-
-        terminal.written(terminal.console(), folder)
+        terminal.written(console, folder)
     output.draw(of_all)
     if output.figures:
         draw_each(figures, output)

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.inference import Interval, Uncertainty
+from exfit.inference.confidence import Interval, Uncertainty
 from exfit.util.text import rounded
 
 Array = NDArray[np.float64]

@@ -15,7 +15,9 @@ def check(result: Check) -> Iterator[Block]:
     other = "twin" if result.has_equations else "record"
     for record, differences in result.from_program.items():
         listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
-        yield paragraph(f"largest difference of program and {other} at the start, {record}: {listed}")
+        yield paragraph(
+            f"largest difference of program and {other} at the start, {record}: {listed}"
+        )
     yield from remarks("warning:", result.warnings, kind="warning")
     yield from notes(result.notes)
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exfit.inference import ParameterEffect
+from exfit.inference.sensitivity import ParameterEffect
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES
@@ -37,14 +37,14 @@ MARKS: dict[str, Mark] = {GOOD: "ok", MATCHES: "doubt"}  # of verdicts; the othe
 
 
 def briefs(
-    result: FitResult, folder: Path, before: FitResult | None = None
+    result: FitResult, folder: Path | None = None, before: FitResult | None = None
 ) -> Iterator[list[Block]]:
-    """Yield what is first read of a fit whose files are in a folder, each time in fewer lines.
+    """Yield what is first read of a fit, and of its files in a folder, each time in fewer lines.
 
     Left out are the values of records, then causes from the last one on, then validations that
     are accepted.
     """
-    causes = 0 if result.verdict is None else len(result.verdict.causes)
+    causes = len(result.verdict.causes)
     accepted = sum(not match.reason for match in result.validation)
     yield [*_brief(result, folder, before, causes, accepted, True)]
     for most in range(causes, 0, -1):
@@ -54,7 +54,7 @@ def briefs(
 
 def _brief(
     result: FitResult,
-    folder: Path,
+    folder: Path | None,
     before: FitResult | None,
     causes: int,
     accepted: int,
@@ -72,14 +72,17 @@ def _brief(
     yield from listed[:causes]
     if causes < len(listed):
         yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
-    yield paragraph(f"written to {folder}; all of it: `exfit show {folder} --all`")
+    if folder is not None:
+        yield paragraph(f"written to {folder}; all of it: `exfit show --all {folder}`")
     yield verdict(result)
 
 
-def whole(result: FitResult, before: FitResult | None = None) -> Iterator[Block]:
+def whole(
+    result: FitResult, folder: Path | None = None, before: FitResult | None = None
+) -> Iterator[Block]:
     """Yield all of a fit: values, effort, how well they are determined, records, the verdict.
 
-    The values of a fit ``before`` are beside the new ones.
+    The values of a fit ``before`` are beside the new ones; ``folder`` has the files.
     """
     yield fitted_table(result, before)
     several = len(result.comparisons) > 1
@@ -120,6 +123,8 @@ def whole(result: FitResult, before: FitResult | None = None) -> Iterator[Block]
         yield from played(result.comparisons)
     yield from rejections(result.validation)
     yield from _causes(result)
+    if folder is not None:
+        yield paragraph(f"written to {folder}")
     yield verdict(result)
 
 
@@ -132,18 +137,14 @@ def _errors(result: FitResult) -> list[str]:
 
 def verdict(result: FitResult) -> Note:
     """Say in a sentence what a fit comes to."""
-    if result.verdict is None:
-        return Note(result.message, "verdict", f"{result.outcome}:", "strong")
     mark = MARKS.get(result.verdict.verdict, "bad")
     return Note(result.verdict.sentence, "verdict", "verdict:", mark)
 
 
 def _causes(result: FitResult) -> Iterator[Note]:
     """Yield why a fit may be as it is, each with what to do."""
-    if result.verdict is not None:
-        label = "note:" if result.verdict.verdict == GOOD else "cause:"
-        sentences = (cause.sentence for cause in result.verdict.causes)
-        yield from remarks(label, sentences, kind="remedy")
+    label = "note:" if result.verdict.verdict == GOOD else "cause:"
+    yield from remarks(label, (cause.sentence for cause in result.verdict.causes), kind="remedy")
 
 
 def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
@@ -158,7 +159,7 @@ def fitted_table(
 ) -> Table:
     """Make the table of fitted values with their intervals; those of records come last."""
     shown = {name: p for name, p in result.parameters.items() if of_records or not p.of_record}
-    marks = {name: ", ".join(_remarks(parameter)) for name, parameter in shown.items()}
+    marks = {name: ", ".join(remarks_on(parameter)) for name, parameter in shown.items()}
     linear = any(parameter.linear_error is not None for parameter in shown.values())
     heads = (
         TableColumn("parameter"),
@@ -170,7 +171,7 @@ def fitted_table(
         TableColumn("unit"),
         *([TableColumn("")] if any(marks.values()) else []),
     )
-    no_interval = "" if result.verdict is None else result.verdict.in_place_of_interval
+    no_interval = result.verdict.in_place_of_interval
     rows = []
     for name, parameter in shown.items():
         vague = result.knowledge is not None and parameter.why
@@ -196,7 +197,7 @@ def fitted_table(
     return Table(heads, tuple(rows))
 
 
-def _remarks(parameter: FittedParameter) -> Iterator[str]:
+def remarks_on(parameter: FittedParameter) -> Iterator[str]:
     """Yield what must be seen beside a value."""
     if parameter.at_bound:
         yield f"on its {parameter.at_bound}"

@@ -4,8 +4,8 @@ from matplotlib.figure import Figure
 
 from exfit.errors import ExfitError
 from exfit.results.model import FitResult, FittedParameter
+from exfit.show.blocks import interval, number
 from exfit.show.figures import overlay
-from exfit.show.terminal.terminal import interval, number
 from exfit.util.text import near, percentage
 
 __all__ = ["Figure", "fit_figure", "fit_html"]

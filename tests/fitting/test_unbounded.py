@@ -32,7 +32,7 @@ from exfit.models.families import without_doubles
 from exfit.records.record import Record
 from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
-from exfit.show import terminal
+from exfit.show import fits, terminal
 from exfit.workflows import check, fit, profile, simulate
 
 NOISE = 1e-5  # pu: far below what KD = -0.3 does to vt
@@ -137,7 +137,7 @@ def test_a_missing_bound_is_null_in_the_file_and_infinite_in_python(found, tmp_p
 def test_terminal_report_and_file_mark_the_value_and_no_other(found):
     folder, _, result = found
     stream = io.StringIO()
-    terminal.fit(Console(file=stream, width=80), result)
+    terminal.show(Console(file=stream, width=80), fits.whole(result))
     lines = stream.getvalue().splitlines()
     assert all(len(line) <= 80 for line in lines)
     for name in ("KD", "TE"):

@@ -18,7 +18,7 @@ from exfit.inference.linear import ResidualBlock
 from exfit.inference.sensitivity import effects
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
-from exfit.show.terminal.fits import ranking
+from exfit.show.fits import ranking
 from exfit.workflows import fit, identify, simulate
 
 SMALL = 1e-4  # relative: a central difference over it is off by about its square

@@ -11,7 +11,8 @@ from rich.console import Console
 import exfit
 from exfit.dsp.features import TIMES
 from exfit.dsp.recorded_features import EITHER, RecordedResponse, recorded_features
-from exfit.show.terminal.validations import comparisons
+from exfit.show.terminal import show
+from exfit.show.validations import comparisons
 
 WAYS = {
     "no ripple": {"rippled": False},
@@ -97,7 +98,7 @@ def test_tables_say_without_which_line_measured_features_are():
     quiet = fit_of(drawn_response(3), rippled=False)
     for result in (fitted, quiet):
         page = Console(file=StringIO(), width=200)
-        comparisons(page, result.comparisons)
+        show(page, comparisons(result.comparisons))
         text = page.file.getvalue()
         removed = result.comparison.features.measured.removed
         assert ("fit: measured without the line of" in text) is bool(removed)

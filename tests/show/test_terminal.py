@@ -3,6 +3,7 @@
 import io
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from cases import local_case
@@ -17,10 +18,10 @@ from exfit.features.fleet.sisters import sisters
 from exfit.features.fleet.summary import summary_of
 from exfit.features.report.page import html as report_html
 from exfit.results.verdict import MATCHES, MISSES, Cause, Verdict
-from exfit.show import terminal
+from exfit.show import fits, terminal
+from exfit.show.blocks import interval, notes
 from exfit.show.notebook import fit_html
-from exfit.show.terminal.side_by_side import side_by_side
-from exfit.show.terminal.terminal import interval
+from exfit.show.series import side_by_side
 
 SENTENCE = (
     "KD, TE and KA can move together (KD +51 %, TE +10 %, KA +9.7 %): vt changes by 3.2e-6 pu rms, "
@@ -31,7 +32,7 @@ SENTENCE = (
 @pytest.mark.parametrize("width", range(40, 161))
 def test_a_note_breaks_between_words_but_in_no_figure_and_in_no_command(width):
     stream = io.StringIO()
-    terminal.notes(Console(file=stream, width=width), [SENTENCE, "short"])
+    terminal.show(Console(file=stream, width=width), notes([SENTENCE, "short"]))
     first, *others = stream.getvalue().removesuffix("note: short\n").splitlines()
     assert all(line == line.rstrip() and len(line) <= width for line in [first, *others])
     assert all(line.startswith("      ") for line in others)
@@ -68,23 +69,56 @@ def missed():
 
 
 @pytest.mark.parametrize("width", [60, 80])
-def test_the_verdict_and_its_causes_come_first_whole_and_once(missed, width):
+def test_the_verdict_comes_last_below_its_causes_whole_and_once(missed, width):
     stream = io.StringIO()
-    terminal.fit(Console(file=stream, width=width), missed)
+    terminal.show(Console(file=stream, width=width), fits.whole(missed, Path("runs/missed")))
     lines = stream.getvalue().splitlines()
-    assert lines[1].startswith("verdict: misses the record: ifd of the second record")
-    table = next(k for k, line in enumerate(lines) if line.startswith("parameter"))
-    above, below = (" ".join(" ".join(part).split()) for part in (lines[:table], lines[table:]))
-    for text in (REASON, *(cause.sentence for cause in CAUSES)):
-        assert above.count(text) == 1
-        assert text not in below
-    assert max(map(len, lines[:table])) <= width
+    assert lines[0].startswith("parameter")
+    last = max(k for k, line in enumerate(lines) if line.startswith("verdict: misses the record:"))
+    causes = min(k for k, line in enumerate(lines) if line.startswith("cause:"))
+    parts = (lines[:causes], lines[causes:last], lines[last:])
+    above, between, end = (" ".join(" ".join(part).split()) for part in parts)
+    assert end == f"verdict: misses the record: {REASON}"
+    assert REASON not in above + between
+    for cause in CAUSES:
+        assert between.count(cause.sentence) == 1
+        assert cause.sentence not in above
+    assert between.endswith("written to runs/missed")
+    assert max(map(len, lines[causes:])) <= width
+
+
+@pytest.mark.parametrize("width", [40, 80])
+@pytest.mark.parametrize("count", [1, 9, 40])
+def test_in_brief_a_fit_has_thirty_lines_at_most_and_the_verdict_last(missed, width, count):
+    (validated,) = missed.comparisons
+    validations = [replace(validated, name=f"v{k}", reason="") for k in range(count)]
+    levels = {
+        f"record{k}.level": replace(each, of_record=True)
+        for k in range(count)
+        for each in [*missed.parameters.values()][:1]
+    }
+    result = replace(
+        missed,
+        parameters={**missed.parameters, **levels},
+        knowledge=None,
+        validation=tuple(validations),
+    )
+    stream = io.StringIO()
+    versions = fits.briefs(result, Path("runs/missed"))
+    terminal.show_shortest(Console(file=stream, width=width), versions)
+    lines = stream.getvalue().splitlines()
+    assert len(lines) < 30
+    text = " ".join(" ".join(lines).split())
+    assert text.endswith(f"verdict: misses the record: {REASON}")
+    assert "`exfit show --all runs/missed` verdict:" in text
+    assert all(any(line.startswith(name) for line in lines) for name in missed.parameters)
+    assert CAUSES[0].sentence in text
 
 
 def shown(result, width):
     """Return what the terminal shows of a fit, line by line."""
     stream = io.StringIO()
-    terminal.fit(Console(file=stream, width=width), result)
+    terminal.show(Console(file=stream, width=width), fits.whole(result))
     return stream.getvalue().splitlines()
 
 
@@ -169,7 +203,8 @@ def test_every_table_has_three_digits_of_a_value_and_none_beyond_its_bounds(miss
             },
         )
         stream = io.StringIO()
-        side_by_side(Console(file=stream, width=80), {"one": result, "other": result})
+        both = {"one": result, "other": result}
+        terminal.show(Console(file=stream, width=80), side_by_side(both))
         cases = [row(name, parameters=summary_of(result, "", 1.0).parameters) for name in "abcd"]
         batch = fleet_page(Fleet(tmp_path, tuple(cases)), sisters(cases))
         page = Page(report_html(result, tmp_path))
@@ -191,7 +226,7 @@ def test_every_table_has_three_digits_of_a_value_and_none_beyond_its_bounds(miss
 def test_what_does_not_match_is_nowhere_called_good_or_converged(missed):
     result = replace(missed, verdict=Verdict("no match", "the response goes the other way"))
     stream = io.StringIO()
-    terminal.fit(Console(file=stream, width=80), result)
+    terminal.show(Console(file=stream, width=80), fits.whole(result))
     for text in (stream.getvalue(), fit_html(result), repr(result)):
         assert "no match" in text
         assert "converged" not in text

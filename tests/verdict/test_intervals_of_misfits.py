@@ -17,7 +17,7 @@ from exfit.features.fleet.summary import summary_of
 from exfit.features.fleet.table import fleet_table, parameter_table
 from exfit.features.report.page import html as report_html
 from exfit.results.verdict import MISSES, NO_MATCH
-from exfit.show import terminal
+from exfit.show import fits, terminal
 from exfit.show.figures import profiles as profile_figure
 from exfit.show.notebook import fit_html
 
@@ -64,8 +64,8 @@ def test_no_parameter_has_an_interval_and_each_says_why(result):
 def test_no_table_shows_one(result, tmp_path):
     word = IN_PLACE[result.verdict.verdict]
     stream = io.StringIO()
-    terminal.fit(Console(file=stream, width=80), result)
-    table = stream.getvalue().partition("\nparameter")[2].partition("\n\n")[0]
+    terminal.show(Console(file=stream, width=80), fits.whole(result))
+    table = stream.getvalue().partition("parameter")[2].partition("\n\n")[0]
     assert table.count(word) == fit_html(result).count(word) == len(result.parameters)
     assert " ... " not in table
     assert " ... " not in fit_html(result)
@@ -101,7 +101,7 @@ def test_no_profile_has_one(case, result):
     assert (profile.low, profile.high, profile.linear) == (None, None, None)
     assert profile.ends == (result.verdict.no_interval,) * 2
     stream = io.StringIO()
-    terminal.profiles(Console(file=stream, width=80), profiled)
+    terminal.show(Console(file=stream, width=80), fits.profiles(profiled))
     assert IN_PLACE[profiled.verdict.verdict] in stream.getvalue()
     assert " ".join(stream.getvalue().split()).count("no parameter has an interval") == 1
     figure = profile_figure(profiled)

@@ -90,11 +90,11 @@ def compare(
     if output.as_json:
         print_json(agreement.as_json())
     elif output.shown:
-        from exfit.features.compare.terminal import show_agreement
+        from exfit.features.compare.agreement_blocks import agreement as blocks_of
         from exfit.show import terminal
 
         console = terminal.console()
-        show_agreement(console, agreement)
+        terminal.show(console, blocks_of(agreement))
         terminal.written(console, folder)
     output.draw(figures)
 

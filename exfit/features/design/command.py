@@ -102,11 +102,11 @@ def _identify(loaded: "Case", folder: Path, noise: Mapping[str, float], output: 
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
-        from exfit.features.design.terminal import show_design
+        from exfit.features.design import design_blocks
         from exfit.show import terminal
 
         console = terminal.console()
-        show_design(console, design)
+        terminal.show(console, design_blocks.design(design))
         terminal.written(console, folder)
     output.draw(figures)
 
@@ -139,11 +139,11 @@ def _design(
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
-        from exfit.features.design.terminal import show_designed_test
+        from exfit.features.design import design_blocks
         from exfit.show import terminal
 
         console = terminal.console()
-        show_designed_test(console, design)
+        terminal.show(console, design_blocks.designed_test(design))
         terminal.written(console, folder)
     output.draw(figures)
 

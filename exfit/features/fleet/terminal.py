@@ -2,21 +2,22 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from textwrap import shorten
 
 from rich.console import Console
 from rich.live import Live
-from rich.markup import escape
 from rich.progress_bar import ProgressBar as Bar
-from rich.table import Table
+from rich.table import Table as Grid
 from rich.text import Text
 
 from exfit.features.fleet.folder import Fleet
 from exfit.features.fleet.summary import CaseSummary
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.show.terminal.terminal import paragraph, plain_table, show_table, written
+from exfit.show.blocks import Block, Mark, Note, Table, columns, row
+from exfit.show.terminal.render import STYLES, show
+from exfit.show.terminal.terminal import paragraph, written
 
 FIRST_LINE, BETWEEN_LINES = 10.0, 60.0  # s: when a file or pipe gets its lines
 REFRESHES = 2.0  # a second
@@ -29,7 +30,7 @@ SHORTEST_BAR = 10  # characters
 MINUTE, HOUR = 60.0, 3600.0
 LONG_WAIT = 100.0  # s: from here on in minutes
 HARMLESS = (GOOD, MATCHES, "no record")
-STYLES = {GOOD: "green", MATCHES: "yellow", "no record": "dim", "not run": "dim"}
+MARKS: dict[str, Mark] = {GOOD: "ok", MATCHES: "doubt", "no record": "faint", "not run": "faint"}
 
 
 class BatchProgress:
@@ -106,19 +107,19 @@ class BatchProgress:
         at_a_time = self._workers or max(sum(self._durations) / max(now - self._began, 1e-9), 1.0)
         return max((waiting * mean + sum(rest)) / at_a_time, *rest, 0.0)
 
-    def picture(self) -> Table:
+    def picture(self) -> Grid:
         """Return the lines that a terminal shows."""
         width = self.console.width - 1
         head, pace = f"{self.done} of {self._cases} cases", self._pace()
         room = width - len(head) - len(pace) - 2 * BETWEEN
-        lines = Table.grid(padding=(0, BETWEEN, 0, 0))
+        lines = Grid.grid(padding=(0, BETWEEN, 0, 0))
         if room >= SHORTEST_BAR:
             lines.add_row(head, Bar(max(self._cases, 1), self.done, width=room), pace)
         else:
             lines.add_row(", ".join(filter(None, (head, pace))))
         running = self._now(self._clock())
         running.truncate(max(width, 1), overflow="ellipsis")
-        grid = Table.grid()
+        grid = Grid.grid()
         for line in (lines, self._counts(), running):
             grid.add_row(line)
         return grid
@@ -146,7 +147,7 @@ class BatchProgress:
     def _counts(self) -> Text:
         kept = {"done before": self._kept} if self._kept else {}
         parts = [*kept.items(), *self._outcomes.most_common()]
-        words = (Text(f"{word} {count}", STYLES.get(word, "")) for word, count in parts)
+        words = (Text(f"{word} {count}", STYLES[MARKS.get(word, "")]) for word, count in parts)
         return Text(", ").join(words)
 
     def _now(self, now: float) -> Text:
@@ -162,16 +163,8 @@ class BatchProgress:
 
 def batch(console: Console, fleet: Fleet) -> None:
     """Show what the cases of a batch came to, and which of them need attention."""
-    counts = Counter(case.outcome for case in fleet.cases)
     console.print()
-    table = plain_table("outcome", "cases", numbers=("cases",))
-    for outcome, count in counts.most_common():
-        table.add_row(outcome, str(count), style=STYLES.get(outcome, "bold red"))
-    show_table(console, table)
-    attention = [case for case in fleet.cases if case.outcome not in HARMLESS]
-    if attention:
-        console.print()
-        _attention(console, attention)
+    show(console, _outcomes(fleet))
     console.print()
     if fleet.interrupted:
         paragraph(console, "interrupted: run the same command again to go on", "bold red")
@@ -179,17 +172,20 @@ def batch(console: Console, fleet: Fleet) -> None:
     written(console, fleet.folder / "fleet.csv")
 
 
-def _attention(console: Console, cases: Sequence[CaseSummary]) -> None:
-    table = plain_table("case", "outcome", "reason")
-    for case in cases[:MOST_ATTENTION]:
-        table.add_row(
-            escape(case.name),
-            case.outcome,
-            escape(shorten(case.reason, LONGEST_REASON, placeholder=" …")),
+def _outcomes(fleet: Fleet) -> Iterator[Block]:
+    """Yield how many cases came to what, and those that need attention."""
+    counts = Counter(case.outcome for case in fleet.cases).most_common()
+    rows = (row(outcome, str(count), mark=MARKS.get(outcome, "bad")) for outcome, count in counts)
+    yield Table(columns("outcome", "cases", numbers=("cases",)), tuple(rows))
+    attention = [case for case in fleet.cases if case.outcome not in HARMLESS]
+    if attention:
+        reasons = (
+            row(case.name, case.outcome, shorten(case.reason, LONGEST_REASON, placeholder=" …"))
+            for case in attention[:MOST_ATTENTION]
         )
-    show_table(console, table)
-    if len(cases) > MOST_ATTENTION:
-        paragraph(console, f"… and {len(cases) - MOST_ATTENTION} more in fleet.csv", "dim")
+        yield Table(columns("case", "outcome", "reason"), tuple(reasons))
+    if len(attention) > MOST_ATTENTION:
+        yield Note(f"… and {len(attention) - MOST_ATTENTION} more in fleet.csv", mark="faint")
 
 
 def _duration(seconds: float) -> str:

@@ -71,7 +71,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
 def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
     """Write what all tests came to and their report, show it, and draw the figures."""
     from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.show.programme_terminal import programme
+    from exfit.features.programme.show import programme_blocks
     from exfit.features.report.writing import write_report
     from exfit.show import terminal
 
@@ -84,7 +84,7 @@ def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
             print_json(result.to_dict())
         elif output.shown:
             console = terminal.console()
-            programme(console, result)
+            terminal.show(console, programme_blocks.programme(result))
             console.print()
             terminal.written(console, folder)
     if not output.figures or result.interrupted:
@@ -99,11 +99,12 @@ def check(path: Path) -> bool:
     """Check each test of a programme and show what comes of it; False: something speaks against."""
     from exfit.features.programme.case.programme import load_programme
     from exfit.features.programme.run import check_programme
-    from exfit.features.programme.show.programme_terminal import checked_step
+    from exfit.features.programme.show import programme_blocks
     from exfit.show import terminal
 
-    sound = True
+    sound, console = True, terminal.console()
     for checked in check_programme(load_programme(path)):
-        checked_step(terminal.console(), checked)
+        terminal.show(console, programme_blocks.checked_step(checked))
+        console.print()
         sound = sound and checked.sound
     return sound

@@ -78,8 +78,11 @@ def _show(ranking: "Ranking", folder: Path, output: Output) -> None:
     if output.as_json:
         print_json(ranking.to_dict())
     elif output.shown:
-        from exfit.features.rank.terminal import show_ranking
+        from exfit.features.rank.ranking_blocks import ranking as blocks_of
         from exfit.show import terminal
 
-        show_ranking(terminal.console(), ranking)
-        terminal.written(terminal.console(), folder)
+        console = terminal.console()
+        console.print()
+        terminal.show(console, blocks_of(ranking))
+        console.print()
+        terminal.written(console, folder)

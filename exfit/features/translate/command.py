@@ -64,9 +64,9 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     if output.as_json:
         print_json(translation.to_dict())
     elif output.shown:
-        from exfit.features.translate.terminal import show_translation
+        from exfit.features.translate.translation_blocks import translation as blocks_of
 
-        show_translation(console, translation)
+        terminal.show(console, blocks_of(translation))
         terminal.written(console, folder)
     output.draw(figures)
     if translation.poor:

@@ -104,12 +104,7 @@ class LiveIterations:
         self.lines.append(iteration)
         if len(self.lines) == 1:
             paragraph(self.console, self.title)
-        if self._live is None:
-            columns = _fitting(self.console.width)
-            if len(self.lines) == 1:
-                self._print(_row(HISTORY[:columns]))
-            self._print(_row(_cells(iteration)[:columns]))
-        else:
+        if self._live is not None:
             self._draw(self._live)
 
     def starts(self, progress: Progress) -> None:

@@ -8,10 +8,18 @@ from rich.segment import Segment, Segments
 from rich.table import Table as Grid
 from rich.text import Text
 
-from exfit.show.blocks import Block, Facts, Heading, Mark, Note, Table, TableColumn, Verbatim
-from exfit.show.terminal.terminal import (
-    BETWEEN_COLUMNS,
+from exfit.show.blocks import (
     NO_BREAK,
+    Block,
+    Facts,
+    Heading,
+    Mark,
+    Note,
+    Table,
+    TableColumn,
+    Verbatim,
+)
+from exfit.show.terminal.terminal import (
     UNBROKEN,
     in_groups,
     paragraph,
@@ -27,6 +35,8 @@ STYLES: dict[Mark, str] = {
     "faint": "dim",
 }
 INDENT = 2  # characters a level
+BETWEEN_COLUMNS = 2  # characters
+MOST_LINES = 30  # of what is shown in brief: with the command they are read at a glance
 
 
 def show(console: Console, blocks: Iterable[Block]) -> None:
@@ -52,6 +62,17 @@ def show(console: Console, blocks: Iterable[Block]) -> None:
                 remarks(console, label, [block.text], STYLES[block.mark])
             case Verbatim(text):
                 console.print(Text(text), soft_wrap=True)
+
+
+def show_shortest(console: Console, versions: Iterable[Sequence[Block]]) -> None:
+    """Write the first version of something that has few lines, else the last one."""
+    chosen: Sequence[Block] = ()
+    for chosen in versions:
+        with console.capture() as written:
+            show(console, chosen)
+        if written.get().count("\n") < MOST_LINES:
+            break
+    show(console, chosen)
 
 
 def _table(console: Console, table: Table) -> None:

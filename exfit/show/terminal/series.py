@@ -1,18 +1,17 @@
-"""Fits of several cases with several strategies: while they run, and when they are done."""
+"""Fits of several cases with several strategies, while they run."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from exfit.results.model import FitResult, Iteration
-from exfit.results.side_by_side import explanation_of, outcome_of
+from exfit.results.model import Iteration
+from exfit.results.side_by_side import outcome_of
 from exfit.results.verdict import MATCHES, MISSES
-from exfit.runs.fits import FitRun, FitSeries, PlannedFit, Progress
-from exfit.show.terminal.side_by_side import side_by_side
-from exfit.show.terminal.terminal import paragraph, remarks
+from exfit.runs.fits import FitRun, PlannedFit, Progress
+from exfit.show.terminal.terminal import paragraph
 
 HEADS = ("fit", "it", "f", "rmse", "s", "")
 FORMS = ("{:>4}", "{:>10}", "{:>10}", "{:>7}", "{:<13}")  # behind the name
@@ -79,42 +78,3 @@ def progress_words(progress: Progress) -> str:
     if isinstance(progress, Iteration):
         return f"iteration {progress.number}, f {progress.cost:.4e}"
     return f"{progress.stage} {progress.done} of {progress.total}, best f {progress.best:.4e}"
-
-
-def fit_series(console: Console, series: FitSeries) -> None:
-    """Show the results of a series: a table for each case, or one where each case was fitted once.
-
-    How each fit ended stands below its table, and last what was not run.
-    """
-    if series.runs:
-        _tables(console, series)
-    console.print()
-    for name in series.failed:
-        console.print(Text.assemble(f"{name}: ", ("failed", "bold red")), soft_wrap=True)
-    if series.not_run:
-        names = ", ".join(series.not_run)
-        paragraph(console, f"not run, interrupted: {names}", "bold red")
-
-
-def _tables(console: Console, series: FitSeries) -> None:
-    by_case = series.by_case
-    if all(len(runs) == 1 for runs in by_case.values()):
-        results = {name: runs[0].result for name, runs in by_case.items()}
-        console.print()
-        side_by_side(console, results, models=True)
-        _outcomes(console, results)
-        return
-    for name, runs in by_case.items():
-        results = {run.result.strategy: run.result for run in runs}
-        first = runs[0].result
-        console.print()
-        paragraph(console, f"{name}: {first.model} fitted to {first.comparison.record}", "bold")
-        side_by_side(console, results, start=True)
-        _outcomes(console, results)
-
-
-def _outcomes(console: Console, results: Mapping[str, FitResult]) -> None:
-    for name, result in results.items():
-        outcome = outcome_of(result)
-        style = "green" if result.holds else "bold red"
-        remarks(console, f"{name}: {outcome}:", [explanation_of(result)], style)

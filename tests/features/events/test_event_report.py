@@ -11,8 +11,9 @@ from pages import Page
 from exfit.features.report.page import html
 from exfit.features.report.sections.usability import usability
 from exfit.results.io import load_result, result_text
-from exfit.show.terminal import comparisons
+from exfit.show.terminal import show
 from exfit.show.terminal.terminal import GuardedConsole
+from exfit.show.validations import comparisons
 from exfit.simulation.small_signal import Pole
 from exfit.workflows import fit
 
@@ -96,7 +97,8 @@ def test_what_was_played_in_is_kept_in_the_file_of_the_fit(result, tmp_path):
 
 def test_the_terminal_has_room_for_the_errors_of_events(result, capsys):
     """80 columns, without a line that is broken."""
-    comparisons(GuardedConsole(width=80), [*result.comparisons, *result.validation])
+    matches = [*result.comparisons, *result.validation]
+    show(GuardedConsole(width=80), comparisons(matches))
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     (heads,) = [line for line in lines if line.startswith("record")]

@@ -4,9 +4,10 @@ import numpy as np
 from rich.console import Console
 
 from exfit.features.programme.show import programme_figures
-from exfit.features.programme.show.programme_terminal import saturation
+from exfit.features.programme.show.programme_blocks import saturation
 from exfit.features.programme.steady.saturation import saturation_curve
 from exfit.show import figures as plots
+from exfit.show import terminal
 
 
 def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):
@@ -15,7 +16,7 @@ def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):
     ifd = 800.0 * (vt + np.maximum(vt - 0.8, 0.0) ** 2) * (vt > 0.1)
     ifd += 1.5 * np.cos(np.arange(17.0)) * (vt > 0.1)
     console = Console(width=80, record=True)
-    saturation(console, saturation_curve(vt, ifd, efd=0.2 * ifd))
+    terminal.show(console, saturation(saturation_curve(vt, ifd, efd=0.2 * ifd)))
     lines = console.export_text().splitlines()
     assert max(map(len, lines)) <= 80
     first_words = {line.split("  ")[0] for line in lines}

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from exfit.features.programme.show import programme_figures
-from exfit.features.programme.show.programme_terminal import v_curve as show
+from exfit.features.programme.show.programme_blocks import v_curve as blocks_of
 from exfit.features.programme.steady.fields_on_load import (
     FieldMeasurement,
     PointsOnLoad,
@@ -19,6 +19,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.show import figures as plots
+from exfit.show import terminal
 from exfit.util.text import to_json
 from exfit.util.typed import plain, read
 
@@ -39,7 +40,7 @@ def result():
 def test_the_terminal_shows_every_point_in_eighty_columns(result):
     console = Console(width=80, record=True, file=None, quiet=False)
     with console.capture() as capture:
-        show(console, result)
+        terminal.show(console, blocks_of(result))
     lines = capture.get().splitlines()
     assert max(map(len, lines)) <= 80
     assert lines[0].startswith("verdict: good: ifd differs by 0.00")

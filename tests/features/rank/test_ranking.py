@@ -11,9 +11,10 @@ from rich.console import Console
 
 import exfit
 from exfit.features.rank.ranking import STRONG, Likelihood, _gap, ranked, ranking_sentences
-from exfit.features.rank.terminal import show_ranking
+from exfit.features.rank.ranking_blocks import ranking as blocks_of
 from exfit.results.comparisons import Overlay
 from exfit.results.verdict import NOT_CONVERGED, Verdict
+from exfit.show import terminal
 
 SAMPLES = 2000
 NO_SERIES = SimpleNamespace(failed={}, not_run=())
@@ -189,5 +190,6 @@ def test_with_typical_data_of_the_machine_no_model_is_called_refuted(result):
     for typical, meaning in (((), "not refuted"), (("machine.S10",), "matches best")):
         page = Console(file=StringIO(), width=80)
         models = ranked(fits, typical)
-        show_ranking(page, SimpleNamespace(models=models, sentences=(), series=NO_SERIES))
+        ranking = SimpleNamespace(models=models, sentences=(), series=NO_SERIES)
+        terminal.show(page, blocks_of(ranking))
         assert f"* {meaning}" in page.file.getvalue()

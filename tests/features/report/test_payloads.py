@@ -13,7 +13,7 @@ from exfit.case.load import load_case
 from exfit.features.drawings.diagram import block_diagram
 from exfit.features.report.page import html
 from exfit.results.io import load_result, result_text
-from exfit.show import terminal
+from exfit.show import fits, terminal
 from exfit.show.notebook import fit_html
 from exfit.show.terminal.terminal import GuardedConsole
 
@@ -83,7 +83,7 @@ def test_a_terminal_obeys_no_text_of_a_result(results, is_terminal):
     for result in results:
         stream = io.StringIO()
         console = GuardedConsole(file=stream, force_terminal=is_terminal, width=100)
-        terminal.fit(console, result)
+        terminal.show(console, fits.whole(result))
         shown.append(stream.getvalue())
     hostile, harmless = ({*CONTROL.findall(text)} for text in shown)
     assert hostile == harmless == ({"\x1b"} if is_terminal else set())

@@ -1,15 +1,12 @@
-"""The content of a recorder's file."""
+"""The content of a recorder's file as blocks."""
 
 from collections.abc import Iterator, Sequence
-
-from rich.console import Console
-from rich.text import Text
 
 from exfit.dsp.sampling import Sampling
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 from exfit.records.pmu_recognition import PmuContent
-from exfit.show.terminal.terminal import notes, number, paragraph, plain_table, show_table
+from exfit.show.blocks import Block, Table, Verbatim, columns, notes, number, paragraph, row
 
 NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
 MOST_ROWS = 40  # channels, steps or notes of a file that someone reads through
@@ -17,44 +14,38 @@ MOST_NAMES = 12  # of channels in one line
 MORE = "... and {:,} more in inspect.json"
 
 
-def inspection(console: Console, result: Inspection, record: Sequence[str]) -> None:
-    """Show what a file holds, and the sections of a case that it suggests."""
+def inspection(result: Inspection, record: Sequence[str]) -> Iterator[Block]:
+    """Yield what a file holds, and the sections of a case that it suggests."""
     clock = " and ".join(result.clock.columns)
-    paragraph(
-        console,
+    yield paragraph(
         f"{result.path.name}: {len(result.time)} samples by {clock}, "
-        f"{result.sampling.start:.6g} ... {result.sampling.end:.6g} s",
+        f"{result.sampling.start:.6g} ... {result.sampling.end:.6g} s"
     )
-    paragraph(console, in_words(result.sampling))
-    console.print()
-    _channels(console, result)
-    console.print()
+    yield paragraph(in_words(result.sampling))
+    yield _channels(result)
+    yield from _more(len(result.channels) - MOST_ROWS)
     of_pmu = frozenset[str]() if result.pmu is None else result.pmu.columns
     for line in _signals([each for each in result.channels if each.name not in of_pmu]):
-        paragraph(console, line)
-    console.print()
+        yield paragraph(line)
     if result.pmu is not None:
-        paragraph(console, _of_pmu(result.pmu))
+        yield paragraph(_of_pmu(result.pmu))
     elif result.plays_in:
-        paragraph(console, "a play-in file: voltage and frequency, which drive a grid-playback")
+        yield paragraph("a play-in file: voltage and frequency, which drive a grid-playback")
     elif result.is_event:
-        paragraph(console, "a grid event: voltage, angle and power, and no reference")
+        yield paragraph("a grid event: voltage, angle and power, and no reference")
+    elif not result.steps:
+        yield paragraph("no step in any channel")
     else:
-        _steps(console, result)
-    console.print()
-    if result.findings:
-        findings = result.findings
-        notes(console, findings[:MOST_ROWS])
-        _more(console, len(findings) - MOST_ROWS)
-        console.print()
-    paragraph(console, "for a case; what is in # comments is a guess to check:")
-    console.print()
-    console.print("\n".join(record), markup=False, soft_wrap=True)
-    console.print()
+        yield _steps(result)
+        yield from _more(len(result.steps) - MOST_ROWS)
+    yield from notes(result.findings[:MOST_ROWS])
+    yield from _more(len(result.findings) - MOST_ROWS)
+    yield paragraph("for a case; what is in # comments is a guess to check:")
+    yield Verbatim("\n".join(record))
 
 
 def _of_pmu(pmu: PmuContent) -> str:
-    """Return what a file holds of a phasor measurement unit as a sentence."""
+    """Say what a file holds of a phasor measurement unit."""
     phasors = [phasor for phasor in (pmu.voltage, pmu.current) if phasor is not None]
     parts = [
         f"{phasor.quantity} {_some(phasor.magnitudes)} with the angle {_some(phasor.angles)}"
@@ -74,7 +65,7 @@ def _of_pmu(pmu: PmuContent) -> str:
 
 
 def in_words(sampling: Sampling) -> str:
-    """Return how a record is sampled as a sentence."""
+    """Say how a record is sampled."""
     rate = f"{sampling.rate:.4g} Hz" if sampling.rate >= 1.0 else f"every {sampling.step:.4g} s"
     if sampling.even:
         text = f"sampled evenly, {rate}, {1e3 * sampling.step:.6g} ms apart"
@@ -88,39 +79,38 @@ def in_words(sampling: Sampling) -> str:
     return text + (f"; {count} gap{'s' if count > 1 else ''}" if count else "; no gaps")
 
 
-def _channels(console: Console, result: Inspection) -> None:
-    """Show the channels; of many those that matter most."""
+def _channels(result: Inspection) -> Table:
+    """Make the table of the channels; of many those that matter most."""
     heads = ("at rest", "smallest", "largest", "noise", "rounded to")
-    table = plain_table("channel", "unit", "is", *heads, numbers=heads)
     many = len(result.channels) > MOST_ROWS
+    rows = []
     for channel in result.foremost[:MOST_ROWS] if many else result.channels:
         name = channel.name
         if len(name) > NAME_WIDTH:
             name = name[: NAME_WIDTH - 1] + "…"
-        unit = (channel.unit or "") + ("?" if channel.unit_from == "name" else "")
-        cells = (
-            name,
-            unit,
-            "" if channel.signal is None else channel.signal + ("" if channel.sure else "?"),
-            number(channel.level),
-            number(channel.low),
-            number(channel.high),
-            f"{channel.frequency:.4g} Hz" if channel.frequency else number(channel.noise, 2),
-            number(channel.quantum, 2),
+        rows.append(
+            row(
+                name,
+                (channel.unit or "") + ("?" if channel.unit_from == "name" else ""),
+                "" if channel.signal is None else channel.signal + ("" if channel.sure else "?"),
+                number(channel.level),
+                number(channel.low),
+                number(channel.high),
+                f"{channel.frequency:.4g} Hz" if channel.frequency else number(channel.noise, 2),
+                number(channel.quantum, 2),
+            )
         )
-        table.add_row(*(Text(cell) for cell in cells))
-    show_table(console, table)
-    _more(console, len(result.channels) - MOST_ROWS)
+    return Table(columns("channel", "unit", "is", *heads, numbers=heads), tuple(rows))
 
 
-def _more(console: Console, count: int) -> None:
+def _more(count: int) -> Iterator[Block]:
     """Say how many rows are left out, if any are."""
     if count > 0:
-        console.print(MORE.format(count))
+        yield paragraph(MORE.format(count))
 
 
 def _some(texts: Sequence[str]) -> str:
-    """Return texts in one line, the first of many."""
+    """Join texts in one line, the first of many."""
     more = [MORE.format(len(texts) - MOST_NAMES)] * (len(texts) > MOST_NAMES)
     return ", ".join([*texts[:MOST_NAMES], *more])
 
@@ -136,14 +126,11 @@ def _signals(channels: Sequence[InspectedChannel]) -> Iterator[str]:
         yield f"taken for no signal: {_some(others)}"
 
 
-def _steps(console: Console, result: Inspection) -> None:
-    if not result.steps:
-        console.print("no step in any channel")
-        return
-    table = plain_table("step at (s)", "+- (s)", "changes for good", numbers=("step at (s)",))
+def _steps(result: Inspection) -> Table:
+    rows = []
     for step in result.steps[:MOST_ROWS]:
         sizes = _some([f"{name} {size:+.4g}" for name, size in step.sizes.items()])
         at = f"{step.at:.4f}" if not step.from_start else f"<= {step.at:.4g}"
-        table.add_row(at, "-" if step.from_start else f"{step.error:.1g}", Text(sizes))
-    show_table(console, table)
-    _more(console, len(result.steps) - MOST_ROWS)
+        rows.append(row(at, "-" if step.from_start else f"{step.error:.1g}", sizes))
+    heads = columns("step at (s)", "+- (s)", "changes for good", numbers=("step at (s)",))
+    return Table(heads, tuple(rows))

@@ -1,0 +1,196 @@
+"""What the tests of a programme came to, as blocks."""
+
+from collections.abc import Iterator, Sequence
+
+from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
+from exfit.features.programme.run import CheckedStep
+from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
+from exfit.features.programme.steady.v_curve_result import VCurve
+from exfit.results.model import FitResult
+from exfit.show import checks, fits
+from exfit.show.blocks import (
+    Block,
+    Heading,
+    Table,
+    TableColumn,
+    columns,
+    interval,
+    notes,
+    number,
+    paragraph,
+    remarks,
+    row,
+    unresolved,
+)
+from exfit.signals import TERMINALS
+from exfit.workflows.model_check import Check
+
+
+def programme(result: ProgrammeResult) -> Iterator[Block]:
+    """Yield the results of the tests at rest, that of the bump tests together, and the faults."""
+    for test in result.tests:
+        if not isinstance(test.result, FitResult):
+            yield Heading(f"{test.name} ({test.kind})")
+            yield from _at_rest(test)
+    if result.fit is not None:
+        yield from fits.whole(result.fit)
+    if result.values:
+        yield _values(result.values)
+    for test in result.tests:
+        if not test.holds and isinstance(test.result, FitResult):
+            yield from remarks(f"{test.name}: {test.verdict}:", [test.reason], "bad")
+    for name, fault in result.failed.items():
+        yield from remarks(f"{name}: failed:", fault.splitlines(), "bad")
+    yield from remarks("warning:", result.warnings)
+    if result.not_run:
+        names = ", ".join(result.not_run)
+        yield paragraph(f"not run, interrupted: {names}; run again to go on", "bad")
+
+
+def checked_step(checked: CheckedStep) -> Iterator[Block]:
+    """Yield a test of a programme that is checked: its result at rest, or the check of its fit."""
+    step = checked.step
+    tests = "" if step.tests in ((), (step.name,)) else f" of {', '.join(step.tests)}"
+    yield Heading(f"{step.name}{tests} ({step.kind})")
+    if isinstance(checked.outcome, Check):
+        yield from checks.check(checked.outcome)
+    elif checked.outcome is None:
+        yield paragraph(checked.fault, "bad")
+    else:
+        yield from _at_rest(checked.outcome)
+
+
+def _at_rest(test: FinishedTest) -> Iterator[Block]:
+    """Yield what a test at rest gives; nothing of a fit."""
+    if isinstance(test.result, SaturationResult):
+        mark = fits.MARKS.get(test.verdict, "bad") if test.holds else "bad"
+        yield paragraph(f"verdict: {test.verdict}: {test.reason}", mark)
+        yield from saturation(test.result)
+    elif isinstance(test.result, VCurve):
+        yield from v_curve(test.result)
+
+
+def _values(values: Sequence[EnteredValue]) -> Table:
+    """Make the table of values that tests gave, each beside the one of the file."""
+    rows = []
+    for value in values:
+        known = value.given is not None
+        given = f"{value.given:g}, {value.given_source}" if known else value.given_source or "none"
+        if not value.entered:
+            given += ", used"
+        rows.append(
+            row(
+                value.name,
+                value.unit,
+                value.rounded(value.value),
+                interval(value.interval, value.rounded),
+                value.source,
+                value.test,
+                given,
+            )
+        )
+    heads = (
+        TableColumn("value"),
+        TableColumn("unit", expendable=1),
+        TableColumn("measured", number=True),
+        *columns("95 % interval", "source"),
+        TableColumn("test", expendable=2),
+        TableColumn("in the file"),
+    )
+    return Table(heads, tuple(rows), "values that tests gave to those after them")
+
+
+def saturation(result: SaturationResult) -> Iterator[Block]:
+    """Yield the numbers of the curve that is used, those of each form, and what limits them."""
+    no_interval = result.verdict.in_place_of_interval
+    quantities = (
+        row(
+            name,
+            value.rounded(value.value),
+            no_interval or interval(value.interval, value.rounded),
+            unit,
+        )
+        for name, value, unit in _quantities(result)
+    )
+    heads = ("value", "95 %")
+    yield Table(columns("", *heads, "unit", numbers=heads), tuple(quantities))
+    rows = []
+    for curve in result.curves:
+        values = (curve.ifd_base, curve.S10, curve.S12)
+        cells = (value.rounded(value.value) for value in values)
+        words = ["used"] * (curve.form == result.form) + ["refuted"] * curve.refuted
+        rows.append(row(curve.form, *cells, f"{curve.rms:.2g}", ", ".join(words)))
+    forms = (f"base ({result.unit})", "S(1.0)", "S(1.2)", "rms (pu)")
+    yield Table(columns("form", *forms, "", numbers=forms), tuple(rows))
+    yield from notes(result.notes)
+
+
+def _quantities(result: SaturationResult) -> Iterator[tuple[str, MeasuredValue, str]]:
+    """Yield what the test gives: its name, value and unit."""
+    curve = result.curve
+    name = "exciter field current" if result.exciter else "base of ifd"
+    yield f"{name}, 1 pu on the air-gap line", curve.ifd_base, result.unit
+    if result.efd_base is not None:
+        yield "base of efd", result.efd_base, result.efd_unit
+    if result.resistance is not None:
+        yield "resistance of the field", result.resistance, f"{result.efd_unit}/{result.unit}"
+    yield "S(1.0)", curve.S10, "pu"
+    yield "S(1.2)", curve.S12, "pu"
+    if curve.hysteresis is not None:
+        yield "hysteresis, rising less falling", curve.hysteresis, "pu"
+    if result.residual is not None:
+        yield "residual voltage", MeasuredValue(result.residual, None, (None, None)), "pu"
+
+
+def v_curve(result: VCurve) -> Iterator[Block]:
+    """Yield the verdict, each point with its field by record and model, and what was fitted."""
+    yield paragraph(f"verdict: {result.verdict.sentence}")
+    yield points_table(result)
+    if result.parameters:
+        yield parameters_table(result)
+    yield from unresolved(result.undetermined)
+    yield from notes((*(cause.sentence for cause in result.verdict.causes), *result.notes))
+
+
+def points_table(result: VCurve) -> Table:
+    """Make the table of points: power, voltage, and each field signal, measured and simulated."""
+    heads = (
+        "point",
+        *TERMINALS,
+        *(
+            f"{signal} {words}"
+            for signal in result.readings
+            for words in ("measured", "simulated", "differs")
+        ),
+    )
+    rows = []
+    for k in range(len(result.p)):
+        cells = [f"{value:.3f}" for value in (result.p[k], result.q[k], result.vt[k])]
+        for reading in result.readings.values():
+            cells += [f"{reading.measured[k]:.4f}", f"{reading.simulated[k]:.4f}"]
+            cells.append(f"{100.0 * reading.residuals[k] / reading.measured[k]:+.2f} %")
+        worst = any(reading.worst == k for reading in result.readings.values())
+        rows.append(row(str(k + 1), *cells, "largest" if worst else ""))
+    return Table(columns(*heads, "", numbers=heads), tuple(rows))
+
+
+def parameters_table(result: VCurve) -> Table:
+    """Make the table of what was fitted, with its interval."""
+    marks = {name: ", ".join(fits.remarks_on(each)) for name, each in result.parameters.items()}
+    remark = any(marks.values())
+    no_interval = result.verdict.in_place_of_interval
+    rows = [
+        row(
+            name,
+            number(parameter.start),
+            parameter.rounded(parameter.value),
+            no_interval or interval(parameter.interval, parameter.rounded),
+            parameter.unit,
+            *([marks[name]] if remark else []),
+            mark="" if parameter.determined and parameter.physical else "doubt",
+        )
+        for name, parameter in result.parameters.items()
+    ]
+    heads = ("start", "fitted", "95 % interval")
+    last = [""] if remark else []
+    return Table(columns("parameter", *heads, "unit", *last, numbers=heads), tuple(rows))
