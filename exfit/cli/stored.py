@@ -22,9 +22,10 @@ def show(result: Path, everything: bool) -> None:
     RESULT is the result.json of a fit, the validation.json of a validation, or the folder that
     holds one of them.
     """
-    from exfit.results.io import VALIDATION, load_result, load_validation, result_file
+    from exfit.results.io import load_result, load_validation, result_file
     from exfit.show import fits, run_folder, terminal, validations
     from exfit.show.blocks import Table, columns, paragraph, row
+    from exfit.util.file_names import VALIDATION
 
     console, source = terminal.console(), result_file(result)
     validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
