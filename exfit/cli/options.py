@@ -186,7 +186,7 @@ class Given:
         path = self.parameters
         if path is None and not self.changes:
             return load(case)
-        from exfit.fitting.overrides import (
+        from exfit.workflows.given_values import (
             fitted_code,
             read_parameters,
             sources_in,

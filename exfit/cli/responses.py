@@ -48,8 +48,8 @@ def simulate(
     parameter of the machine is named as in --set machine.Tpd0=6.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import changed_values, fitted_code, read_parameters
     from exfit.show import run_folder
+    from exfit.workflows.given_values import changed_values, fitted_code, read_parameters
 
     loaded = load(case, *(fitted_code(parameters) if parameters else ()))
     folder = output.folder_of(loaded, "simulate", run_folder.OF_SIMULATION)
@@ -122,8 +122,8 @@ def validate(
     accepted.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import read_parameters, sources_in
     from exfit.show import run_folder
+    from exfit.workflows.given_values import read_parameters, sources_in
 
     if as_found and parameters is not None:
         raise ExfitError("--as-found and --parameters: only one of them says whose values they are")
@@ -152,8 +152,8 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
 
     Raises CaseError where it was not fitted.
     """
-    from exfit.fitting.overrides import fitted_code
     from exfit.show import run_folder
+    from exfit.workflows.given_values import fitted_code
 
     source = parameters or run_folder.last_fit(path)
     case = load(path, *(() if source is None else fitted_code(source)))

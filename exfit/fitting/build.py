@@ -30,8 +30,8 @@ from exfit.fitting.recorded.switchings import (
     Switching,
     announced,
     masked,
+    switchings_as_steps,
     switchings_of,
-    taken_apart,
 )
 from exfit.fitting.recordings import record_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
@@ -67,8 +67,8 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     offset = offset_step(test, begin, end)
     given = input_steps(view, test, {**values, **network})
     played = _driving(view, test, record, file, driving, switchings)
-    apart = taken_apart(played, file, switchings, prefix_of(recording), len(given))
-    steps = (*given, *apart.steps, *offset)
+    switched = switchings_as_steps(played, file, switchings, prefix_of(recording), len(given))
+    steps = (*given, *switched.steps, *offset)
     nuisances, free = nuisance_parameters(
         prefix_of(recording),
         test,
@@ -80,14 +80,14 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
-    recorded = {**apart.inputs, **references.recorded}
+    recorded = {**switched.inputs, **references.recorded}
     inputs = Inputs(begin, end + _beyond(nuisances, free, delay), steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
     experiment = Experiment(
         simulator.with_inputs(steps, delay) if delay else simulator,
         _channels(case, file, record, [s for s in system.outputs if s not in driving]),
         {**network, **levels_of(case, test, record)},
-        (*nuisances, *apart.nuisances),
+        (*nuisances, *switched.nuisances),
         recording.name,
     )
     plain = ExperimentSetup(
@@ -95,7 +95,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         test,
         record,
         experiment,
-        (*free, *apart.free),
+        (*free, *switched.free),
         references.files,
         _played(view.kind, driving),
         switchings=announced(file, switchings),

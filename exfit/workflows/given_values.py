@@ -1,11 +1,24 @@
-"""Values in place of those of a case, by name or of an earlier fit; what a result says of them."""
+"""Values in place of those of a case: by name, of a file, of an earlier fit; what a result says."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, TypeAlias
+from math import isclose
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
+from exfit.case.ties import TieError
+from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.fitting.overrides import changed_values, taken_over, with_given_values
+from exfit.fitting.nuisances.parameters import names_of
+from exfit.fitting.recorded.references import with_recorded_steps
+from exfit.fitting.recorded.switchings import names_of_switchings
+from exfit.fitting.system import values_of
+from exfit.models.sheet import Parameter
+from exfit.util.magnitude import magnitude_fault
+from exfit.util.sources import SOURCES
+from exfit.util.text import near
 
 if TYPE_CHECKING:
     from exfit.results.description import GivenInPlace
@@ -13,6 +26,189 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, float]
 ValuesOrResult: TypeAlias = "Values | FitResult"
+
+WHOLE_FIT = "result.json"
+OF_A_RESULT = "the result of a fit; give the parameters.yaml beside it"
+
+
+def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[str, float]:
+    """Return changes of values by name: KA, machine.Tpd0, or what is found about a record.
+
+    Raises CaseError, naming ``place``, for a name that the case does not have, a value that the
+    equations exclude, or values that contradict each other.
+    """
+    rows = case.rows()
+    faults = [*_wrong_names(case, given, rows), *_outside(rows, given)]
+    if not faults:
+        try:
+            values = values_of(case, given)
+        except TieError as fault:
+            raise CaseError([f"{place}: {fault}"]) from None
+        following = {name: values[name] for name in case.ties.by_name if name not in given}
+        faults = [*_outside(rows, following), *contradictions(case, values)]
+    if faults:
+        raise CaseError(f"{place}: {fault}" for fault in faults)
+    return dict(given)
+
+
+def with_given_values(
+    case: Case,
+    given: Mapping[str, float],
+    source: Path | str,
+    sources: Mapping[str, str] = MappingProxyType({}),
+) -> Case:
+    """Return the case with other fixed values, and other starts of what is free.
+
+    ``source`` is who gives them, ``sources`` where each of the values comes from. Raises CaseError,
+    naming ``source``, as `changed_values` does, and for a start out of bounds.
+    """
+    changed = case.with_values(changed_values(case, given, str(source)), source, sources)
+    faults, rows = [], case.rows()
+    for name, section in changed.free().items():
+        low, high = bounds_of(section, rows.get(name))
+        if name in given and not low <= section.start <= high:
+            limits = f"{low:g} ... {high:g} in {case.path}"
+            faults.append(f"{source}: {name}: {section.start:g} lies outside its bounds {limits}")
+    if faults:
+        raise CaseError(faults)
+    return changed
+
+
+def _wrong_names(
+    case: Case, given: Mapping[str, float], rows: Mapping[str, Parameter]
+) -> Iterator[str]:
+    """Yield the names that the case does not have, and values without a sheet that are unusable."""
+    helpers = [name for name in case.values() if name not in rows]
+    names = [*rows, *helpers, *_of_records(case)]
+    for name, value in given.items():
+        if name not in names:
+            yield f"{name}: not a parameter; {near(name, names)}"
+        elif name not in rows and (fault := magnitude_fault(value)):
+            yield f"{name}: {fault}"
+
+
+def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
+    """Yield the values that the equations exclude."""
+    for name, value in values.items():
+        fault = rows[name].range_fault(value) if name in rows else None
+        if fault is not None:
+            yield f"{name}: {fault}"
+
+
+def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
+    """Yield what does not fit together in the values of a system."""
+    for part in case.parts.all:
+        own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
+        yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
+
+
+class CodeHashes(NamedTuple):
+    """The SHA-256 of the user's own model and of the program that a fit was made with, or ""."""
+
+    model: str = ""
+    program: str = ""
+
+
+def fitted_code(path: Path) -> CodeHashes:
+    """Return the hashes of the code that a file of parameters is of.
+
+    They are read before a case is loaded, which runs the model. Raises CaseError for a file that
+    holds no parameters: it would lack the hashes too.
+    """
+    content, _ = _content(path)
+    return CodeHashes(*(str(content.get(key, "")) for key in ("model_sha256", "program_sha256")))
+
+
+def _content(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return what a file of parameters contains, and the faults of its text."""
+    if path.is_dir() or path.name == WHOLE_FIT:  # a large one is more than YAML is read of
+        raise CaseError([f"{path}: {OF_A_RESULT}"])
+    top, faults = read_yaml(read_text(path), path)
+    content = top.value if isinstance(top.value, dict) else {}
+    if "inputs" in content:
+        raise CaseError([f"{path}: {OF_A_RESULT}"])
+    texts = [fault.text for fault in faults]
+    parameters = content.get("parameters")
+    if not isinstance(parameters, dict) or not parameters:
+        raise CaseError(f"{path}: {text}" for text in (*texts, "parameters: missing"))
+    return content, texts
+
+
+def read_parameters(case: Case, path: Path) -> dict[str, float]:
+    """Return the changes that a file of parameters makes to a case.
+
+    What follows others in the case is left to them, if the file agrees; so is what the file says
+    about records that the case does not have. Raises CaseError where it is not such a file, or is
+    of another model.
+    """
+    content, texts = _content(path)
+    parameters, about = content["parameters"], content.get("records", {})
+    if str(content.get("model", case.subject)).upper() != case.subject:
+        texts.append(f"model: {content['model']}, but {case.path} has {case.subject}")
+    texts += _no_numbers("parameters", parameters)
+    texts += _no_numbers("records", about)
+    texts += _wrong_sources(content.get("sources", {}))
+    if texts:
+        raise CaseError(f"{path}: {text}" for text in texts)
+    return taken_over(case, parameters, about, str(path))
+
+
+def sources_in(path: Path) -> dict[str, str]:
+    """Return where the values of a file that `read_parameters` has read come from, by name."""
+    return {str(name): str(word) for name, word in _content(path)[0].get("sources", {}).items()}
+
+
+def taken_over(
+    case: Case, parameters: Mapping[str, float], about: Mapping[str, float], place: str
+) -> dict[str, float]:
+    """Return the changes that values of an earlier fit, and its values ``about`` records, make.
+
+    As `read_parameters` does; raises CaseError, naming ``place``, as `changed_values` does.
+    """
+    names = _of_records(case)
+    of_records = {name: value for name, value in about.items() if name in names}
+    return _without_agreeing_ties(case, changed_values(case, {**parameters, **of_records}, place))
+
+
+def _without_agreeing_ties(case: Case, given: Mapping[str, float]) -> dict[str, float]:
+    """Return changes without those of tied parameters that the ties give as well."""
+    others = {name: value for name, value in given.items() if name not in case.ties.by_name}
+    following = values_of(case, others)
+    return {
+        name: value
+        for name, value in given.items()
+        if name in others or not isclose(value, following[name])
+    }
+
+
+def _no_numbers(key: str, given: Any) -> Iterator[str]:
+    """Yield the values of a section that are no numbers."""
+    if not isinstance(given, dict):
+        yield f"{key}: not a mapping (key: value)"
+        return
+    for name, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            yield f"{key}.{name}: {value!r} is not a number"
+
+
+def _wrong_sources(given: Any) -> Iterator[str]:
+    """Yield the words that are no source of a value."""
+    if not isinstance(given, dict):
+        yield "sources: not a mapping (key: value)"
+        return
+    for name, word in given.items():
+        if word not in SOURCES:
+            yield f"sources.{name}: {word!r} is not a source; {near(str(word), SOURCES)}"
+
+
+def _of_records(case: Case) -> list[str]:
+    """Return the names of all that a fit of a case finds about its records."""
+    recordings = [with_recorded_steps(case, recording) for recording in case.recordings]
+    return [
+        name
+        for recording in recordings
+        for name in (*names_of(recording), *names_of_switchings(case, recording))
+    ]
 
 
 def with_values(case: Case, values: "ValuesOrResult | None") -> Case:

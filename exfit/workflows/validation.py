@@ -18,7 +18,7 @@ from exfit.fitting.program import Program, by_program
 from exfit.fitting.recorded.shown_instants import instants_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
-from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
+from exfit.fitting.validation_steps import GivenSteps, SetupOfRecord, with_steps_of_record
 from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
@@ -267,7 +267,7 @@ def _steps(
 
 
 def _notes(
-    test: UnplannedTest,
+    test: SetupOfRecord,
     setup: ExperimentSetup,
     comparison: Comparison,
     fitted: Sequence[Comparison],

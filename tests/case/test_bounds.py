@@ -8,11 +8,11 @@ from records import case_of, config
 
 from exfit.case.bounds import is_held, search_bounds
 from exfit.errors import CaseError
-from exfit.fitting.overrides import with_given_values
 from exfit.fitting.problem import free_parameters
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.workflows import check, fit
+from exfit.workflows.given_values import with_given_values
 
 ROWS = {row.symbol: row for row in MODELS["AC1A"].sheet}
 

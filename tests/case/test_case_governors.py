@@ -7,7 +7,6 @@ from places import REFERENCE
 from exfit.case.load import load_case
 from exfit.case.peek import free_of
 from exfit.errors import CaseError
-from exfit.fitting.overrides import changed_values
 from exfit.fitting.system import system_of
 from exfit.plants import BREAKER
 from exfit.results.io import load_result
@@ -15,6 +14,7 @@ from exfit.show.run_folder import write_fit
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.verdict.run_quality import speed_notes, typical_notes
 from exfit.workflows import fit, simulate
+from exfit.workflows.given_values import changed_values
 
 TRUTH = {"governor.R": 0.05, "governor.T1": 0.5, "governor.T3": 8.0}
 CASE = """\

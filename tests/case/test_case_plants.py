@@ -10,11 +10,11 @@ from tiers import few_of
 from exfit.case.load import load_case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.input_steps import input_steps
-from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.fitting.system import inputs_of, system_of
 from exfit.show.run_folder import PARAMETERS, write_fit
 from exfit.verdict.run_quality import typical_notes
 from exfit.workflows import fit, simulate
+from exfit.workflows.given_values import changed_values, read_parameters
 
 ON_LOAD = """\
 model: SEXS

@@ -12,8 +12,8 @@ from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme.case.programme import load_programme
 from exfit.features.start.table_of_tests import read_test_table
-from exfit.fitting.overrides import read_parameters
 from exfit.util.text import MOST_TEXTS
+from exfit.workflows.given_values import read_parameters
 
 TEST = {**FIRST_ORDER["test"], "duration": 3.0}
 BASE = safe_dump({**FIRST_ORDER, "test": TEST}, sort_keys=False)

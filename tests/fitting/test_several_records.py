@@ -23,11 +23,11 @@ from tiers import few_of
 
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiments
-from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.system import values_of
 from exfit.show.run_folder import write_fit
 from exfit.workflows import fit, simulate, validate
+from exfit.workflows.given_values import changed_values, read_parameters
 from exfit.workflows.model_check import check
 
 NEAR = 1.56  # s: TF where the records do not speak against it

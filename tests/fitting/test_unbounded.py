@@ -24,7 +24,6 @@ from exfit.errors import CaseError, ExfitError
 from exfit.features.planner.export import export
 from exfit.features.report.page import html
 from exfit.fitting.build import build_experiments
-from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.search import fitted
 from exfit.models import MODELS
@@ -34,6 +33,7 @@ from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
 from exfit.show import fits, terminal
 from exfit.workflows import check, fit, profile, simulate
+from exfit.workflows.given_values import changed_values, read_parameters, with_given_values
 
 NOISE = 1e-5  # pu: far below what KD = -0.3 does to vt
 NEGATIVE = {**UNIT, "KD": -0.3}

@@ -18,7 +18,6 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.report.page import html
-from exfit.fitting.overrides import read_parameters
 from exfit.results import fit_files
 from exfit.results.io import load_result
 from exfit.results.tables import DIGITS, parameter_file, table
@@ -26,6 +25,7 @@ from exfit.show import figure_files, run_folder
 from exfit.show import figures as plots
 from exfit.util.files import write
 from exfit.util.text import to_json
+from exfit.workflows.given_values import read_parameters
 
 CASE = ROOT / "configs" / "first_order.yaml"
 

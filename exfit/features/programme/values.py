@@ -16,11 +16,11 @@ from exfit.features.programme.result import EnteredValue, FinishedTest
 from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
 from exfit.features.programme.steady.tests_at_rest import channel_bases, machine_values
 from exfit.features.programme.steady.v_curve_result import VCurve
-from exfit.fitting.overrides import with_given_values
 from exfit.plants import MACHINE
 from exfit.records.units import alike
 from exfit.results.model import FittedParameter
 from exfit.util.sources import FITTED, LEAST_CERTAIN_FIRST, NOT_STATED
+from exfit.workflows.given_values import with_given_values
 
 MEASURED = "measured"
 BASE = ".base"

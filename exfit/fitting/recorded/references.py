@@ -66,8 +66,8 @@ class _Sampled:
         except ValueError as fault:
             raise RecordError(f"{self.source}: {fault}") from None
 
-    def taken_apart(self, steady: float) -> tuple[tuple[FindableStep, ...], RecordedInput | None]:
-        """Return its jumps, each between two samples, and how it deviates beside them.
+    def split(self, steady: float) -> tuple[tuple[FindableStep, ...], RecordedInput | None]:
+        """Split it into its jumps, each between two samples, and how it deviates beside them.
 
         Both count from its mean until ``steady`` (s). It deviates by None where it only jumps.
         """
@@ -124,7 +124,7 @@ def references_of(
     if not sampled:
         return References(test, {}, files)
     steady = _steady_until(test, file, sampled)
-    parts = {signal: reference.taken_apart(steady) for signal, reference in sampled.items()}
+    parts = {signal: reference.split(steady) for signal, reference in sampled.items()}
     steps = {signal: jumping for signal, (jumping, _) in parts.items()}
     return References(
         test.model_copy(update={**steps, "steady_until": steady}),

@@ -114,7 +114,7 @@ def _filtered_end(file: RecordFile, record: Record) -> Iterator[tuple[float, flo
     yield end - reach, end
 
 
-class TakenApart(NamedTuple):
+class SwitchedInputs(NamedTuple):
     """The inputs of an event without its switchings, these as steps, and their instants."""
 
     inputs: dict[str, Input]
@@ -123,13 +123,13 @@ class TakenApart(NamedTuple):
     free: tuple[FreeParameter, ...] = ()
 
 
-def taken_apart(
+def switchings_as_steps(
     inputs: dict[str, Input],
     file: RecordFile,
     switchings: Sequence[Switching],
     prefix: str,
     first: int,
-) -> TakenApart:
+) -> SwitchedInputs:
     """Return the inputs with each switching as a step whose instant a fit finds, if it does.
 
     It lies between the samples of the jump. ``first`` is the place of these steps among all, and
@@ -137,7 +137,7 @@ def taken_apart(
     """
     smooth = {name: own for name, own in inputs.items() if isinstance(own, SplinedInput)}
     if file.switchings != "find" or not switchings:
-        return TakenApart(inputs)
+        return SwitchedInputs(inputs)
     steps, nuisances, free = list[InputStep](), list[Nuisance](), list[FreeParameter]()
     for number, group in enumerate(_large(groups_of(switchings)), 1):
         before = min(each.jump[0] for each in group)
@@ -154,7 +154,7 @@ def taken_apart(
         name = _name(prefix, number)
         nuisances.append(Nuisance(name, "switching", place, count=len(group)))
         free.append(FreeParameter(name, at, low + margin, high - margin, logarithmic=False))
-    return TakenApart({**inputs, **smooth}, tuple(steps), tuple(nuisances), tuple(free))
+    return SwitchedInputs({**inputs, **smooth}, tuple(steps), tuple(nuisances), tuple(free))
 
 
 def _large(groups: Sequence[Group]) -> list[Group]:

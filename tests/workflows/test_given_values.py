@@ -6,7 +6,7 @@ from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
 from exfit.errors import CaseError
-from exfit.fitting.overrides import read_parameters, with_given_values
+from exfit.workflows.given_values import read_parameters, with_given_values
 
 BACKGROUND = 1e-3 * np.random.default_rng(1).standard_normal(len(TIME))
 

@@ -57,7 +57,7 @@ class GivenSteps(NamedTuple):
     instants: tuple[float, ...] = ()
 
 
-class UnplannedTest(NamedTuple):
+class SetupOfRecord(NamedTuple):
     """A record with its test, and what must be known of where that is from."""
 
     setup: ExperimentSetup
@@ -66,7 +66,7 @@ class UnplannedTest(NamedTuple):
 
 def with_steps_of_record(
     case: Case, recording: Recording, values: Values, given: GivenSteps
-) -> UnplannedTest:
+) -> SetupOfRecord:
     """Return the setup of a record whose steps are those that it shows, or that are ``given``.
 
     The test of the ``recording`` is that of another record of its kind: it says which signal is
@@ -85,11 +85,11 @@ def with_steps_of_record(
         recording = _with_own_reference(recording, inspection)
         if recording.test.vref == "recorded":
             test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
-            return UnplannedTest(_built(case, recording, values, test), (OWN_REFERENCE,))
+            return SetupOfRecord(_built(case, recording, values, test), (OWN_REFERENCE,))
     steps = _lasting(record, _shown(record, inspection, given), given)
     if signal is None:
         test = {"steady_until": _earliest(record, steps, 0), "vt0": None}
-        return UnplannedTest(_built(case, recording, values, test))
+        return SetupOfRecord(_built(case, recording, values, test))
 
     def setup_with(sizes: Sequence[float], earlier: Test) -> ExperimentSetup:
         events = tuple(_events(record, steps, sizes, given))
@@ -101,11 +101,11 @@ def with_steps_of_record(
     if earlier:
         setup = setup_with(sizes, earlier)
         if _begins_there(setup, values, steps[0], sizes):
-            return UnplannedTest(setup, (EARLIER_STEPS,))
-    return UnplannedTest(setup_with(sizes, {}))
+            return SetupOfRecord(setup, (EARLIER_STEPS,))
+    return SetupOfRecord(setup_with(sizes, {}))
 
 
-def _event(case: Case, recording: Recording, values: Values, given: GivenSteps) -> UnplannedTest:
+def _event(case: Case, recording: Recording, values: Values, given: GivenSteps) -> SetupOfRecord:
     """Return the setup of a grid event: it has its own rest, and no steps.
 
     Raises CaseError where steps are given.
@@ -114,7 +114,7 @@ def _event(case: Case, recording: Recording, values: Values, given: GivenSteps) 
         text = f"step and at: not allowed with plant {case.kind.name}: the record drives it"
         raise CaseError([f"{case.path}: {text}"])
     test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
-    return UnplannedTest(_built(case, recording, values, {**test, "vref": (), "vs": ()}))
+    return SetupOfRecord(_built(case, recording, values, {**test, "vref": (), "vs": ()}))
 
 
 def _stepped(case: Case, test: BumpTest) -> str | None:
