@@ -164,7 +164,7 @@ def planned(
 
 
 def _how_far(case: Case, strategies: Sequence[str], search: str | None) -> str | None:
-    """Return how far to search, None: as the case says.
+    """Choose how far to search, None: as the case says.
 
     Several strategies are compared: a search that goes on would lead all of them to one minimum.
     """

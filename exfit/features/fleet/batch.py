@@ -262,7 +262,7 @@ class BatchRun:
         return True
 
     def _end(self, case: PlannedCase, outcome: CaseOutcome) -> None:
-        """Keep what a case came to, and announce it."""
+        """Keep the outcome of a case, and announce it."""
         entry = case.entry
         if outcome.changed:
             entry = IndexEntry(entry.case, reason=outcome.changed, facts=entry.facts)

@@ -61,7 +61,7 @@ class Bundle:
 
     @property
     def size(self) -> int:
-        """How many bytes travel."""
+        """Number of bytes that travel."""
         return sum(len(file.content) for file in self.files)
 
 

@@ -63,7 +63,7 @@ def connected(address: str) -> Iterator["Client"]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep what distributed logs and warns of from standard error."""
+    """Keep logs and warnings of distributed from standard error."""
     names = {name for name in logging.root.manager.loggerDict if name.split(".")[0] in LOGGERS}
     levels = {logger: logger.level for logger in map(logging.getLogger, {*LOGGERS, *names})}
     for logger in levels:
@@ -87,7 +87,7 @@ def _refuse_other_than_schedulers(address: str) -> None:
 
 
 async def _kind_at(address: str) -> str:
-    """Return what of Dask answers at an address, "" where something else does."""
+    """Ask an address for its role in Dask; "" where something else answers."""
     from distributed.comm import connect
     from distributed.core import send_recv
     from distributed.security import Security
@@ -112,7 +112,7 @@ async def _kind_at(address: str) -> str:
 
 
 def _reason(fault: BaseException) -> str:
-    """Return what caused a fault, in the words of the system where it has any."""
+    """Word the cause of a fault, as the system does where it has words."""
     cause: BaseException | None = fault
     while cause is not None:
         system = OF_SYSTEM.search(str(cause))
@@ -152,7 +152,7 @@ def asked(client: "Client", worker: str) -> "Future[Mapping[str, Any]]":
 
 
 def answered(worker: str, answer: "Future[Mapping[str, Any]]") -> str | None:
-    """Return why a worker may not be used, "" where it may; None where it was lost meanwhile.
+    """Read the reason to refuse a worker, "" for none; None where it was lost meanwhile.
 
     It has other versions than this computer, so that the results would not be the same, or no
     exfit.

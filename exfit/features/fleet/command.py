@@ -167,7 +167,7 @@ def _tables_among(given: "Sequence[Path]") -> tuple[list[Path], list[Path]]:
 
 
 def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]":
-    """Return what makes the cases of tables; raises ExfitError with the faults of all of them."""
+    """Plan the cases of tables; raises ExfitError with the faults of all of them."""
     from exfit.features.planner.table_cases import cases_of_table
 
     made: dict[Path, CaseMaking] = {}
@@ -186,7 +186,7 @@ def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]
 
 
 def _observer(shown: bool) -> "AbstractContextManager[BatchObserver | None]":
-    """Return what shows a batch while it runs, None where nothing is to be shown."""
+    """Make the display of a batch that runs, None where nothing is to be shown."""
     if not shown:
         return nullcontext()
     from exfit.features.fleet.terminal import BatchProgress

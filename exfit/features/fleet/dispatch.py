@@ -52,7 +52,7 @@ FETCHED_WITHIN = 5.0  # s, an outcome that is there
 
 
 def cluster_workers(address: str, time_limit: float) -> Compute:
-    """Return what fits cases on the cluster of a scheduler, each in no more than ``time_limit`` s.
+    """Make the `Compute` of a scheduler's cluster, each case in no more than ``time_limit`` s.
 
     It raises ClusterError where the cluster cannot be used: before the first case where a worker
     has other versions than this computer.
@@ -157,7 +157,7 @@ class Dispatch:
             raise ClusterError(self._refusals() or f"{address}: no worker is left")
 
     def _is_useless(self, present: Mapping[str, int]) -> bool:
-        """Return whether no worker will be found: all are refused, or there was none for long."""
+        """Find that no worker will come: all are refused, or there was none for long."""
         refused = bool(present) and present.keys() <= self.refused.keys()
         return refused or self.looked - self.had_workers > WITHOUT_WORKERS
 
@@ -173,7 +173,6 @@ class Dispatch:
             self.checks[worker] = asked(self.client, worker)
 
     def _refusals(self) -> str:
-        """Return which workers may not be used, and why."""
         return "\n".join(f"worker {worker}: {reason}" for worker, reason in self.refused.items())
 
     def _lose(self, worker: str) -> None:

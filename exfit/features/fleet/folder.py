@@ -55,7 +55,7 @@ class IndexEntry:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why there is no fit of a case, and the processor time that was spent, s."""
+    """The reason why a case has no fit, and the processor time that was spent, s."""
 
     kind: FailureKind
     reason: str
@@ -64,7 +64,7 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class CaseOutcome:
-    """What a worker makes of a case: the files of its fit by name with their summary, or a failure.
+    """The outcome of a case: the files of its fit by name with their summary, or a failure.
 
     The last file is that by which the fit, or the programme, is known to be done.
     Neither: the case, or a file of it, was changed meanwhile, in the way that ``changed`` says.
@@ -96,7 +96,7 @@ class Fleet:
 
     @property
     def counts(self) -> dict[CaseStatus, int]:
-        """How many cases there are of each status."""
+        """Number of cases of each status."""
         return dict(Counter(case.status for case in self.cases))
 
     def path_of(self, case: CaseSummary) -> Path:
@@ -139,17 +139,17 @@ def case_path(folder: Path, case: str) -> Path:
 
 
 def is_done(folder: Path, key: str) -> bool:
-    """Return whether the fit of a key is done."""
+    """Look for the fit of a key, whole."""
     return any((folder / key / name).is_file() for name in (RESULT, WHOLE_PROGRAMME))
 
 
 def failure_of(folder: Path, key: str) -> Failure | None:
-    """Return why the fit of a key failed; None where it did not, or was not run."""
+    """Read the failure of a key; None where its fit did not fail, or was not run."""
     return read_kept(folder / key / FAILED, Failure)
 
 
 def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
-    """Write what a case came to under its key; raises ExfitError where that is not possible."""
+    """Write the outcome of a case under its key; raises ExfitError where that is not possible."""
     if outcome.summary is not None:
         summary = text_of(outcome.summary, version=VERSION)
         *others, result = outcome.files.items()
@@ -173,7 +173,7 @@ def write_entry(folder: Path, entry: IndexEntry) -> None:
 
 
 def has_entry(folder: Path, case: str) -> bool:
-    """Return whether the index has an entry of a case."""
+    """Look for the entry of a case in the index."""
     return (folder / INDEX / IndexEntry(case).file).is_file()
 
 
@@ -184,7 +184,7 @@ def entries_of(folder: Path) -> dict[str, IndexEntry]:
 
 
 def _is_of_batch(entry: IndexEntry) -> bool:
-    """Return whether the key of an entry is one: the name of a folder here, no way out of it."""
+    """Accept the key of an entry if it is the name of a folder here, and no way out of it."""
     return not entry.key or KEY.fullmatch(entry.key) is not None
 
 
@@ -210,7 +210,7 @@ def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
 
 
 def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
-    """Return what changes in a folder when a case is added or comes to an end."""
+    """Stamp all files of a folder that change when a case is added or comes to an end."""
     return frozenset(_stamps(folder))
 
 

@@ -50,7 +50,7 @@ Compute = Callable[[Iterator[PlannedCase], Begin, End], None]
 
 
 class Answer(NamedTuple):
-    """What a worker says: that it is ready, that it begins, an outcome; None: that it has died."""
+    """A word of a worker: it is ready, it begins, an outcome; None: it has died."""
 
     worker: "WorkerProcess"
     content: Any
@@ -153,7 +153,7 @@ def in_this_process(cases: Iterator[PlannedCase], begin: Begin, end: End) -> Non
 
 
 def local_workers(workers: int, time_limit: float) -> Compute:
-    """Return what fits cases in so many processes, each case in no more than ``time_limit`` s."""
+    """Make the `Compute` of so many processes, each case in no more than ``time_limit`` s."""
 
     def compute(cases: Iterator[PlannedCase], begin: Begin, end: End) -> None:
         pool = Pool(cases, begin, end, workers, time_limit)

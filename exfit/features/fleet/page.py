@@ -226,7 +226,7 @@ def _case_view(fleet: Fleet, case: CaseSummary, remarks: Mapping[tuple[str, str]
 
 
 def _label(case: CaseSummary, curve: SummaryCurve) -> str:
-    """Return what a picture is of: the signal, and the record where there are several."""
+    """Label a picture by its signal, and by the record where there are several."""
     records = {each.record for each in case.curves}
     return f"{curve.signal} of {curve.record}" if len(records) > 1 else curve.signal
 

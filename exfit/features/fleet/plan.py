@@ -35,7 +35,7 @@ class Share(NamedTuple):
 
 @dataclass(frozen=True)
 class BatchSettings:
-    """What a batch does: how it fits, what it runs, and what it tries again.
+    """Settings of a batch: how it fits, what it runs, and what it tries again.
 
     ``trust``: code that a case names is run. ``retry_failed``: cases that failed are fitted again.
     ``further`` are functions that make files beside those of every fit.
@@ -93,7 +93,7 @@ def _same(path: Path, other: Path) -> bool:
 
 
 def _may_be_case(file: Path) -> bool:
-    """Return whether a file of YAML is a case, a programme, or nothing that can be read."""
+    """Accept a file of YAML that is a case, a programme, or nothing that can be read."""
     try:
         content = content_of(decoded(read_regular(file), file), file)
     except (OSError, CaseError):
@@ -140,7 +140,7 @@ def planned_case(case: Path, folder: Path, settings: BatchSettings) -> PlannedCa
 
 
 def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool) -> str:
-    """Return why a case is not even tried, "" where it is: open values, code without trust."""
+    """Find a reason not to try a case, or "": open values, code without trust."""
     missing = [dotted(place) for place in open_places(content)]
     if missing:
         return f"{files[0]}: to be filled in: {', '.join(missing)}"
@@ -162,7 +162,7 @@ def _without_task(entry: IndexEntry, status: CaseStatus, reason: str) -> Planned
 
 
 def _group(content: Mapping[str, Any]) -> str:
-    """Return what cases have in common that share their machine code."""
+    """Name the group of cases that share their machine code."""
     parameters = content.get("parameters")
     free = parameters.get("free") if isinstance(parameters, Mapping) else None
     plant, *added = (

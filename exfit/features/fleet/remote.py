@@ -1,4 +1,4 @@
-"""What runs in the workers of a cluster: the cases of bundles, each in a process beside the worker.
+"""Cases of bundles in the workers of a cluster, each in a process beside the worker.
 
 A process of its own can be ended where a case hangs, takes no more than itself along where a case
 crashes, and computes with one thread, however many the worker has: the worker's other cases and
@@ -45,7 +45,7 @@ class RemoteCase(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """What a worker replies: the packed outcome of a case, or how the process that had it died."""
+    """The reply of a worker: the packed outcome of a case, or how the process that had it died."""
 
     packed: bytes = b""
     death: str = ""
@@ -56,7 +56,7 @@ class NoProcess(Exception):
 
 
 def versions() -> dict[str, str]:
-    """Return what results of this computer depend on: versions, system and kind of processor."""
+    """Read the versions, the system and the processor that results of this computer depend on."""
     return {
         "exfit": __version__,
         "Python": platform.python_version(),
@@ -91,7 +91,7 @@ class Seat:
     def reply(
         self, case: PlannedCase, group: str, limit: float, is_wanted: Callable[[], bool]
     ) -> Reply:
-        """Return what becomes of a case; the process has ended where it takes longer or crashes.
+        """Have a case fitted; the process has ended where that takes longer or crashes.
 
         It is ended, too, once the case is not wanted any more.
         """
@@ -135,7 +135,7 @@ class Seats:
     leaving: Timer | None = None
 
     def reply(self, remote: RemoteCase, is_wanted: Callable[[], bool]) -> Reply:
-        """Return what becomes of a case; raises NoProcess where none can be started for it."""
+        """Have a case fitted; raises NoProcess where no process can be started for it."""
         case = remote.case
         if not isinstance(case.task, BundledTask):
             raise TypeError("a case without its files")
@@ -190,7 +190,7 @@ class Seats:
 
 
 def run_packed(payload: bytes) -> Reply:
-    """Return what becomes of a packed case, in a worker of the cluster."""
+    """Have a packed case fitted, in a worker of the cluster."""
     from distributed import get_worker
 
     remote: RemoteCase = pickle.loads(payload)

@@ -26,7 +26,7 @@ WITHOUT_INTERVAL = "no interval"  # that was looked for, as without a global sea
 
 
 def missing_interval(case: CaseSummary, name: str) -> str:
-    """Return why a fitted parameter of a case has no closed interval, "" where it has one."""
+    """Find why a fitted parameter of a case has no closed interval, "" where it has one."""
     parameter = case.fitted[name]
     if case.verdict in WITHOUT_INTERVALS:
         return f"{WITHOUT_INTERVAL}: {case.verdict}"
@@ -98,13 +98,13 @@ class SisterGroup:
 
     @property
     def title(self) -> str:
-        """What the units share, in words."""
+        """The models, make and rating that the units share, in words."""
         models = self.model + (f" on {self.machine_model}" if self.machine_model else "")
         return ", ".join((models, *self.facts))
 
     @property
     def outliers(self) -> int:
-        """How many values differ from those of the sisters."""
+        """Number of values that differ from those of the sisters."""
         return sum(v.is_outlier for parameter in self.parameters for v in parameter.values)
 
 
@@ -156,7 +156,7 @@ def _group(members: Sequence[CaseSummary]) -> SisterGroup:
 
 
 def _unit(case: CaseSummary) -> tuple[str, ...]:
-    """Return what two cases of one unit share: its place, else its name, else all content."""
+    """Identify a unit by its place, else its name, else all content of its case."""
     if case.bus is not None and case.machine_id is not None:
         return ("bus", str(case.bus), case.machine_id)
     plant, unit = (stated(case.about, fact) for fact in (PLANT, UNIT))
@@ -212,7 +212,7 @@ def _beyond_intervals(values: Sequence[SisterValue]) -> Iterator[SisterValue]:
 
 
 def _apart(one: SisterValue, other: SisterValue) -> bool:
-    """Return whether one interval ends before the other begins; an open side has no end."""
+    """Find that one interval ends before the other begins; an open side has no end."""
     return any(
         a.high is not None and b.low is not None and a.high < b.low
         for a, b in ((one, other), (other, one))

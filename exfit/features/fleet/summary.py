@@ -28,7 +28,7 @@ CURVE_DIGITS = 6  # significant, of a point of a curve
 
 
 class CaseFacts(NamedTuple):
-    """What a case says of its unit: its name, its place in a planner's file, its models.
+    """The unit of a case: its name, its place in a planner's file, its models.
 
     ``unit`` is what ``about`` has under Unit, else the bus and the machine; "" where neither is
     given. ``bus`` and ``machine_id`` are those of ``as_found``.
@@ -64,7 +64,7 @@ class SummaryParameter(NamedTuple):
 
 
 class SummaryValidation(NamedTuple):
-    """What the records that were not fitted say, "" without any; ``rmse`` is the largest, pu."""
+    """The outcome of records that were not fitted, "" without any; ``rmse``: the largest, pu."""
 
     outcome: Literal["accepted", "not accepted", ""] = ""
     rmse: float | None = None
@@ -86,7 +86,7 @@ class SummaryCurve:
 
 @dataclass(frozen=True, eq=False)
 class CaseSummary:
-    """What a case of a batch came to.
+    """The outcome of a case of a batch.
 
     ``name`` is that of no other case of the batch, ``case`` the path of its file, relative to the
     folder of the batch where there is a way, and ``key`` the folder of its fit there, "" without
@@ -123,7 +123,7 @@ class CaseSummary:
 
     @property
     def outcome(self) -> str:
-        """What the case came to in a few words: its verdict, or why there is none."""
+        """The outcome in a few words: the verdict, or why there is none."""
         from exfit.results.side_by_side import NOT_ACCEPTED
 
         if self.status != "done":
@@ -139,7 +139,7 @@ class CaseSummary:
 
 
 def facts_of(content: Mapping[str, Any]) -> CaseFacts:
-    """Return what the content of a case file, faulty or not, says of its unit."""
+    """Read the unit from the content of a case file, faulty or not."""
     as_found, plant = _mapping(content.get("as_found")), _mapping(content.get("plant"))
     bus, machine_id = as_found.get("bus"), as_found.get("id")
     bus = bus if isinstance(bus, int) and not isinstance(bus, bool) else None
@@ -154,7 +154,7 @@ def facts_of(content: Mapping[str, Any]) -> CaseFacts:
 
 
 def _unit(about: Mapping[Any, Any], bus: int | None, machine_id: str | None) -> str:
-    """Return what a case calls its unit, else its place in the planner's file in words."""
+    """Name the unit as its case does, else by its place in the planner's file."""
     facts = {str(key): _text(fact) for key, fact in about.items()}
     machine = None if machine_id is None else f"machine {machine_id}"
     place = filter(None, (None if bus is None else f"bus {bus}", machine))
@@ -224,7 +224,7 @@ def _validation(validations: "Sequence[Comparison]") -> SummaryValidation:
 
 
 def _unresolved(result: "FitResult") -> tuple[str, ...]:
-    """Return what the records do not determine, as the verdict counts it.
+    """List the parameters that the records do not determine, as the verdict counts them.
 
     A parameter whose interval was not looked for, as without a global search, or that has none as
     the response misses the records, is none of these.

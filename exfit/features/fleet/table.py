@@ -112,7 +112,7 @@ def text_cell(text: str) -> str:
 
 
 def _beside_sisters(place: tuple[SisterParameter, SisterValue] | None, remark: str) -> list[str]:
-    """Return what the comparison says of a parameter, of one without sisters a remark alone."""
+    """Write the comparison of a parameter, for one without sisters a remark alone."""
     if place is None:
         return [""] * len(PARAMETER_COLUMNS[11:-1]) + [remark]
     parameter, value = place

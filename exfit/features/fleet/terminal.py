@@ -151,7 +151,7 @@ class BatchProgress:
         return Text(", ").join(words)
 
     def _now(self, now: float) -> Text:
-        """Return what runs, the longest first."""
+        """Name the cases that run, the longest first."""
         longest = sorted(self._running.items(), key=lambda item: item[1])
         names = [
             f"{_name(case)} ({_duration(now - began)})" for case, began in longest[:MOST_RUNNING]

@@ -69,7 +69,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
 
 
 def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
-    """Write what all tests came to and their report, show it, and draw the figures."""
+    """Write the results of all tests and their report, show them, and draw the figures."""
     from exfit.features.programme import folder as programme_folder
     from exfit.features.programme.show import programme_blocks
     from exfit.features.report.writing import write_report

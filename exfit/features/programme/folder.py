@@ -41,7 +41,7 @@ def write_test(test: FinishedTest, folder: Path) -> None:
 
 
 def write_programme(result: ProgrammeResult, folder: Path) -> None:
-    """Write what all tests of a programme came to; raises ExfitError where that cannot be."""
+    """Write the summary of a programme; raises ExfitError where that is not possible."""
     write(folder / WHOLE_PROGRAMME, summary_text(result))
 
 

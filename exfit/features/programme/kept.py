@@ -1,4 +1,4 @@
-"""What a programme keeps of each test: its result, under a hash of all that goes into it."""
+"""The kept result of each test of a programme, under a hash of all that goes into it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class KeptTest:
 
 @dataclass(frozen=True)
 class KeptSummary:
-    """What programme.json holds beside its version; ``programme`` is the file that was run."""
+    """The content of programme.json but its version; ``programme`` is the file that was run."""
 
     tests: tuple[KeptTest, ...]
     programme: Path

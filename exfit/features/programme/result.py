@@ -54,7 +54,7 @@ class EnteredValue:
 
     @property
     def warning(self) -> str:
-        """What to look into, in a sentence; "" where nothing contradicts the value."""
+        """The contradiction of the file to the value, in a sentence; "" without one."""
         if not self.excluded or self.given is None:
             return ""
         low, high = map(self.rounded, self.interval)
@@ -83,7 +83,7 @@ class FinishedTest:
 
     @property
     def verdict(self) -> str:
-        """What it comes to, in the words of a fit's verdict."""
+        """The verdict, in the words of that of a fit."""
         return verdict_of(self.result)
 
     @property
@@ -139,7 +139,7 @@ class ProgrammeResult:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What contradicts the file of the programme, in sentences."""
+        """Contradictions to the file of the programme, in sentences."""
         return tuple(filter(None, (value.warning for value in self.values)))
 
     @property
@@ -175,10 +175,10 @@ class ProgrammeResult:
 
 
 def verdict_of(result: StepResult) -> str:
-    """Return what a test comes to, in the words of a fit's verdict."""
+    """Word the verdict of a test as that of a fit."""
     return outcome_of(result) if isinstance(result, FitResult) else result.verdict.verdict
 
 
 def reason_of(result: StepResult) -> str:
-    """Return what a test comes to in a sentence."""
+    """Word the verdict of a test in a sentence."""
     return explanation_of(result) if isinstance(result, FitResult) else result.verdict.reason

@@ -122,7 +122,7 @@ def refuse_unreadable(programme: Programme) -> None:
 
 
 def _readings(programme: Programme) -> "list[Callable[[], object]]":
-    """Return what reads each file of a programme."""
+    """Plan the reading of each file of a programme."""
     readings: list[Callable[[], object]] = []
     for step in steps_of(programme):
         section = None if step.name == FIT else programme.test(step.name)

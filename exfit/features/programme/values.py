@@ -1,4 +1,4 @@
-"""How what a test measured enters the tests after it.
+"""Measured values of a test, as they enter the tests after it.
 
 A value of the file stays where its source is more certain than a test: a fitted value replaces one
 that is typical or has no source stated, a measured one also one that was fitted; what was measured
@@ -28,7 +28,7 @@ Values = tuple[EnteredValue, ...]
 
 
 def values_given(test: FinishedTest, programme: Programme) -> Iterator[EnteredValue]:
-    """Yield what a finished test gives those after it, each beside what the file has there.
+    """Yield the values of a finished test for those after it, each beside that of the file.
 
     Only what the test limits on both sides counts, and only where its points or record are matched.
     """
@@ -69,7 +69,7 @@ def with_values(case: Case, values: Values) -> Case:
 
 
 def bases_of(values: Values) -> dict[str, tuple[float, str]]:
-    """Return what 1 pu is of a signal, and in which unit, by what the tests gave."""
+    """Collect the bases that tests gave, by signal: 1 pu, and its unit."""
     return {
         value.name.removesuffix(BASE): (value.value, value.unit)
         for value in values

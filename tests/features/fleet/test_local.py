@@ -11,7 +11,7 @@ from batches import Events, case_file, record_file, table_of, troubled
 
 import exfit
 from exfit.errors import ExfitError
-from exfit.features.fleet import processes
+from exfit.features.fleet import local
 from exfit.features.fleet.folder import IndexEntry
 from exfit.features.fleet.local import Waiting
 from exfit.features.fleet.local import in_this_process as here
@@ -77,7 +77,7 @@ def test_workers_compute_what_this_process_does(tmp_path):
 
 
 def test_workers_that_cannot_be_started_end_the_batch_with_the_reason(tmp_path, monkeypatch):
-    monkeypatch.setattr(processes, "PROGRAM", "raise SystemExit('no such computer')")
+    monkeypatch.setattr(local, "PROGRAM", "raise SystemExit('no such computer')")
     case = case_file(tmp_path / "a.yaml", record_file(tmp_path / "a.csv"))
     with pytest.raises(ExfitError, match=r"no worker can be started: .*no such computer"):
         exfit.batch(case, tmp_path / "fleet", workers=1)

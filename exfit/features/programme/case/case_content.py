@@ -53,7 +53,7 @@ def tests_of_kind(content: Content, *kinds: str) -> Iterator[tuple[int, Content]
 
 
 def common_content(content: Content) -> CaseContent:
-    """Return what all tests of a programme share, as a case without a record."""
+    """Build the content of the case without a record that all tests share."""
     shared = {key: value for key, value in content.items() if key not in (TESTS, "records")}
     return CaseContent({**shared, "records": []})
 
@@ -150,7 +150,7 @@ def _with_free(plant: Content, free: Content) -> Content:
 
 
 def _places_of_recording(place: Place, index: int) -> dict[Place, Place | None]:
-    """Return where a record of a case stands; names are checked with those of all tests."""
+    """Map the places of a record to those in the file; names are checked with all others."""
     return {place: (TESTS, index), (*place, "name"): None}
 
 

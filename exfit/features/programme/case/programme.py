@@ -80,7 +80,7 @@ class Programme:
         return next(test for test in self.tests if test.name == name)
 
     def content_of(self, name: str) -> Content:
-        """Return what the file says of a test, and nothing of others; of "fit" of all bump tests.
+        """Select the content of a test, and nothing of others; of "fit" that of all bump tests.
 
         It holds all from which the result of the test follows but values that others measured, and
         the files that it names.
@@ -112,7 +112,7 @@ class Programme:
         return replace(self, content=content, tests=self._document(content).programme)
 
     def shared_case(self) -> Case:
-        """Return what all tests share, as a case without a record."""
+        """Build the case without a record that all tests share."""
         return self.single or self._case(common_content(dict(self.content)))
 
     def bump_case(self) -> Case:
@@ -163,7 +163,7 @@ def load_programme(path: Path) -> Programme:
 
 
 def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
-    """Yield what contradicts itself in a programme, or in one of its cases."""
+    """Yield contradictions in a programme, or in one of its cases."""
     top = ContentNode((), content)
     for key in IN_PLACE_OF_TESTS:
         if key in content:
@@ -192,7 +192,7 @@ def _use_faults(tests: list[ContentNode]) -> Iterator[Fault]:
 
 
 def _machine_faults(tests: list[ContentNode], kind: PlantKind) -> Iterator[Fault]:
-    """Yield what contradicts itself in the tests of the machine, or that there is none."""
+    """Yield contradictions in the tests of the machine, or that there is no machine."""
     for test in tests:
         of_test = test.at("kind").text
         if of_test in (SATURATION, STEADY, REJECTION) and not kind.has_machine:
@@ -226,7 +226,7 @@ class ProgrammeStep:
 
 
 def steps_of(programme: Programme) -> tuple[ProgrammeStep, ...]:
-    """Return what a programme runs, in this order; within a kind in that of the file."""
+    """List the steps of a programme in their order, within a kind in that of the file."""
     case = programme.single
     if case is not None:
         names = (recording.name for recording in (*case.recordings, *case.validations))

@@ -1,4 +1,4 @@
-"""What contradicts itself in the tests at rest of a programme, given in place or in a file."""
+"""Contradictions in the tests at rest of a programme, given in place or in a file."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +14,7 @@ AUTO = "auto"
 
 
 def steady_test_faults(test: ContentNode) -> Iterator[Fault]:
-    """Yield what contradicts itself in the points of a steady test, beside what is free."""
+    """Yield contradictions in the points of a steady test, beside its free parameters."""
     yield from points_faults(test, POINT_SIGNALS, TERMINALS)
     if "points" not in test:
         yield from _field_faults(test)
@@ -43,7 +43,7 @@ def _column_faults(signal: str, column: ContentNode) -> Iterator[Fault]:
 
 
 def _terminal_faults(column: ContentNode) -> Iterator[Fault]:
-    """Yield what only a column of the field may have."""
+    """Yield keys that only a column of the field may have."""
     fields = " or ".join(FIELDS)
     if column.at("base").is_section:
         yield column.at("base").fault(f"must be a number: only that of {fields} can be fitted")
@@ -117,7 +117,7 @@ def _file_faults(columns: ContentNode, needed: Sequence[str]) -> Iterator[Fault]
 
 
 def saturation_test_faults(test: ContentNode) -> Iterator[Fault]:
-    """Yield what contradicts itself in a saturation test."""
+    """Yield contradictions in a saturation test."""
     yield from points_faults(test, CURVE_SIGNALS, CURVE_SIGNALS[:2])
     yield from _unit_faults(test.at("columns"))
     yield from _winding_faults(test)

@@ -1,1 +1,1 @@
-"""What a programme shows: in the terminal, as figures, and as the page of its report."""
+"""A programme shown: in the terminal, as figures, and as the page of its report."""

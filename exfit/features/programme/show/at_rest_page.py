@@ -53,7 +53,7 @@ class VCurveView:
 
 
 def saturation_view(result: SaturationResult, key: str) -> SaturationView:
-    """Return what a saturation test shows; ``key`` begins the ids of its chart."""
+    """View a saturation test; ``key`` begins the ids of its chart."""
     return SaturationView(
         form=result.form,
         rows=tuple(_rows(result)),
@@ -64,7 +64,7 @@ def saturation_view(result: SaturationResult, key: str) -> SaturationView:
 
 
 def v_curve_view(result: VCurve, key: str) -> VCurveView:
-    """Return what points on load show; ``key`` begins the ids of its charts."""
+    """View points on load; ``key`` begins the ids of its charts."""
     return VCurveView(
         machine=result.machine,
         verdict=f"{result.verdict.verdict}: {result.verdict.reason}",

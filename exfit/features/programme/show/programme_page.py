@@ -34,7 +34,7 @@ class ProgrammeView:
 
 
 def programme_page(result: ProgrammeResult, folder: Path) -> Page:
-    """Return what the page of a programme shows."""
+    """Build the page of a programme."""
     sections = [_overview(result)]
     for number, test in enumerate(result.tests, 1):
         if test.result is not result.fit:
@@ -51,7 +51,7 @@ def programme_page(result: ProgrammeResult, folder: Path) -> Page:
 
 
 def _headline(result: ProgrammeResult) -> Headline:
-    """Return what a programme without bump tests comes to."""
+    """Word the outcome of a programme without bump tests."""
     words = "; ".join(f"{test.name}: {test.verdict}" for test in result.tests)
     word = "All tests are matched" if result.holds else "Not all tests are matched"
     return Headline(f"{word}.", f"{words}.", result.holds, ())

@@ -111,7 +111,7 @@ class FieldsOnLoad:
 
     @property
     def blocks(self) -> tuple[ResidualBlock, ...]:
-        """Where the errors of each field signal are."""
+        """Slices of the errors of each field signal."""
         count = len(self.points.p)
         return tuple(
             ResidualBlock(

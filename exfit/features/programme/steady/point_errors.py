@@ -55,7 +55,7 @@ def allowing_for_errors(
 def _change(
     problem: PointProblem, values: Mapping[str, float], name: str, std_error: float
 ) -> Array:
-    """Return by how much a standard error of a value changes the errors of the points (M,)."""
+    """Change of the errors of the points (M,) by one standard error of a value."""
     change, sides = np.zeros_like(problem.errors(values)), 0
     for step in (-STEP, STEP):
         moved = problem.errors({**values, name: values[name] + step * std_error})

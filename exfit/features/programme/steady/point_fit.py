@@ -115,7 +115,7 @@ class FittedPoints:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """What the points do not determine, in words."""
+        """Parameters that the points do not determine, in words."""
         by_reason: dict[str, list[str]] = {}
         for name, known in self.confidence.parameters.items():
             if known.why is not None:
@@ -125,7 +125,7 @@ class FittedPoints:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is remarkable about the noise of the points and the intervals, in words."""
+        """Remarks on the noise of the points and on the intervals, in words."""
         if not self.allowed_for:
             return self.confidence.sentences
         errors = f"the intervals allow for the errors of {listed(self.allowed_for)} (given)"
@@ -236,7 +236,7 @@ def linearisation(problem: PointProblem, values: Values) -> Linearisation:
 
 
 def by_profile(known: Uncertainty, made: PointProfile) -> Uncertainty:
-    """Return what is known of a parameter by its profile."""
+    """Read the interval of a parameter from its profile."""
     profile = made.profile
     parameter = made.problem.free[profile.index]
     limits = [None if end is None else parameter.value(end) for end in (profile.low, profile.high)]
@@ -246,7 +246,7 @@ def by_profile(known: Uncertainty, made: PointProfile) -> Uncertainty:
 
 
 def open_sides(parameter: FreeParameter, profile: estimate.CostProfile) -> Iterator[str]:
-    """Yield why a profile has no limit on a side."""
+    """Yield the reasons why a profile has no limit on a side."""
     bounds = (f"its min {parameter.low:.4g}", f"its max {parameter.high:.4g}")
     limits = (profile.low, profile.high)
     for side, limit, end, bound in zip(

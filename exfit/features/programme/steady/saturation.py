@@ -45,7 +45,7 @@ COPPER = 234.5  # degrees C below zero, where its resistance would vanish (IEEE 
 
 
 class FieldWinding(NamedTuple):
-    """What is known of the field winding: its resistance at a temperature, and that when hot."""
+    """The field winding: its resistance at a temperature, and its temperature when hot."""
 
     resistance: float | None = None
     temperature: float | None = None
@@ -73,7 +73,7 @@ def saturation_curve(
     winding: FieldWinding = UNKNOWN_WINDING,
     exciter: bool = False,
 ) -> SaturationResult:
-    """Return what an open-circuit saturation test shows.
+    """Fit the curve of an open-circuit saturation test.
 
     Args:
         vt: (M,), pu, in the order in which the points were taken.
@@ -147,7 +147,7 @@ def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:
 
 
 def directions(vt: Array) -> Array:
-    """Return whether each point (M,) was reached with rising voltage, 1, or falling, -1.
+    """Find the direction (M,) in which each point was reached: voltage rising, 1, or falling, -1.
 
     The voltage turns where it goes back from its extreme by more than TURN.
     """
@@ -166,7 +166,7 @@ def directions(vt: Array) -> Array:
 
 
 def refutes(best: FormFit, other: FormFit) -> bool:
-    """Return whether one form fits so much better that the other is none of the curve's.
+    """Find that one form fits so much better that the other is none of the curve's.
 
     As for an interval: by more than its cost may rise.
     """

@@ -53,7 +53,7 @@ class CurvePoints(NamedTuple):
 
     @property
     def branches(self) -> int:
-        """How many branches there are: 1, or 2 with hysteresis to be seen."""
+        """Number of branches: 1, or 2 with hysteresis to be seen."""
         return len(np.unique(self.direction))
 
 
@@ -81,7 +81,7 @@ class FormFit:
         return np.asarray(self.weight * (simulated - self.points.ifd))
 
     def residuals(self, x: Array) -> Array:
-        """Return what is made small (M + 1,): the errors, and the offset by its prior."""
+        """Residuals (M + 1,): the errors, and the offset by its prior."""
         return np.append(self.errors(x), self.prior * x[OFFSET])
 
     def jacobian(self, x: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What limits the numbers of a saturation test, in sentences."""
+"""Limits of the numbers of a saturation test, in sentences."""
 
 from collections.abc import Iterator
 

@@ -166,7 +166,7 @@ class SaturationResult:
 
     @property
     def verdict(self) -> Verdict:
-        """What the test comes to: good only if the form is that of the points, and all is measured.
+        """The verdict: good only if the form is that of the points, and all is measured.
 
         A form that another one refutes matches as long as its residuals are within the limit: the
         intervals hold the values of the other.
@@ -181,7 +181,7 @@ class SaturationResult:
         return Verdict(GOOD, "the points determine the air-gap line and the saturation")
 
     def _doubts(self) -> Iterator[str]:
-        """Yield what keeps a test that matches from being good."""
+        """Yield the doubts that keep a test that matches from being good."""
         curve, best = self.curve, self.curves[0]
         values = {"the base of ifd": curve.ifd_base, "S10": curve.S10, "S12": curve.S12}
         names = [name for name, value in values.items() if not value.determined]

@@ -69,12 +69,12 @@ def steady(
 
 
 def given_base(column: PointColumn) -> float:
-    """Return what 1 pu is of a column, 1 where that is not given as a number."""
+    """Read the base of a column, 1 where it is not given as a number."""
     return column.base if isinstance(column.base, float) else 1.0
 
 
 def column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
-    """Return how a signal is converted to per unit; raises RecordError where it is not."""
+    """Complete the conversion of a signal to per unit; raises RecordError for an unknown one."""
     column = test.columns.get(signal) or PointColumn()
     unit = column.unit or points.units.get(signal) or "pu"
     if column.base is None and column.scale == 1.0 and needs_base(unit):
@@ -105,7 +105,7 @@ DEFAULT_UNITS = MappingProxyType({"vt": "pu", **dict(zip(FIELDS, ("A", "V"), str
 
 
 def saturation(test: SaturationTest, points: Points, machine: Machine | None) -> SaturationResult:
-    """Return what a saturation test shows of a machine, whose model decides which form is used.
+    """Evaluate a saturation test of a machine, whose model decides which form is used.
 
     Raises ExfitError for input that cannot be used.
     """
@@ -130,7 +130,7 @@ def saturation(test: SaturationTest, points: Points, machine: Machine | None) ->
 
 
 def machine_values(result: SaturationResult) -> Mapping[str, MeasuredValue]:
-    """Return what the test gives the machine's section: S10 and S12, nothing of a brushless unit.
+    """Select S10 and S12 for the machine's section; nothing of a brushless unit.
 
     They enter it with ``sources: measured``.
     """
@@ -140,7 +140,7 @@ def machine_values(result: SaturationResult) -> Mapping[str, MeasuredValue]:
 
 
 def channel_bases(result: SaturationResult) -> Mapping[str, tuple[MeasuredValue, str]]:
-    """Return what 1 pu is of ifd and, where it is known, of efd, each with its unit.
+    """Collect the bases of ifd and, where it is known, of efd, each with its unit.
 
     It is the base of channels of later records that are in that unit and give none.
     """

@@ -190,7 +190,7 @@ def _verdict(
 
 
 def _match(reading: FieldReading) -> str:
-    """Return how a field signal matches, in words: rms beside the limit, and the noise."""
+    """Word the match of a field signal: rms beside the limit, and the noise."""
     beside = "within" if reading.matches else "beyond"
     noise = "" if reading.noise is None else f", noise {reading.noise:.2g} pu"
     worst = reading.worst

@@ -1,4 +1,4 @@
-"""Why points on load are not matched: the one thing that, if it were another, would match them."""
+"""Causes of points on load that are not matched: one thing that, if another, would match them."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -33,7 +33,7 @@ class TrialOfPoints(NamedTuple):
 
 
 def causes_of(fields: FieldsOnLoad, values: Values, problem: PointProblem) -> tuple[Cause, ...]:
-    """Return what would match the points much better if it were another, the likeliest first.
+    """Find the things that, if another, would match the points much better, the likeliest first.
 
     One by one Xd, Xq, the saturation and each base that the problem does not fit is fitted as well,
     and the reactive power reversed; what the problem fits is fitted again from its start.
