@@ -17,11 +17,8 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit import estimate
-from exfit.case.schema import Estimate
 from exfit.fitting.descents import minimum_near
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -35,39 +32,14 @@ WEIGHT_TOLERANCE = 0.02  # of a weight: so small a change moves no parameter by 
 OTHER_MINIMUM = 0.1  # of a weight: a larger change shows that another minimum was found
 
 
-def searched(
-    problem: FitProblem,
-    options: Estimate,
-    search: Callable[[FitProblem], SearchResult],
-    counter: SimulationCounter | None = None,
-) -> tuple[FitProblem, SearchResult]:
-    """Return the problem with the weights that the options ask for, and its search."""
-    if options.weights == "balanced":
-        return balanced_search(problem, search, counter)
-    return problem, search(problem)
+def other_deviations(problem: FitProblem, theta: Array) -> Array | None:
+    """Find the deviations (channels,) of residuals in a minimum theta (N,) with other weights.
 
-
-def balanced_search(
-    problem: FitProblem,
-    search: Callable[[FitProblem], SearchResult],
-    counter: SimulationCounter | None = None,
-) -> tuple[FitProblem, SearchResult]:
-    """Return the problem with the weights that balance its channels, and its search.
-
-    The weights come from descents from the start of the case; where the search ends in a minimum
-    with other ones, from there. Raises KeyboardInterrupt where an interruption ends the descents.
+    None where the weights are those of this minimum.
     """
-    problem = balanced(problem, problem.residuals.start, counter)
-    found = search(problem)
-    for _ in range(MOST_SEARCHES - 1):
-        if found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED:
-            break
-        deviations = residual_deviations(problem.compressed, found.best.x)
-        if _agree(deviations, _deviations_used(problem.residuals), OTHER_MINIMUM):
-            break
-        problem = balanced(problem, found.best.x, counter, deviations)
-        found = search(problem)
-    return problem, found
+    deviations = residual_deviations(problem.compressed, theta)
+    used = [channel.residual_deviation or np.nan for channel in problem.residuals.channels]
+    return None if _agree(deviations, np.array(used), OTHER_MINIMUM) else deviations
 
 
 def balanced(
@@ -137,10 +109,6 @@ def _movements(residuals: Residuals) -> Array:
     """Return the standard deviation (channels,) of what each channel shows, per unit."""
     movements = [float(np.std(channel.measured[channel.kept])) for channel in residuals.channels]
     return np.maximum(movements, LEAST_NOISE)
-
-
-def _deviations_used(residuals: Residuals) -> Array:
-    return np.array([channel.residual_deviation or np.nan for channel in residuals.channels])
 
 
 def _agree(before: Array, after: Array, tolerance: float) -> bool:

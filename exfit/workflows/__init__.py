@@ -63,15 +63,14 @@ def fit(
     """
     from exfit.fitting.program import program_of
     from exfit.fitting.search import checked_strategy, search_options
-    from exfit.workflows.fit_run import FitRequest, fit_result
+    from exfit.workflows.fit_run import fit_result
     from exfit.workflows.given_values import with_values
 
     case = with_values(loaded(case, values), values)
     method = checked_strategy(strategy or case.estimate.strategy)
     options = search_options(case, search)
     with program_of(case) as program:
-        request = FitRequest(case, method, options, progress, search_progress, live)
-        return fit_result(request, program)
+        return fit_result(case, method, options, program, progress, search_progress, live)
 
 
 def load_case(path: str | PathLike[str]) -> Case:

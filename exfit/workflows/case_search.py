@@ -1,8 +1,11 @@
-"""The search for the parameters of a case: weighted, judged, and continued where profiles lead."""
+"""The search for the parameters of a case: stages, each of which takes the state further.
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
+They are read from top to bottom, in `SEARCH` and `STAGES`; why each is there stands in it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +13,14 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
-from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
-from exfit.fitting.descents import Announce
+from exfit.fitting.channel_weights import (
+    MOST_SEARCHES,
+    as_fitted,
+    balanced,
+    other_deviations,
+    weighted_alike,
+)
+from exfit.fitting.descents import Announce, Judge
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.nuisances.found_lines import with_found_lines
@@ -29,174 +38,238 @@ from exfit.results.intervals.determination import (
     without_linear_intervals,
 )
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
-from exfit.util.strategies import WEIGHED_BY_NOISE
+from exfit.util.strategies import FROM_FURTHER_STARTS, WEIGHED_BY_NOISE
 from exfit.workflows.choice_by_validation import judge_of
 
 Array = NDArray[np.float64]
-Watch = Callable[[estimate.Progress], None]
 
+UNKNOWN = Determination(None)
 MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
 
 
-class SearchTask(NamedTuple):
-    """What a case is searched with: the tests of the fit, ``unseen`` ones, the settings."""
+def _ignore(*_: object) -> None:
+    """Ignore how far a search is."""
+
+
+@dataclass(frozen=True)
+class SearchState:
+    """How far the search of a case is.
+
+    ``setups`` are its tests, ``unseen`` those of the validations. ``problem`` has the weights that
+    were found until now; ``found`` is the search of it, ``determined`` how well the records
+    determine what it found. ``line_notes`` say which periodic disturbances are fitted.
+    ``announce(state, line)`` is called with each line of the path to the result, ``watch`` with how
+    far the rest is.
+    """
 
     case: Case
     setups: tuple[ExperimentSetup, ...]
     unseen: tuple[ExperimentSetup, ...]
+    problem: FitProblem
     method: str
     options: Estimate
-    counter: SimulationCounter
     program: Program | None = None
+    announce: "Callable[[SearchState, estimate.SolverIteration], None]" = _ignore
+    watch: Callable[[estimate.Progress], None] = _ignore
+    counter: SimulationCounter = field(default_factory=SimulationCounter)
+    searched: SearchResult | None = None
+    determined: Determination = UNKNOWN
+    line_notes: tuple[str, ...] = ()
+
+    @property
+    def found(self) -> SearchResult:
+        """The search until now."""
+        assert self.searched is not None
+        return self.searched
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether an interruption ended the search."""
+        return self.found.interrupted or self.found.best.stop is estimate.Stop.INTERRUPTED
+
+    @property
+    def fitted(self) -> tuple[ExperimentSetup, ...]:
+        """The tests with the weights of the problem."""
+        return as_fitted(self.setups, self.problem)
+
+    @property
+    def on_line(self) -> Announce:
+        """What is called with each line of the path."""
+        return partial(self.announce, self)
+
+    def continued(
+        self,
+        problem: FitProblem,
+        found: SearchResult,
+        point: Array,
+        phase: str = FROM_FURTHER_STARTS,
+        judge: Judge | None = None,
+    ) -> SearchResult:
+        """Search on from a point (N,) with a lower cost than the best one found."""
+        rest = self.on_line, self.counter, self.options, phase, judge
+        return continued_from(point, found, problem, *rest)
 
 
-class SearchOutcome(NamedTuple):
-    """The problem and the tests with the weights of the fit, the search, what it determines."""
-
-    problem: FitProblem
-    setups: tuple[ExperimentSetup, ...]
-    unseen: tuple[ExperimentSetup, ...]
-    found: SearchResult
-    determined: Determination
+Stage = Callable[[SearchState], SearchState]
 
 
-def search_outcome(
-    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
-) -> SearchOutcome:
-    """Return the best point of a case and how well it is determined.
+def in_turn(stages: Sequence[Stage], state: SearchState) -> SearchState:
+    """Take a state through stages, one after the other."""
+    for stage in stages:
+        state = stage(state)
+    return state
 
-    Where profiles lead to a lower minimum the search goes on from there.
+
+def lines(state: SearchState) -> SearchState:
+    """Fit sines to the periodic disturbances that the residuals of a first search show.
+
+    Before that search nothing tells them from a response. Raises KeyboardInterrupt where an
+    interruption ends it.
     """
-    options, counter = task.options, task.counter
-    problem, found = weighed_search(task, problem, announce, progress)
-    setups, unseen = as_fitted(task.setups, problem), task.unseen
-    if task.program is not None:
-        values = problem.residuals.values(found.best.x)
-        setups = task.program.settled(setups, values, problem.residuals)
-        unseen = task.program.settled(unseen, values)
-        problem = with_setups(problem, setups)
-    if options.weights == "balanced":
+    if not any(setup.automatic_sines for setup in state.setups):
+        return state
+    first = in_turn((*WEIGHTED, samples_at_steps), replace(state, announce=_ignore))
+    if first.interrupted:
+        raise KeyboardInterrupt
+    at = first.problem.residuals, first.found.best.x
+    setups, notes = with_found_lines(state.setups, *at)
+    problem = problem_of(residuals_of(state.case, setups))
+    return replace(state, setups=setups, problem=problem, line_notes=notes)
+
+
+def weights(state: SearchState) -> SearchState:
+    """Balance the channels, where the case asks for it, by the minimum near its start.
+
+    What a model can match of each signal is known in a minimum only.
+    """
+    if state.options.weights != "balanced":
+        return state
+    start = state.problem.residuals.start
+    return replace(state, problem=balanced(state.problem, start, state.counter))
+
+
+def descents(state: SearchState) -> SearchState:
+    """Descend from the start of the case and, in a global search, from others.
+
+    Of minima that the records do not tell apart it is one on which the validations hold.
+    """
+    case, problem, judge = state.case, state.problem, None
+    if state.program is None:  # whose runs are too dear to judge its ends
+        judge = judge_of(case, problem, state.setups, state.unseen)
+    settings = state.counter, state.options, judge, state.program
+    found = search(case, problem, state.method, state.on_line, state.watch, *settings)
+    return replace(state, searched=found)
+
+
+def weights_of_minimum(state: SearchState) -> SearchState:
+    """Balance and search anew where the search ended in a minimum with other weights."""
+    if state.options.weights != "balanced":
+        return state
+    for _ in range(MOST_SEARCHES - 1):
+        if state.interrupted:
+            break
+        x = state.found.best.x
+        deviations = other_deviations(state.problem, x)
+        if deviations is None:
+            break
+        problem = balanced(state.problem, x, state.counter, deviations)
+        state = descents(replace(state, problem=problem))
+    return state
+
+
+def samples_at_steps(state: SearchState) -> SearchState:
+    """Leave out samples at the instant of a step that contradict all others, and search anew.
+
+    A recorder may have taken them before the step or after it. Notes name them.
+    """
+    if state.interrupted:
+        return state
+    problem, notes = without_contradicting_samples(state.problem, state.found.best.x)
+    if not notes:
+        return state
+    fewer = replace(state, problem=problem, setups=as_fitted(state.setups, problem))
+    again = in_turn(WEIGHTED, fewer)
+    found = again.found._replace(notes=(*again.found.notes, *notes))
+    return replace(again, setups=state.setups, searched=found)
+
+
+def driving_noise(state: SearchState) -> SearchState:
+    """Weight the errors by the noise of recorded signals that drive the simulation.
+
+    It is in the errors of all signals at once, and biases the parameters.
+    """
+    if state.interrupted or not state.case.kind.finds_rest:
+        return state
+
+    def proceed(problem: FitProblem, found: SearchResult, point: Array) -> SearchResult:
+        return state.continued(problem, found, point, WEIGHED_BY_NOISE)
+
+    stage = parts("INPUT_NOISE")["weighed search"].load()
+    problem, found = stage(state.problem, state.fitted, state.found, proceed, state.watch)
+    return replace(state, problem=problem, searched=found)
+
+
+def settled(state: SearchState) -> SearchState:
+    """Prepare the tests for what follows: no run of a program more, validations weighted alike."""
+    problem, unseen = state.problem, state.unseen
+    if state.program is not None:
+        values = problem.residuals.values(state.found.best.x)
+        setups = state.program.settled(state.fitted, values, problem.residuals)
+        problem, unseen = with_setups(problem, setups), state.program.settled(unseen, values)
+    if state.options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
-    if task.program is not None:
-        determined = determined_by_twin(task, problem, found, setups, progress)
-        return SearchOutcome(problem, setups, unseen, found, determined)
-    profiled = options.search != "local"
-    determined = determination(problem, found, setups, profiled, progress)
-    judge = judge_of(task.case, problem, setups, unseen)
+    return replace(state, problem=problem, unseen=unseen)
+
+
+def profiles(state: SearchState) -> SearchState:
+    """Find how well the records determine the parameters, by profiles where linear theory fails.
+
+    Where these lead to a lower minimum the search goes on from there.
+    """
+    if state.program is not None:
+        return _profiles_by_twin(state, state.program)
+    problem, found, setups = state.problem, state.found, state.fitted
+    profiled = state.options.search != "local"
+    determined = determination(problem, found, setups, profiled, state.watch)
+    judge = judge_of(state.case, problem, setups, state.unseen)
     for _ in range(MOST_MINIMA):
         if determined.lower is None:
             break
-        found = continued_from(
-            determined.lower, found, problem, announce, counter, options, judge=judge
-        )
-        determined = determination(problem, found, setups, profiled, progress)
-    return SearchOutcome(problem, setups, unseen, found, determined)
+        found = state.continued(problem, found, determined.lower, judge=judge)
+        determined = determination(problem, found, setups, profiled, state.watch)
+    return replace(state, searched=found, determined=determined)
 
 
-def determined_by_twin(
-    task: SearchTask,
-    problem: FitProblem,
-    found: SearchResult,
-    setups: tuple[ExperimentSetup, ...],
-    progress: Watch,
-) -> Determination:
-    """Return how well the records determine the parameters of a program, by its corrected twin.
+def _profiles_by_twin(state: SearchState, program: Program) -> SearchState:
+    """Find how well the records determine the parameters of a program, by its corrected twin.
 
     Profiles take no run. Where they lead to a lower cost, which the program need not have, the
     result is not at the minimum of the corrected twin. The intervals are those of linear theory
     then, which is judged at that minimum; without a twin they are so as well.
     """
-    if task.case.has_no_equations:
-        return determination(problem, found, setups, False, progress)
-    determined = determination(problem, found, setups, True, progress)
+    problem, found, setups = state.problem, state.found, state.fitted
+    determined = determination(problem, found, setups, program.has_twin, state.watch)
     if determined.lower is None:
-        return determined
-    counter, of_record = SimulationCounter(), names_of_records(setups)
+        return replace(state, determined=determined)
+    of_record = names_of_records(setups)
     try:
-        of_twin = continued_from(
-            determined.lower, found, problem, lambda _: None, counter, task.options
-        ).best
-        own, there = (
-            uncertainty_of_solution(problem, point, of_record)
-            for point in (found.best.x, of_twin.x)
-        )
+        quiet = replace(state, announce=_ignore, counter=SimulationCounter())
+        of_twin = quiet.continued(problem, found, determined.lower).best
+        own = uncertainty_of_solution(problem, found.best.x, of_record)
+        there = uncertainty_of_solution(problem, of_twin.x, of_record)
     except KeyboardInterrupt:
-        return Determination(None, interrupted=True)
+        return replace(state, determined=Determination(None, interrupted=True))
     if own is None or there is None:
-        return Determination(None)
+        return replace(state, determined=Determination(None))
     if found.best.cost - of_twin.cost > max(own.rises.values(), default=0.0):  # another minimum
-        return determination(problem, found, setups, False, progress)
+        determined = determination(problem, found, setups, False, state.watch)
+        return replace(state, determined=determined)
     names = not_served_by_linear_theory(problem.residuals, of_twin.x, there, of_record)
     own = replace(own, nonlinear=there.nonlinear)
-    return Determination(without_linear_intervals(own, names, NEEDS_PROFILE))
+    determined = Determination(without_linear_intervals(own, names, NEEDS_PROFILE))
+    return replace(state, determined=determined)
 
 
-def with_lines(
-    task: SearchTask, problem: FitProblem, progress: Watch
-) -> tuple[SearchTask, FitProblem, tuple[str, ...]]:
-    """Return the tests and the problem with the lines that residuals of a first search show.
-
-    Notes say which. Raises KeyboardInterrupt where an interruption ended that search.
-    """
-    if not any(setup.automatic_sines for setup in task.setups):
-        return task, problem, ()
-    weighted, first = weighted_search(task, problem, lambda _: None, progress)
-    if first.interrupted or first.best.stop is estimate.Stop.INTERRUPTED:
-        raise KeyboardInterrupt
-    setups, notes = with_found_lines(task.setups, weighted.residuals, first.best.x)
-    disturbed = problem_of(residuals_of(task.case, setups))
-    return task._replace(setups=setups), disturbed, notes
-
-
-def weighed_search(
-    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
-) -> tuple[FitProblem, SearchResult]:
-    """Return the problem weighed by the noise of the signals that drive its events, and its search.
-
-    It is that of `weighted_search` for tests that no event drives.
-    """
-    problem, found = weighted_search(task, problem, announce, progress)
-    ended = found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED
-    if ended or not task.case.kind.finds_rest:
-        return problem, found
-
-    def proceed(weighed: FitProblem, found: SearchResult, point: Array) -> SearchResult:
-        counter, options = task.counter, task.options
-        return continued_from(point, found, weighed, announce, counter, options, WEIGHED_BY_NOISE)
-
-    weigh = parts("INPUT_NOISE")["weighed search"].load()
-    weighed: tuple[FitProblem, SearchResult] = weigh(
-        problem, as_fitted(task.setups, problem), found, proceed, progress
-    )
-    return weighed
-
-
-def weighted_search(
-    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
-) -> tuple[FitProblem, SearchResult]:
-    """Return the problem with the weights that the case asks for, and its search.
-
-    Without the samples at the instant of a step that contradict all others, which notes name.
-    """
-    problem, found = _weighted_search(task, problem, announce, progress)
-    if found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED:
-        return problem, found
-    fewer, notes = without_contradicting_samples(problem, found.best.x)
-    if not notes:
-        return problem, found
-    task = task._replace(setups=as_fitted(task.setups, fewer))
-    problem, found = _weighted_search(task, fewer, announce, progress)
-    return problem, found._replace(notes=(*found.notes, *notes))
-
-
-def _weighted_search(
-    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
-) -> tuple[FitProblem, SearchResult]:
-    def search_of(problem: FitProblem) -> SearchResult:
-        program, judge = task.program, None
-        if program is None:  # whose runs are too dear to judge its ends
-            judge = judge_of(task.case, problem, task.setups, task.unseen)
-        rest = task.counter, task.options, judge, program
-        return search(task.case, problem, task.method, announce, progress, *rest)
-
-    return searched(problem, task.options, search_of, task.counter)
+WEIGHTED: tuple[Stage, ...] = (weights, descents, weights_of_minimum)
+SEARCH: tuple[Stage, ...] = (lines, *WEIGHTED, samples_at_steps, driving_noise)
+STAGES: tuple[Stage, ...] = (*SEARCH, settled, profiles)

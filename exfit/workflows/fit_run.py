@@ -2,7 +2,6 @@
 
 import time as clock
 from collections.abc import Callable
-from typing import NamedTuple
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -10,14 +9,13 @@ from exfit.case.schema import Estimate
 from exfit.fitting.build import build_experiment
 from exfit.fitting.program import Program
 from exfit.fitting.search import fitted
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.intervals.minima import minima_notes, minima_of
 from exfit.results.model import FitResult, Iteration
 from exfit.util.versions import versions
 from exfit.verdict.causes import Pace
 from exfit.verdict.causes.pace import time_for_causes
 from exfit.verdict.rule import verdict_of
-from exfit.workflows.case_search import SearchTask, search_outcome, with_lines
+from exfit.workflows.case_search import STAGES, SearchState, in_turn
 from exfit.workflows.descriptions.case_description import (
     criteria_of,
     fixed_values,
@@ -46,45 +44,40 @@ from exfit.workflows.solution import (
 LINEAR_ALONE = "no twin: intervals are those of linear theory, by quotients at the result"
 
 
-class FitRequest(NamedTuple):
-    """What is fitted, how, and what is called meanwhile; see `exfit.fit`."""
-
-    case: Case
-    method: str
-    options: Estimate
-    progress: Callable[[Iteration], None]
-    search_progress: Callable[[estimate.Progress], None]
-    live: Callable[[LiveResponse], None] | None
-
-
-def fit_result(request: FitRequest, program: Program | None) -> FitResult:
-    """Return the result of a fit, simulated by a program where one is given."""
+def fit_result(
+    case: Case,
+    method: str,
+    options: Estimate,
+    program: Program | None,
+    progress: Callable[[Iteration], None],
+    search_progress: Callable[[estimate.Progress], None],
+    live: Callable[[LiveResponse], None] | None,
+) -> FitResult:
+    """Fit a case, simulated by a program where one is given, as `exfit.fit` says."""
     began = clock.perf_counter()
     # of the processor, but for a program that runs beside it
     timer = clock.process_time if program is None else clock.perf_counter
     search_began = timer()
-    case, method, options, progress, search_progress, live = request
     start = case.values()
     setups, problem = fitted(case, program)
-    counter = SimulationCounter()
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
     if program is not None:
         unseen = program.simulated(unseen)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     hashes, case_text = input_hashes(case, used), text_of(case)
-    task = SearchTask(case, setups, unseen, method, options, counter, program)
-    task, problem, line_notes = with_lines(task, problem, search_progress)
-    residuals = problem.residuals
 
-    def announce(line: estimate.SolverIteration) -> None:
-        response = None if live is None else live_response(task.setups[0], residuals, line.x)
-        if live is not None and response is not None:
-            live(response)
+    def announce(state: SearchState, line: estimate.SolverIteration) -> None:
+        residuals = state.problem.residuals
+        if live is not None:
+            response = live_response(state.setups[0], residuals, line.x)
+            if response is not None:
+                live(response)
         progress(iteration_of(line, residuals))
 
-    outcome = search_outcome(task, problem, announce, search_progress)
-    problem, setups, unseen, found, determined = outcome
+    began_with = case, setups, unseen, problem, method, options, program
+    state = in_turn(STAGES, SearchState(*began_with, announce, search_progress))
+    problem, setups, unseen, found = state.problem, state.fitted, state.unseen, state.found
     residuals = problem.residuals
     best = found.best
     history = [iteration_of(line, residuals) for line in found.history]
@@ -92,7 +85,7 @@ def fit_result(request: FitRequest, program: Program | None) -> FitResult:
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
     analysis = analysed(
-        case, problem, best, determined, fine, comparisons, unseen, program, history
+        case, problem, best, state.determined, fine, comparisons, unseen, program, history
     )
     walked = problem.compressed if program is None else None
     minima = minima_of(residuals, found, analysis.uncertainty, walked)
@@ -137,12 +130,12 @@ def fit_result(request: FitRequest, program: Program | None) -> FitResult:
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
-        simulations=counter.simulations if program is None else program.runs,
-        substeps=counter.substeps,
+        simulations=state.counter.simulations if program is None else program.runs,
+        substeps=state.counter.substeps,
         seconds=clock.perf_counter() - began,
         notes=(
             *found.notes,
-            *line_notes,
+            *state.line_notes,
             *noted,
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
             *([] if program is None else program.notes([*setups, *unseen])),

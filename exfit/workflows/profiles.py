@@ -19,7 +19,6 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference.confidence import LEVEL, Interval
 from exfit.results.compare_with_record import compare_with_record
@@ -36,7 +35,7 @@ from exfit.util.text import error_of_interval, near, rounded_value
 from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.diagnostics import search_range_notes
 from exfit.verdict.rule import verdict_alone
-from exfit.workflows.case_search import SearchTask, weighed_search, with_lines
+from exfit.workflows.case_search import SEARCH, SearchState, in_turn
 
 Array = NDArray[np.float64]
 
@@ -239,13 +238,11 @@ def _found(
     options = case.estimate.to_the_minimum()
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
     unseen = tuple(build_experiment(case, recording, start) for recording in judged)
-    counter = SimulationCounter()
-    task = SearchTask(case, setups, unseen, options.strategy, options, counter, program)
-    task, problem, _ = with_lines(task, problem, progress)
-    problem, found = weighed_search(task, problem, lambda _: None, progress)
-    if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
+    at = case, setups, unseen, problem, options.strategy, options, program
+    state = in_turn(SEARCH, SearchState(*at, watch=progress))
+    if state.interrupted:
         raise KeyboardInterrupt
-    return task.setups, problem, found
+    return state.setups, state.problem, state.found
 
 
 def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:

@@ -32,9 +32,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from coverage_cases import HARD_CASES, noisy, truth_of
 from dense_profiles import dense_intervals
 
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.util.files import write
-from exfit.workflows.case_search import SearchTask, search_outcome
+from exfit.workflows.case_search import STAGES, SearchState, in_turn
 
 RECORDS, SEED = 500, 2026
 DENSE = 20
@@ -54,8 +53,8 @@ def record_of(task):
     rng = np.random.default_rng([seed, *name.encode(), number])
     case, setups, problem = noisy(name, rng)
     options = case.estimate
-    task = SearchTask(case, setups, (), options.strategy, options, SimulationCounter())
-    problem, _, _, search, determined = search_outcome(task, problem, ignore, ignore)
+    state = in_turn(STAGES, SearchState(case, setups, (), problem, options.strategy, options))
+    problem, search, determined = state.problem, state.found, state.determined
     uncertainty = determined.uncertainty
     fitted = problem.residuals.values(search.best.x)
     seconds = time.process_time() - began

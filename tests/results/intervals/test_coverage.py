@@ -11,9 +11,8 @@ from coverage_cases import HARD_CASES, covariance_of, exact, noisy, truth_of
 from scipy.stats import binom
 from tiers import few_of
 
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.inference.confidence import LEVEL
-from exfit.workflows.case_search import SearchTask, search_outcome
+from exfit.workflows.case_search import STAGES, SearchState, in_turn
 
 RECORDS = 8
 LEAST = binom.ppf(1e-3, RECORDS, LEVEL)  # fewer hold the truth in one of a thousand such tests
@@ -23,10 +22,9 @@ def printed(name, seed):
     """Return the intervals of a fit to one record, by parameter."""
     case, setups, problem = noisy(name, np.random.default_rng([seed, 1]))
     options = case.estimate.model_copy(update={"starts": 2})
-    task = SearchTask(
-        replace(case, estimate=options), setups, (), options.strategy, options, SimulationCounter()
-    )
-    determined = search_outcome(task, problem, lambda _: None, lambda _: None).determined
+    case = replace(case, estimate=options)
+    state = SearchState(case, setups, (), problem, options.strategy, options)
+    determined = in_turn(STAGES, state).determined
     return {
         parameter: known.interval
         for parameter, known in determined.uncertainty.confidence.parameters.items()

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from coverage_cases import HARD_CASES, noisy, truth_of
 
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.intervals.instants import (
     decided_by_few_samples,
     intervals_near,
     minima_between_samples,
 )
-from exfit.workflows.case_search import SearchTask, search_outcome
+from exfit.workflows.case_search import STAGES, SearchState, in_turn
 
 NAME, INSTANT = "st6b_instant", "vref.at"
 
@@ -48,8 +47,8 @@ def test_beside_an_instant_between_the_wrong_samples_a_lower_minimum_is_found(re
 def test_an_instant_that_one_sample_decides_is_said_to_be_so_and_has_no_interval(record):
     case, setups, problem = record
     options = case.estimate
-    task = SearchTask(case, setups, (), options.strategy, options, SimulationCounter())
-    outcome = search_outcome(task, problem, lambda _: None, lambda _: None)
+    state = SearchState(case, setups, (), problem, options.strategy, options)
+    outcome = in_turn(STAGES, state)
     parameters = outcome.determined.uncertainty.confidence.parameters
     reason = "has no interval: one sample decides it, between those at 1 and 1.005 s"
     assert parameters[INSTANT].interval is None

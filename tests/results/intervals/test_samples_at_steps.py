@@ -12,9 +12,8 @@ from tiers import few_of
 from exfit.case.load import parse_case
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import problem_of, residuals_of
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
-from exfit.workflows.case_search import SearchTask, search_outcome, weighted_search
+from exfit.workflows.case_search import STAGES, WEIGHTED, SearchState, in_turn, samples_at_steps
 
 TIME = np.arange(0.0, 6.0, 0.01)
 SAMPLE = 2.0  # s: an instant of these
@@ -26,8 +25,10 @@ NOISE = 1e-4
 FOUND = {"start": SAMPLE + 0.004, "min": SAMPLE - 0.25, "max": SAMPLE + 0.25}
 FAR = 5.0  # standard errors: noise alone takes an estimate so far in one of 1.7 million
 
+SEARCHED = (*WEIGHTED, samples_at_steps)
 
-def task_of(folder, model, signals, true_instant, at, seed=0):
+
+def state_of(folder, model, signals, true_instant, at, seed=0):
     """Return the search of a noisy record of a step at an instant, and its problem.
 
     The record is that of an exact step; the case has the instant ``at``.
@@ -60,12 +61,8 @@ def task_of(folder, model, signals, true_instant, at, seed=0):
     )
     setups = (replace(setup, experiment=replace(setup.experiment, channels=channels)),)
     options = case.estimate
-    task = SearchTask(case, setups, (), options.strategy, options, SimulationCounter())
-    return task, problem_of(residuals_of(case, setups))
-
-
-def ignore(_):
-    """Ignore a message."""
+    problem = problem_of(residuals_of(case, setups))
+    return SearchState(case, setups, (), problem, options.strategy, options)
 
 
 CONTRADICTIONS = [
@@ -80,15 +77,14 @@ CONTRADICTIONS = [
 def test_a_sample_that_contradicts_all_others_is_left_out(
     tmp_path, model, signals, true_instant, at
 ):
-    task, problem = task_of(tmp_path, model, signals, true_instant, at)
-    outcome = search_outcome(task, problem, ignore, ignore)
+    outcome = in_turn(STAGES, state_of(tmp_path, model, signals, true_instant, at))
     (note,) = outcome.found.notes
     assert note == (
         "efd: the sample at 2 s is left out: at the instant of a step, where efd may jump, and in "
         "contradiction to all others"
     )
     left_out = {
-        channel.signal: TIME[~channel.kept].tolist() for channel in outcome.setups[0].channels
+        channel.signal: TIME[~channel.kept].tolist() for channel in outcome.fitted[0].channels
     }
     assert left_out == {signal: [SAMPLE] if signal == "efd" else [] for signal in signals}
     fitted = outcome.problem.residuals.values(outcome.found.best.x)
@@ -109,8 +105,8 @@ def test_a_sample_that_contradicts_all_others_is_left_out(
     ],
 )
 def test_where_nothing_contradicts_the_problem_stays_the_same(tmp_path, signals, true_instant, at):
-    task, problem = task_of(tmp_path, "st1a", signals, true_instant, at)
-    problem, found = weighted_search(task, problem, ignore, ignore)
+    state = in_turn(SEARCHED, state_of(tmp_path, "st1a", signals, true_instant, at))
+    problem, found = state.problem, state.found
     assert found.notes == ()
     assert without_contradicting_samples(problem, found.best.x) == (problem, ())
     assert all(channel.kept.all() for channel in problem.residuals.channels)
@@ -120,7 +116,8 @@ def test_a_sample_that_agrees_in_another_minimum_stays():
     # a local search ends beside a sample that is not at the instant, 4.9 ms later
     case, setups, problem = noisy("st6b_instant", np.random.default_rng([1, 1]))
     options = case.estimate.model_copy(update={"search": "local"})
-    task = SearchTask(case, setups, (), options.strategy, options, SimulationCounter())
-    problem, found = weighted_search(task, problem, ignore, ignore)
+    state = SearchState(case, setups, (), problem, options.strategy, options)
+    state = in_turn(SEARCHED, state)
+    problem, found = state.problem, state.found
     assert abs(problem.residuals.values(found.best.x)["vref.at"] - 1.0) < 1e-3
     assert found.notes == ()
