@@ -37,8 +37,8 @@ def noise_before_rounding(readings: Array, levels: Array, slopes: Array, step: f
     for noise in candidates:
         for _ in range(CORRECTIONS):
             _, score, information = reading_likelihood(off + basis @ amounts, noise)
-            weighed = basis.T @ (information[:, None] * basis)
-            amounts = amounts + np.linalg.lstsq(weighed, basis.T @ score)[0]
+            weighted = basis.T @ (information[:, None] * basis)
+            amounts = amounts + np.linalg.lstsq(weighted, basis.T @ score)[0]
         likelihoods.append(np.sum(reading_likelihood(off + basis @ amounts, noise)[0]))
     best = min(max(int(np.argmax(likelihoods)), 1), CANDIDATES - 2)
     around = slice(best - 1, best + 2)

@@ -149,14 +149,14 @@ def _with_channels(experiment: Experiment, changed: Callable[[Channel], Channel]
 def weight_notes(residuals: Residuals) -> Iterator[str]:
     """Yield how the channels are weighted, where their residuals decide it."""
     several = len(residuals.experiments) > 1
-    weighed_by_noise = any(each.whitening is not None for each in residuals.experiments)
+    weighted_by_noise = any(each.whitening is not None for each in residuals.experiments)
     deviations = [
         f"{experiment.name + ' ' if several else ''}{channel.signal} {deviation:.2g}"
         for experiment in residuals.experiments
         for channel in experiment.channels
         if (deviation := channel.residual_deviation) is not None
     ]
-    if len(deviations) > 1 and weighed_by_noise:
+    if len(deviations) > 1 and weighted_by_noise:
         yield (
             "weights balanced: only up to the phase noise; from there the covariance of the noise "
             "alone weighs the errors"

@@ -11,11 +11,11 @@ PHASES: Mapping[str, str] = {
     "gn": "Gauss-Newton",
 }
 FROM_FURTHER_STARTS = "search"  # in the history: the point that the search from them found
-WEIGHED_BY_NOISE = "noise"  # in the history: the point where errors are weighed by its covariance
+WEIGHTED_BY_NOISE = "noise"  # in the history: the point where errors are weighted by its covariance
 HISTORY_PHASES: Mapping[str, str] = {
     **PHASES,
     FROM_FURTHER_STARTS: "found from further starts",
-    WEIGHED_BY_NOISE: "weighed by the noise of the driving signals",
+    WEIGHTED_BY_NOISE: "weighted by the noise of the driving signals",
 }
 STRATEGIES: Mapping[str, str] = {
     "gn": "Gauss-Newton with full steps (a first one that fails is shortened once)",

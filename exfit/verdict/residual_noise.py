@@ -48,7 +48,7 @@ def sample_scatter(std: float, samples: int) -> Scatter:
 
 
 def white_scatter(std: float, samples: int) -> Scatter:
-    """Return the scatter of residuals that are weighed by the noise of what drives them.
+    """Return the scatter of residuals that are weighted by the noise of what drives them.
 
     It is as certain as the scatter of these signals, by the median of fourth differences.
     """

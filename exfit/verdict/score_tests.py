@@ -94,7 +94,7 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
     with 1 %, divided by the number of values (Bonferroni). A value that is given with a standard
     error may be off by that as well.
 
-    Where the errors are weighed by the noise of what drives the simulation, the bias that it has
+    Where the errors are weighted by the noise of what drives the simulation, the bias that it has
     by each value is taken out, too; it is as uncertain as the variance of that noise.
 
     Source: Rao 1948, the score test (Proc. Camb. Phil. Soc. 44, 50-57).
@@ -161,7 +161,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     count = len(evidence.solution.x)
     added = extended.free[count:]
     theta = np.append(evidence.solution.x, extended.start[count:])
-    if evidence.weighed_by_noise:
+    if evidence.weighted_by_noise:
         extended, _ = parts("INPUT_NOISE")["without bias"].load()(extended, theta)
     errors, slopes = extended.errors(theta)
     own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
@@ -262,7 +262,7 @@ def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Arra
 
     None of errors that the noise of what drives weighs: what is simulated has that noise, too.
     """
-    if evidence.weighed_by_noise:
+    if evidence.weighted_by_noise:
         return
     for number, places in enumerate(blocks(evidence)):
         experiment = evidence.residuals.experiments[number]

@@ -38,7 +38,7 @@ from exfit.results.intervals.determination import (
     without_linear_intervals,
 )
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
-from exfit.util.strategies import FROM_FURTHER_STARTS, WEIGHED_BY_NOISE
+from exfit.util.strategies import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
 from exfit.workflows.choice_by_validation import judge_of
 
 Array = NDArray[np.float64]
@@ -202,9 +202,9 @@ def driving_noise(state: SearchState) -> SearchState:
         return state
 
     def proceed(problem: FitProblem, found: SearchResult, point: Array) -> SearchResult:
-        return state.continued(problem, found, point, WEIGHED_BY_NOISE)
+        return state.continued(problem, found, point, WEIGHTED_BY_NOISE)
 
-    stage = parts("INPUT_NOISE")["weighed search"].load()
+    stage = parts("INPUT_NOISE")["weighted search"].load()
     problem, found = stage(state.problem, state.fitted, state.found, proceed, state.watch)
     return replace(state, problem=problem, searched=found)
 

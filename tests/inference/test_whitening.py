@@ -30,9 +30,9 @@ def test_white_errors_are_independent_and_of_one_size(noise):
 def test_the_sum_of_squares_is_that_by_the_inverse_covariance(noise):
     errors = np.random.default_rng(1).standard_normal((3, 2 * COUNT))
     covariance = noise.covariance(np.arange(2 * COUNT))
-    weighed = np.einsum("ki,ij,kj->k", errors, np.linalg.inv(covariance), errors)
+    weighted = np.einsum("ki,ij,kj->k", errors, np.linalg.inv(covariance), errors)
     white = whitening(noise, ORDER, 1.0).errors(errors)
-    assert np.sum(white**2, axis=1) == pytest.approx(weighed, rel=1e-9)
+    assert np.sum(white**2, axis=1) == pytest.approx(weighted, rel=1e-9)
 
 
 def test_only_errors_before_it_tell_what_one_should_be(noise):

@@ -118,7 +118,8 @@ def fits(count, free, times=1.0, driving=1.0, same=False, search="local", plain=
         case = Path(folder) / "case.yaml"
         case.write_text(yaml.safe_dump(content(free, search)))
         reason = mock.patch(
-            "exfit.workflows.case_search.why_not_weighed", return_value="in this study"
+            "exfit.features.events.driving_noise.weighing.why_not_weighted",
+            return_value="in this study",
         )
         for seed in range(first, first + count):
             write_record(case.with_name("event.csv"), event, times, driving, seed)

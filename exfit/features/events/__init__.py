@@ -3,7 +3,7 @@
 SUGGESTIONS = {"grid event": "suggestion:event_sections"}
 PLANTS = {"grid-playback": "grid_playback:GRID_PLAYBACK"}
 INPUT_NOISE = {
-    "weighed search": "driving_noise.weighing:weighed_search",
+    "weighted search": "driving_noise.weighing:weighted_search",
     "without bias": "driving_noise.weighing:without_bias",
 }
 CAUSES_BEFORE_FIT = {"records of events": "before_fit:event_causes"}

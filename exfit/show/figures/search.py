@@ -22,13 +22,13 @@ from exfit.show.figures.style import (
     short,
     tidy,
 )
-from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHED_BY_NOISE
+from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
     FROM_FURTHER_STARTS: LIMIT,
-    WEIGHED_BY_NOISE: LIMIT,
+    WEIGHTED_BY_NOISE: LIMIT,
 }
 
 WAYS = {

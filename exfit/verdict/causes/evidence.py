@@ -70,7 +70,7 @@ class Evidence:
         return self.residuals.values(self.solution.x)
 
     @property
-    def weighed_by_noise(self) -> bool:
+    def weighted_by_noise(self) -> bool:
         """Whether the noise of what drives the simulations weighs the errors."""
         return any(each.whitening is not None for each in self.residuals.experiments)
 
@@ -88,7 +88,7 @@ class Evidence:
     def noise_cost(self) -> float:
         """The cost that the noise of the records alone would have, as they scatter.
 
-        Errors that are weighed by the noise of what drives them are as large as that foretells.
+        Errors that are weighted by the noise of what drives them are as large as that foretells.
         """
         if any(each.whitening is not None for each in self.residuals.experiments):
             return 0.5 * self.residuals.count * self.residuals.noise**2

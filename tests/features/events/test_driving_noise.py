@@ -21,7 +21,7 @@ WRONG = 1.02  # of X''d: residuals show no such error by themselves
 FACTORS = (0.0, 0.01, 0.1, 1.0)  # of NOISE: the stator makes five times as much of it
 STEP = 1e-5  # of a sample, for a difference quotient
 
-WHY_NOT = "exfit.features.events.driving_noise.weighing.why_not_weighed"
+WHY_NOT = "exfit.features.events.driving_noise.weighing.why_not_weighted"
 
 
 @pytest.fixture(scope="module")
@@ -127,16 +127,16 @@ def test_without_noise_of_what_drives_a_fit_is_that_of_least_squares(fit_of):
 
     The scatter of p and q is that of the residuals to 6 %: so much do the weights differ.
     """
-    weighed = fit_of(0.0, weights="balanced")
+    weighted = fit_of(0.0, weights="balanced")
     with mock.patch(WHY_NOT, return_value="here"):
         plain = fit_of(0.0)
     for name, parameter in plain.parameters.items():
-        own = weighed.parameters[name]
+        own = weighted.parameters[name]
         assert abs(own.value - parameter.value) < own.std_error, name
         assert 0.9 < own.std_error / parameter.std_error < 1.5, name
         assert abs(own.value - TRUTH[name]) < 4.0 * own.std_error, name
-    assert all(test.are_noise for test in weighed.verdict.residuals)
-    (note,) = [note for note in weighed.notes if note.startswith("weights balanced")]
+    assert all(test.are_noise for test in weighted.verdict.residuals)
+    (note,) = [note for note in weighted.notes if note.startswith("weights balanced")]
     assert "the covariance of the noise alone weighs the errors" in note
 
 
@@ -145,11 +145,11 @@ def test_intervals_grow_with_the_noise_of_what_drives_and_own_noise_is_recognise
     """Each of two estimates of the noise is known to 6 %, which may make an interval narrower."""
     fits = [fit_of(factor) for factor in FACTORS]
     for name in TRUTH:
-        errors = [weighed.parameters[name].std_error for weighed in fits]
+        errors = [weighted.parameters[name].std_error for weighted in fits]
         assert all(louder > 0.88 * quieter for quieter, louder in pairwise(errors)), name
         assert errors[-1] > 1.5 * errors[0], name
-    for weighed in fits:
-        for test in weighed.verdict.residuals:
+    for weighted in fits:
+        for test in weighted.verdict.residuals:
             assert test.are_noise
             assert test.times == pytest.approx(1.0, abs=0.12)
 
@@ -158,7 +158,7 @@ def test_intervals_grow_with_the_noise_of_what_drives_and_own_noise_is_recognise
 def test_an_event_that_cannot_be_weighed_says_so(folder, event):
     path = event_case(folder, "event", estimate={"search": "local", "loss": "huber"})
     notes = " ".join(fit(path).notes)
-    assert "it cannot be weighed with a robust loss" in notes
+    assert "it cannot be weighted with a robust loss" in notes
 
 
 def test_added_samples_leave_the_simulator_as_it_is(folder, event):

@@ -49,13 +49,13 @@ UNSEEN = 1e-9  # of the largest singular value: rounding
 REFUTED = 4.0  # times the least cost: such a minimum stays refuted whatever the weights
 NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
 TURN = 2.0 * np.pi  # rad
-NOT_WEIGHED = (
+NOT_WEIGHTED = (
     "the noise of the signals that drive the simulation biases the parameters, and the intervals "
-    "do not hold all of it: it cannot be weighed"
+    "do not hold all of it: it cannot be weighted"
 )
 
 
-def weighed_search(
+def weighted_search(
     problem: FitProblem,
     setups: Sequence[ExperimentSetup],
     found: SearchResult,
@@ -65,24 +65,24 @@ def weighed_search(
     """Weigh a problem by the noise of what drives its tests, and search on from where that leads.
 
     ``found`` is the search of the problem without it, ``setups`` its tests as fitted; ``proceed``
-    searches on, by the weighed problem, from a point (N,). Where errors cannot be weighed the
+    searches on, by the weighted problem, from a point (N,). Where errors cannot be weighted the
     problem and the search remain, with a note that says why; so they do at an interruption.
     Raises SimulationError where there is no response.
     """
-    reason = why_not_weighed(problem.residuals, setups)
+    reason = why_not_weighted(problem.residuals, setups)
     if reason is not None:
-        return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHED} {reason}"))
+        return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHTED} {reason}"))
     try:
-        weighed, theta, notes = weighed_by_noise(problem, setups, found.best.x, watch)
-        found = with_minima_of(weighed, found)
+        weighted, theta, notes = weighted_by_noise(problem, setups, found.best.x, watch)
+        found = with_minima_of(weighted, found)
     except KeyboardInterrupt:
         return problem, found._replace(best=stopped(found.best, Stop.INTERRUPTED))
-    found = proceed(weighed, found, theta)
-    return weighed, found._replace(notes=(*found.notes, *notes))
+    found = proceed(weighted, found, theta)
+    return weighted, found._replace(notes=(*found.notes, *notes))
 
 
-def why_not_weighed(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
-    """Return why errors cannot be weighed by the noise of the driving signals, None if they can."""
+def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
+    """Say why errors cannot be weighted by the noise of driving signals, None if they can."""
     if residuals.robust is not None:
         return "with a robust loss"
     for setup in setups:
@@ -98,13 +98,13 @@ def why_not_weighed(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> 
     return None
 
 
-def weighed_by_noise(
+def weighted_by_noise(
     problem: FitProblem,
     setups: Sequence[ExperimentSetup],
     theta: Array,
     watch: Callable[[Progress], object] = lambda _: None,
 ) -> tuple[FitProblem, Array, tuple[str, ...]]:
-    """Return the problem weighed by the noise of what drives it, its minimum (N,), and notes.
+    """Return the problem weighted by the noise of what drives it, its minimum (N,), and notes.
 
     ``theta`` (N,) is the minimum without weights. The noise moves the minimum no longer: where it
     moved it by much, weights and bias are found anew from the better point. ``watch`` gets how far
@@ -207,13 +207,13 @@ def with_minima_of(problem: FitProblem, found: SearchResult) -> SearchResult:
     if found.minima is None:
         return found
 
-    def weighed(minimum: LocalMinimum) -> LocalMinimum:
+    def weighted(minimum: LocalMinimum) -> LocalMinimum:
         if minimum.cost > REFUTED * found.best.cost:
             return minimum
         end = descent_near(problem.residuals, minimum.x)
         return LocalMinimum(end.x, end.cost, minimum.starts, end)
 
-    minima = map(weighed, found.minima.minima)
+    minima = map(weighted, found.minima.minima)
     return found._replace(minima=replace(found.minima, minima=tuple(minima)))
 
 
@@ -233,7 +233,7 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
         levels = listed([*_levels(experiment.with_inputs(values))])
         yield (
             f"the noise of what drives the simulation{name}, {levels}, is in the errors of all "
-            "signals: they are weighed by its covariance, and the intervals hold it"
+            "signals: they are weighted by its covariance, and the intervals hold it"
         )
     yield f"the bias by that noise is taken out: it was at most {share}{large}"
 
