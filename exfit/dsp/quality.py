@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from exfit.dsp.filtering import OUTLIER_WINDOW, outliers
 from exfit.dsp.noise import noise
-from exfit.dsp.three_phase import MAINS_FREQUENCIES
 from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
@@ -129,6 +128,8 @@ def _repeats(samples: Array, starts: Places, lengths: Places) -> float:
 
 def mains_frequency(time: Array, samples: Array) -> float | None:
     """Return the frequency (Hz) of a channel that is a waveform of the mains, else None."""
+    from exfit.dsp.three_phase import MAINS_FREQUENCIES
+
     t, y = time[:WAVE_SAMPLES], samples[:WAVE_SAMPLES]
     if len(y) < OUTLIER_WINDOW or t[-1] - t[0] <= 0.0 or np.isinf(y).any():
         return None

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
-from exfit.estimate.starts import outcome_of, same
 from exfit.fitting.descents import (
     Announce,
     Descents,
@@ -224,6 +223,8 @@ def own_end(descents: Descents, best: Result) -> Result | None:
 
 def is_same(best: Result, other: Result) -> bool:
     """Return whether an end of a descent is in the minimum that has this best one."""
+    from exfit.estimate.starts import outcome_of, same
+
     nothing = PERFECT * other.history[0].cost
     lowest, higher = outcome_of(best), outcome_of(other)
     return other.cost >= best.cost and same(lowest, higher, nothing=nothing)

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from exfit.case.case import Case
-from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import CaseError
 from exfit.fitting.forms.compression import compressed
 from exfit.fitting.parameters import FreeParameter, free_parameter
@@ -65,6 +64,8 @@ def residuals_of(
 
 def robust_of(case: Case) -> Robust | None:
     """Return the loss that a case has in place of the squares."""
+    from exfit.dsp.robust_loss import LOSSES
+
     estimate = case.estimate
     if estimate.loss == "least-squares":
         return None

@@ -6,19 +6,22 @@ They are functions of the scaled free parameters; what is known beforehand adds 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.ties import TieError, Ties
 from exfit.dsp.noise import NEIGHBOURS, noise
-from exfit.dsp.robust_loss import Loss
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.simulation.substeps import NO_SUBSTEPS
+
+if TYPE_CHECKING:
+    from exfit.dsp.robust_loss import Loss
 
 Array = NDArray[np.float64]
 
@@ -33,7 +36,7 @@ LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 class Robust:
     """A loss that bears spikes, from ``scale`` standard deviations of a channel's noise on."""
 
-    loss: Loss
+    loss: "Loss"
     scale: float
 
 

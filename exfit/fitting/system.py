@@ -22,7 +22,6 @@ from exfit.plants import (
     inputs_at,
     inputs_for_limiters,
 )
-from exfit.plants.playback import DRIVING, PLAYBACK, initial, playback
 from exfit.simulation.kernels import parameters_used
 
 Values = Mapping[str, float]
@@ -119,6 +118,8 @@ def recorded_in_all(case: Case) -> frozenset[str]:
 
 def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationForm) -> None:
     """Raise CaseError where a record lacks a signal that the exciter uses."""
+    from exfit.plants.playback import PLAYBACK
+
     used = driven_by(exciter, saturation)
     required = {signal: exciter for signal in case.kind.required_if_used if signal in used}
     if case.kind is PLAYBACK:
@@ -155,6 +156,8 @@ def _record_files(case: Case) -> dict[str, RecordFile]:
 @cache
 def driven_by(exciter: Model, saturation: SaturationForm) -> frozenset[str]:
     """Return the signals of its plant that reach an exciter."""
+    from exfit.plants.playback import DRIVING, initial, playback
+
     used = parameters_used(playback(exciter, saturation, DRIVING), ("efd",))
     return frozenset(signal for signal in DRIVING if initial(signal) in used)
 

@@ -3,17 +3,18 @@
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from exfit.errors import ExfitError
-from exfit.results.consistency import contradictions, validation_contradictions
 from exfit.results.model import FitResult
 from exfit.results.thinning import thinned, thinned_validation
-from exfit.results.validation_result import ValidationResult
 from exfit.util.file_names import VALIDATION, WHOLE_FIT
 from exfit.util.json_files import read_json
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, plain, read
+
+if TYPE_CHECKING:
+    from exfit.results.validation_result import ValidationResult
 
 VERSION = 10  # of the files; others are refused
 
@@ -23,16 +24,19 @@ def result_text(result: FitResult) -> str:
     return to_json({"version": VERSION, **plain(thinned(result), whole=True)})
 
 
-def validation_text(result: ValidationResult) -> str:
+def validation_text(result: "ValidationResult") -> str:
     """Write validation.json as a text: all of a validation, long samples thinned."""
     return to_json({"version": VERSION, **plain(thinned_validation(result), whole=True)})
 
 
-def load_validation(source: Path) -> ValidationResult:
+def load_validation(source: Path) -> "ValidationResult":
     """Read a validation from its validation.json.
 
     Raises ExfitError where the file cannot be read, or does not hold all of a validation.
     """
+    from exfit.results.consistency import validation_contradictions
+    from exfit.results.validation_result import ValidationResult
+
     content = read_json(source)
     _refuse_other_version(source, content, "validate again")
     try:
@@ -50,6 +54,8 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     Raises ExfitError where the file cannot be read, is of another version, or is no result of a
     fit: with the place in it, and what is wrong there.
     """
+    from exfit.results.consistency import contradictions
+
     source = result_file(Path(path))
     if not source.exists() and source.with_name(VALIDATION).is_file():
         raise ExfitError(f"{path}: holds a validation, no result of a fit")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,11 @@ from exfit.results.model import FitResult
 from exfit.results.other_values import AsFound
 from exfit.results.played_records import LeftOut, PlayedRecord
 from exfit.results.tables import DIGITS, clock_digits
-from exfit.results.validation_result import ValidationResult
 from exfit.simulation.small_signal import Bode, SmallSignal
 from exfit.util.sorting import distinct
+
+if TYPE_CHECKING:
+    from exfit.results.validation_result import ValidationResult
 
 Array = NDArray[np.float64]
 
@@ -46,7 +49,7 @@ def thinned(result: FitResult) -> FitResult:
     )
 
 
-def thinned_validation(result: ValidationResult) -> ValidationResult:
+def thinned_validation(result: "ValidationResult") -> "ValidationResult":
     """Return a validation with its samples as a file holds them."""
     return replace(
         result,

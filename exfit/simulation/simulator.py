@@ -26,7 +26,6 @@ from exfit.simulation.substeps import (
     why_unreachable,
 )
 from exfit.util.sorting import distinct
-from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -480,6 +479,8 @@ def _in_blocks(
     code: TangentKernel, p: Array, courses: Courses, tangents: Array, rates: Array | None
 ) -> tuple[Array, Array, Array | None]:
     """Return samples with derivatives; of a single set each block of directions in a thread."""
+    from exfit.util.threads import in_threads
+
     width = code.directions
     firsts = range(0, tangents.shape[-1], width)
     if len(p) > 1 or len(firsts) <= 1:

@@ -218,7 +218,9 @@ def _other_model(name: str, program: str) -> str:
 
 def _machine(result: FitResult, program: str, warnings: list[str]) -> Iterator[Written]:
     name = result.machine_model
-    candidates = alternatives(MACHINES[name], program) if name in MACHINES else []
+    candidates = (
+        alternatives(MACHINES[name], program) if name is not None and name in MACHINES else []
+    )
     if not candidates:
         what = "no machine is named" if name is None else f"machine {name} has no {program} record"
         warnings.append(f"{what}: only the exciter is written")

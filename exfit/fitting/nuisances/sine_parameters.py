@@ -38,8 +38,6 @@ def with_sines(
     ``values`` or those given beside the case. Raises RecordError for a frequency that the record
     cannot show.
     """
-    from exfit.fitting.residuals import noise_of
-
     prefix, file = prefix_of(recording), recording.record
     given = {**values, **{name: each.value for name, each in case.given_values.items()}}
     for channel in setup.channels:
@@ -51,6 +49,8 @@ def with_sines(
             waiting = {**setup.automatic_sines, channel.signal: _range(section)}
             setup = replace(setup, automatic_sines=waiting)
             continue
+        from exfit.fitting.residuals import noise_of
+
         measured = channel.measured[channel.kept]
         noise = noise_of(channel)
         largest = max(0.5 * float(np.ptp(measured)), noise)

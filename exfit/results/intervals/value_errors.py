@@ -13,7 +13,6 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
-from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals
 from exfit.results.intervals.value_shifts import shifts_by_values
@@ -95,6 +94,8 @@ def allowing_for_bias(
 
     That bias was taken out: it is as uncertain as the variance of the noise.
     """
+    from exfit.inference.whitening import BIAS_KNOWN_TO
+
     residuals = problem.residuals
     if all(experiment.whitening is None for experiment in residuals.experiments):
         return uncertainty

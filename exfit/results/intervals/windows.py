@@ -27,9 +27,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
-from exfit.plants.machine_playback import MACHINE_PLAYBACK
 from exfit.records.record import Record, read_only
-from exfit.records.steps import steps_of_record
 from exfit.results.windows import WindowEstimate, WindowKind, WindowSpread
 
 Array = NDArray[np.float64]
@@ -68,6 +66,8 @@ def spread_over_windows(
 
     Source: Cochran 1954, The combination of estimates from different experiments.
     """
+    from exfit.plants.machine_playback import MACHINE_PLAYBACK
+
     if case.kind is not MACHINE_PLAYBACK or TPD0 not in {free.name for free in residuals.free}:
         return None
     estimates = estimates_of_windows(case, setups, residuals, values)
@@ -129,6 +129,8 @@ def with_spread(
 
 def windows_of(setup: ExperimentSetup) -> Iterator[Window]:
     """Yield the windows of the steps that a record shows."""
+    from exfit.records.steps import steps_of_record
+
     record = setup.record
     signals = {name: record.signals[name] for name in ("vt", "ifd") if name in record.signals}
     steps = steps_of_record(record.time, signals).steps
