@@ -53,11 +53,8 @@ SLOW_TO_IMPORT = {
     "scipy", "matplotlib", "rich", "jinja2", "pandas", "numpy.ma", "numpy.random",
     "numpy.testing",
 }  # fmt: skip
-NOT_OF_A_FIT = {
-    "exfit.workflows.profiles", "exfit.features.compare.agreement", "exfit.features.translate",
-    "exfit.features.design.experiment_design", "exfit.features.planner.records",
-    "exfit.runs.fits", "exfit.show.figures", "exfit.show.terminal", "exfit.records.inspection",
-}  # fmt: skip
+# what a process loads of exfit, at most: files, and the lines in them
+SIMULATE, LOCAL_FIT = (190, 24_000), (310, 41_000)
 
 
 def package(name):
@@ -227,9 +224,10 @@ def test_the_command_starts_without_the_heavy_packages():
     assert not AT_ONCE & set(done.stdout.split())
 
 
-def test_a_fit_without_figures_imports_only_what_it_uses(tmp_path):
+def modules_loaded(folder, command, *options):
+    """Return the modules that a command has imported when it ends."""
     case = Path(__file__).parents[1] / "configs" / "ac1a_typical.yaml"
-    arguments = ["fit", str(case), "-o", str(tmp_path), "--quiet", "--no-plots", "--search=local"]
+    arguments = [command, str(case), "-o", str(folder), "--quiet", "--no-plots", *options]
     code = (
         "import sys, atexit; from exfit.cli import main; "
         "atexit.register(lambda: print(*sys.modules)); main()"
@@ -242,8 +240,19 @@ def test_a_fit_without_figures_imports_only_what_it_uses(tmp_path):
         check=True,
         env=environment,
     )
-    loaded = set(done.stdout.split())
-    assert sorted({*SLOW_TO_IMPORT, *NOT_OF_A_FIT} & loaded) == []
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("limits", "command"), [(SIMULATE, ("simulate",)), (LOCAL_FIT, ("fit", "--search=local"))]
+)
+def test_a_command_without_figures_imports_little_more_than_it_uses(tmp_path, limits, command):
+    loaded = modules_loaded(tmp_path, *command)
+    own = [MODULES[name] for name in loaded & MODULES.keys()]
+    lines = sum(len(path.read_bytes().splitlines()) for path in own)
+    assert sorted(SLOW_TO_IMPORT & loaded) == []
+    assert len(own) <= limits[0]
+    assert lines <= limits[1]
 
 
 @pytest.mark.parametrize("room", ["estimate", "inference"])
