@@ -86,10 +86,6 @@ class Unobserved:
         """Ignore the end of a case."""
 
 
-def _no_tables(_: Fleet) -> None:
-    """Write no table: the folder has all that is in one."""
-
-
 def batch(
     cases: Iterable[str | PathLike[str]] | str | PathLike[str],
     folder: str | PathLike[str] = "fleet",
@@ -105,7 +101,7 @@ def batch(
     observer: BatchObserver | None = None,
     further: Sequence[FurtherFiles] = (),
     compute: Compute | None = None,
-    write_tables: Callable[[Fleet], None] = _no_tables,
+    write_tables: Callable[[Fleet], None] = lambda _: None,
     made: Mapping[Path, CaseMaking] = MappingProxyType({}),
 ) -> Fleet:
     """Fit many cases in several processes; what the folder has already is not fitted again.
@@ -150,7 +146,8 @@ def batch(
     place, share = Path(folder), Share(*part)
     _refuse(share, workers, time_limit, strategy, search)
     existing = case_files(map(Path, given), place) if given or not made else ()
-    files = share_of(_each_once([*existing, *made], place), share, place)
+    each_once = {case_name(place, file): file for file in (*existing, *made)}
+    files = share_of([*each_once.values()], share, place)
     settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
     count = min(workers or processors(), max(1, len(files))) if workers != 0 else 1
     if workers == 0:
@@ -169,11 +166,6 @@ def batch(
     fleet = tables_of(place, write_tables)
     names = frozenset(case_name(place, file) for file in files)
     return replace(fleet, run=names, interrupted=interrupted)
-
-
-def _each_once(files: Iterable[Path], folder: Path) -> list[Path]:
-    """Return files without those that are given in another way, too."""
-    return [*{case_name(folder, file): file for file in files}.values()]
 
 
 def _refuse(
@@ -229,29 +221,24 @@ class BatchRun:
         """Yield the cases that are to be fitted; the others are entered and announced."""
         keys = set[str]()
         for file in self.files:
-            case = self._planned(file)
+            make = self.made.get(case_name(self.folder, file))
+            reason = "" if make is None else make()  # a case of a table is made first
+            if reason:
+                case = refused_case(file, self.folder, reason)
+            else:
+                case = planned_case(file, self.folder, self.settings)
             write_entry(self.folder, case.entry)
             key = case.entry.key
+            kept = is_done(self.folder, key) or (
+                not self.settings.retry_failed and failure_of(self.folder, key) is not None
+            )
             if case.task is None:
                 self.observer.finished(row_of(case.entry))
-            elif key in keys or self._is_kept(key):
+            elif key in keys or kept:
                 self.observer.kept(case.entry.case)
             else:
                 keys.add(key)
                 yield case
-
-    def _planned(self, file: Path) -> PlannedCase:
-        """Return a case with its task, made first where it is one of a table."""
-        make = self.made.get(case_name(self.folder, file))
-        reason = "" if make is None else make()
-        if reason:
-            return refused_case(file, self.folder, reason)
-        return planned_case(file, self.folder, self.settings)
-
-    def _is_kept(self, key: str) -> bool:
-        if is_done(self.folder, key):
-            return True
-        return not self.settings.retry_failed and failure_of(self.folder, key) is not None
 
     def _begin(self, case: PlannedCase) -> bool:
         """Announce that a case begins; return false where another run has done it meanwhile."""

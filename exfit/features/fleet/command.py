@@ -1,7 +1,7 @@
 """The command batch."""
 
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,11 +12,9 @@ from exfit.errors import ExfitError
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
-    from exfit.features.fleet.batch import BatchObserver, CaseMaking
+    from exfit.features.fleet.batch import CaseMaking
     from exfit.features.fleet.folder import Fleet
-    from exfit.features.fleet.task import FurtherFiles
+    from exfit.features.fleet.terminal import BatchProgress
 
 FAILED = 1  # the exit code where cases are without a fit
 WITHOUT_FIT = ("failed", "timed out", "crashed", "refused", "not run")
@@ -129,10 +127,18 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from exfit.features.fleet.batch import batch as fit_all
-    from exfit.features.fleet.table import write_tables
+    from exfit.features.fleet.table import report_file, write_tables
+    from exfit.features.start.cells import is_table
 
-    tables, others = _tables_among(cases)
-    with _observer(shown=not (quiet or as_json)) as observer:
+    tables = [path for path in cases if is_table(path) and not path.is_dir()]
+    others = [path for path in cases if path not in tables]
+    shown: AbstractContextManager[BatchProgress | None] = nullcontext()
+    if not (quiet or as_json):
+        from exfit.features.fleet import terminal
+        from exfit.show.terminal import console
+
+        shown = terminal.BatchProgress(console()).running()
+    with shown as observer:
         fleet = fit_all(
             others,
             output,
@@ -145,7 +151,7 @@ def batch(
             strategy=strategy,
             search=search,
             observer=observer,
-            further=_reports() if reports else (),
+            further=(report_file,) if reports else (),
             write_tables=write_tables,
             made=_cases_of(tables, output),
         )
@@ -154,16 +160,8 @@ def batch(
     if as_json:
         print_json(fleet.to_dict())
     elif not quiet:
-        _show(fleet)
+        terminal.batch(console(), fleet)
     _exit(fleet)
-
-
-def _tables_among(given: "Sequence[Path]") -> tuple[list[Path], list[Path]]:
-    """Return the tables of records among what is given, and the rest."""
-    from exfit.features.start.cells import is_table
-
-    tables = [path for path in given if is_table(path) and not path.is_dir()]
-    return tables, [path for path in given if path not in tables]
 
 
 def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]":
@@ -185,22 +183,6 @@ def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]
     return made
 
 
-def _observer(shown: bool) -> "AbstractContextManager[BatchObserver | None]":
-    """Make the display of a batch that runs, None where nothing is to be shown."""
-    if not shown:
-        return nullcontext()
-    from exfit.features.fleet.terminal import BatchProgress
-    from exfit.show import terminal
-
-    return BatchProgress(terminal.console()).running()
-
-
-def _reports() -> "Sequence[FurtherFiles]":
-    from exfit.features.fleet.table import report_file
-
-    return (report_file,)
-
-
 def _write_missing_reports(fleet: "Fleet") -> bool:
     """Write the reports of fits that an earlier run has made without; return whether any was."""
     from exfit.features.fleet.page import REPORT
@@ -212,13 +194,6 @@ def _write_missing_reports(fleet: "Fleet") -> bool:
 
         write_report(folder)
     return bool(missing)
-
-
-def _show(fleet: "Fleet") -> None:
-    from exfit.features.fleet.terminal import batch
-    from exfit.show import terminal
-
-    batch(terminal.console(), fleet)
 
 
 def _exit(fleet: "Fleet") -> None:

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import groupby, pairwise
 from math import isfinite
 from pathlib import Path
@@ -211,6 +210,7 @@ def _rank(outcome: str) -> tuple[int, str]:
 
 def _case_view(fleet: Fleet, case: CaseSummary, remarks: Mapping[tuple[str, str], str]) -> CaseView:
     worst = max((rmse for rmse in case.rmse.values() if isfinite(rmse)), default=None)
+    several = len({curve.record for curve in case.curves}) > 1
     return CaseView(
         case,
         _style(case.outcome),
@@ -221,14 +221,11 @@ def _case_view(fleet: Fleet, case: CaseSummary, remarks: Mapping[tuple[str, str]
             _parameter_view(case, name, value, remarks.get((case.name, name), ""))
             for name, value in case.fitted.items()
         ),
-        tuple(picture(curve, _label(case, curve)) for curve in case.curves[:MOST_PICTURES]),
+        tuple(
+            picture(curve, f"{curve.signal} of {curve.record}" if several else curve.signal)
+            for curve in case.curves[:MOST_PICTURES]
+        ),
     )
-
-
-def _label(case: CaseSummary, curve: SummaryCurve) -> str:
-    """Label a picture by its signal, and by the record where there are several."""
-    records = {each.record for each in case.curves}
-    return f"{curve.signal} of {curve.record}" if len(records) > 1 else curve.signal
 
 
 def _link(folder: Path, case: CaseSummary) -> str:
@@ -263,20 +260,16 @@ def _interval(value: SummaryParameter) -> str:
     return "" if value.high is None else f"below {value.rounded(value.high)}"
 
 
-def _cell(case: CaseSummary, name: str, values: Mapping[str, SisterValue]) -> SisterCell | None:
-    """Return a parameter of a unit; ``values`` are those of its sisters by case."""
-    value = values.get(case.name)
-    if value is None:
-        return None
-    own = case.fitted[name]
-    return SisterCell(value, own.rounded(own.value), _interval(own))
-
-
 def _sister_view(group: SisterGroup) -> SisterView:
-    columns = [{value.case: value for value in p.values} for p in group.parameters]
-    names = [parameter.name for parameter in group.parameters]
+    cells: dict[tuple[str, str], SisterCell] = {}
+    by_name = {case.name: case for case in group.cases}
+    for parameter in group.parameters:
+        for value in parameter.values:
+            own = by_name[value.case].fitted[parameter.name]
+            cell = SisterCell(value, own.rounded(own.value), _interval(own))
+            cells[value.case, parameter.name] = cell
     rows = [
-        SisterRow(case.name, tuple(map(partial(_cell, case), names, columns)))
+        SisterRow(case.name, tuple(cells.get((case.name, p.name)) for p in group.parameters))
         for case in group.cases
     ]
     if len(rows) <= MOST_SISTERS:

@@ -82,14 +82,12 @@ def _cases_below(top: Path, written: Path) -> Iterator[Path]:
     for place, folders, files in os.walk(top):
         here = Path(place)
         visible = (name for name in folders if not name.startswith("."))
-        folders[:] = sorted(name for name in visible if not _same(here / name, written))
+        folders[:] = sorted(
+            name for name in visible if not (written.exists() and written.samefile(here / name))
+        )
         for name in sorted(files):
             if Path(name).suffix.lower() in SUFFIXES and _may_be_case(here / name):
                 yield here / name
-
-
-def _same(path: Path, other: Path) -> bool:
-    return other.exists() and path.samefile(other)
 
 
 def _may_be_case(file: Path) -> bool:

@@ -165,13 +165,21 @@ def _unit(case: CaseSummary) -> tuple[str, ...]:
 
 def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
     """Return a parameter of all sisters that were fitted with it."""
-    values = [_value(case, name) for case in cases]
+    values = [
+        SisterValue(case.name, own.value, own.low, own.high, missing_interval(case, name))
+        for case in cases
+        for own in [case.fitted[name]]
+    ]
     unit = next(iter(cases)).fitted[name].unit
     closed = [v for v in values if v.low is not None and v.high is not None]
     if len(closed) < FEWEST:
         return SisterParameter(name, unit, tuple(_beyond_intervals(values)))
-    estimates = _estimates(closed)
-    judged = deviations(estimates)
+    low, value, high = (
+        np.array([getattr(v, side) for v in closed], dtype=float)
+        for side in ("low", "value", "high")
+    )
+    below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
+    judged = deviations(Estimates(value, below / ERRORS_IN_HALF, above / ERRORS_IN_HALF))
     columns = (judged.deviation, judged.probability, judged.outlier)
     by_case = {
         v.case: v._replace(
@@ -185,35 +193,16 @@ def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
     return SisterParameter(name, unit, every, judged.centre, judged.spread)
 
 
-def _value(case: CaseSummary, name: str) -> SisterValue:
-    parameter = case.fitted[name]
-    remark = missing_interval(case, name)
-    return SisterValue(case.name, parameter.value, parameter.low, parameter.high, remark)
-
-
-def _estimates(values: Sequence[SisterValue]) -> Estimates:
-    low, value, high = (
-        np.array([getattr(v, side) for v in values], dtype=float)
-        for side in ("low", "value", "high")
-    )
-    below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
-    return Estimates(value, below / ERRORS_IN_HALF, above / ERRORS_IN_HALF)
-
-
 def _beyond_intervals(values: Sequence[SisterValue]) -> Iterator[SisterValue]:
     """Yield values, those with a remark whose intervals do not meet that of another."""
+
+    def ends_before(one: SisterValue, other: SisterValue) -> bool:  # an open side has no end
+        return one.high is not None and other.low is not None and one.high < other.low
+
     for value in values:
-        others = [other.case for other in values if _apart(value, other)]
+        others = [o.case for o in values if ends_before(value, o) or ends_before(o, value)]
         yield (
             value._replace(remark=f"beyond the interval of {', '.join(others)}")
             if others
             else value
         )
-
-
-def _apart(one: SisterValue, other: SisterValue) -> bool:
-    """Find that one interval ends before the other begins; an open side has no end."""
-    return any(
-        a.high is not None and b.low is not None and a.high < b.low
-        for a, b in ((one, other), (other, one))
-    )

@@ -1,6 +1,6 @@
 """A row of the table of a batch: what a case came to, in figures and small curves."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, nan
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
@@ -176,50 +176,40 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
     """
     from exfit.results.side_by_side import explanation_of
 
-    facts = _facts_of_result(result)
+    found = result.as_found
+    bus, machine_id = (None, None) if found is None else (found.bus, found.machine_id)
+    rmse: dict[str, float] = {}  # the largest where several records have a signal
+    for comparison in result.comparisons:
+        for signal, channel in comparison.channels.items():
+            rmse[signal] = max(channel.rmse, rmse.get(signal, channel.rmse))
+    validation = SummaryValidation()
+    if result.validation:
+        accepted = all(match.accepted for match in result.validation)
+        largest = max(match.rmse for match in result.validation)
+        validation = SummaryValidation(
+            "accepted" if accepted else "not accepted", largest if largest < np.inf else None
+        )
     return CaseSummary(
         name=result.name,
         case=result.case.as_posix(),
         key=key,
         status="done",
         reason=explanation_of(result),
-        **facts._asdict(),
+        unit=_unit(result.about, bus, machine_id),
+        bus=bus,
+        machine_id=machine_id,
+        model=result.model,
+        machine_model=result.machine_model or "",
         verdict=result.verdict.verdict,
         holds=result.holds,
-        rmse=_largest_rmse(result.comparisons),
-        validation=_validation(result.validation),
+        rmse=rmse,
+        validation=validation,
         unresolved=() if result.knowledge is None else _unresolved(result),
         parameters=_parameters(result),
         curves=tuple(curve for match in result.comparisons for curve in _curves(match)),
         seconds=round(seconds, 3),
         notes=(*result.notes, *(note for match in result.comparisons for note in match.notes)),
         about=dict(result.about),
-    )
-
-
-def _facts_of_result(result: "FitResult") -> CaseFacts:
-    found = result.as_found
-    bus, machine_id = (None, None) if found is None else (found.bus, found.machine_id)
-    unit = _unit(result.about, bus, machine_id)
-    return CaseFacts(unit, bus, machine_id, result.model, result.machine_model or "")
-
-
-def _largest_rmse(comparisons: "Sequence[Comparison]") -> dict[str, float]:
-    """Return the rmse of each signal, the largest where several records have it."""
-    largest: dict[str, float] = {}
-    for comparison in comparisons:
-        for signal, match in comparison.channels.items():
-            largest[signal] = max(match.rmse, largest.get(signal, match.rmse))
-    return largest
-
-
-def _validation(validations: "Sequence[Comparison]") -> SummaryValidation:
-    if not validations:
-        return SummaryValidation()
-    accepted = all(match.accepted for match in validations)
-    largest = max(match.rmse for match in validations)
-    return SummaryValidation(
-        "accepted" if accepted else "not accepted", largest if largest < np.inf else None
     )
 
 

@@ -8,7 +8,6 @@ the nameplate's remain. Of equal certainty the test of the programme counts.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 from exfit.case.case import Case
 from exfit.features.programme.case.programme import Programme
@@ -38,7 +37,19 @@ def values_given(test: FinishedTest, programme: Programme) -> Iterator[EnteredVa
     own, sources, stated = case.values(), case.sources(), {*case.values()} - {*case.typical()}
     for value in _measured(test):
         if value.name.endswith(BASE):
-            yield _beside_bases(value, programme)
+            # beside the first base of the file that contradicts it
+            signal, (low, high) = value.name.removesuffix(BASE), value.interval
+            bases = [
+                channel.base
+                for section in programme.columns()
+                if (channel := section.get(signal)) is not None
+                and isinstance(getattr(channel, "base", None), float)
+                and channel.unit is not None
+                and alike(channel.unit, value.unit)
+            ]
+            outside = [base for base in bases if not low <= base <= high]
+            first = next(iter((*outside, *bases)), None)
+            yield _beside(value, first, NOT_STATED if bases else "", entered=not bases)
         elif value.name in own:
             given = own[value.name] if value.name in stated else None
             source = sources[value.name]
@@ -132,25 +143,6 @@ def _beside(value: EnteredValue, given: float | None, source: str, entered: bool
     low, high = value.interval
     excluded = given is not None and not low <= given <= high
     return replace(value, given=given, given_source=source, entered=entered, excluded=excluded)
-
-
-def _beside_bases(value: EnteredValue, programme: Programme) -> EnteredValue:
-    """Return the base of a signal beside the first one of the file that contradicts it."""
-    signal = value.name.removesuffix(BASE)
-    given = [base for base, unit in _given_bases(programme, signal) if alike(unit, value.unit)]
-    low, high = value.interval
-    outside = [base for base in given if not low <= base <= high]
-    first = next(iter((*outside, *given)), None)
-    return _beside(value, first, NOT_STATED if given else "", entered=not given)
-
-
-def _given_bases(programme: Programme, signal: str) -> Iterator[tuple[float, str]]:
-    """Yield the bases that tests of the file give a signal, each with its unit."""
-    for section in programme.columns():
-        channel: Any = section.get(signal)
-        base = getattr(channel, "base", None)
-        if isinstance(base, float) and channel.unit is not None:
-            yield base, channel.unit
 
 
 def _certainty(source: str) -> int:

@@ -16,17 +16,13 @@ AUTO = "auto"
 def steady_test_faults(test: ContentNode) -> Iterator[Fault]:
     """Yield contradictions in the points of a steady test, beside its free parameters."""
     yield from points_faults(test, POINT_SIGNALS, TERMINALS)
-    if "points" not in test:
-        yield from _field_faults(test)
-    for signal, column in test.at("columns").sections:
+    columns = test.at("columns")
+    given = "file" in test and "points" not in test
+    if given and not any(signal in columns for signal in FIELDS):
+        yield columns.at(FIELDS[0]).fault(f"is missing: a column of {' or '.join(FIELDS)}")
+    for signal, column in columns.sections:
         yield from _column_faults(signal, column)
     yield from _noise_faults(test)
-
-
-def _field_faults(test: ContentNode) -> Iterator[Fault]:
-    columns = test.at("columns")
-    if "file" in test and not any(signal in columns for signal in FIELDS):
-        yield columns.at(FIELDS[0]).fault(f"is missing: a column of {' or '.join(FIELDS)}")
 
 
 def _column_faults(signal: str, column: ContentNode) -> Iterator[Fault]:
@@ -39,14 +35,12 @@ def _column_faults(signal: str, column: ContentNode) -> Iterator[Fault]:
         yield column.at("scale").fault("must not be 0")
     if base.number is not None and base.number <= 0.0:
         yield base.fault(f"{show(base.number)} is not above 0")
-    yield from _free_base_faults(base) if signal in FIELDS else _terminal_faults(column)
-
-
-def _terminal_faults(column: ContentNode) -> Iterator[Fault]:
-    """Yield keys that only a column of the field may have."""
+    if signal in FIELDS:
+        yield from _free_base_faults(base)
+        return
     fields = " or ".join(FIELDS)
-    if column.at("base").is_section:
-        yield column.at("base").fault(f"must be a number: only that of {fields} can be fitted")
+    if base.is_section:
+        yield base.fault(f"must be a number: only that of {fields} can be fitted")
     if "noise" in column:
         yield column.at("noise").fault(f"only allowed for {fields}")
 
@@ -119,11 +113,7 @@ def _file_faults(columns: ContentNode, needed: Sequence[str]) -> Iterator[Fault]
 def saturation_test_faults(test: ContentNode) -> Iterator[Fault]:
     """Yield contradictions in a saturation test."""
     yield from points_faults(test, CURVE_SIGNALS, CURVE_SIGNALS[:2])
-    yield from _unit_faults(test.at("columns"))
-    yield from _winding_faults(test)
-
-
-def _unit_faults(columns: ContentNode) -> Iterator[Fault]:
+    columns, winding = test.at("columns"), test.at("winding")
     vt = columns.at("vt")
     if "base" in vt and "unit" not in vt:
         yield vt.at("unit").fault("is missing: in which unit is base?")
@@ -133,10 +123,6 @@ def _unit_faults(columns: ContentNode) -> Iterator[Fault]:
     for signal in CURVE_SIGNALS[1:]:
         if "base" in columns.at(signal):
             yield columns.at(signal, "base").fault("not allowed: the test measures it")
-
-
-def _winding_faults(test: ContentNode) -> Iterator[Fault]:
-    winding = test.at("winding")
     if "hot" in winding and "temperature" not in winding:
         yield winding.at("temperature").fault("is missing: hot converts the resistance from it")
     if winding.content and test.at("brushless").value is True:

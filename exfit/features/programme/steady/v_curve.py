@@ -59,7 +59,10 @@ def v_curve(
     Source: IEEE Std 115, cf. the saturation curves and the excitation on load; the model's
     equations are those of its dynamics at rest.
     """
-    _refuse_no_rest(machine, data, points)
+    ifd = field_on_load(machine, data, points.p, points.q, points.vt)
+    for row in np.flatnonzero(~np.isfinite(ifd))[:1]:
+        place = f"p {show(points.p[row])}, q {show(points.q[row])}, vt {show(points.vt[row])} pu"
+        raise RecordError(f"point {row + 1} ({place}): the machine has no rest there")
     fields = FieldsOnLoad(machine, points)
     problem = fields.problem(data, free)
     fit = None
@@ -98,26 +101,15 @@ def power_levels(machine: Machine, data: Values, points: PointsOnLoad) -> Iterat
         p, low, high = float(np.mean(points.p[rows])), points.q[rows].min(), points.q[rows].max()
         beyond = WIDER * (points.q.max() - points.q.min())
         q = np.linspace(low - beyond, high + beyond, CURVE_POINTS)
-        vt = _voltage_along(points.q[rows], points.vt[rows], q)
+        # the line through the voltages of the points, their mean for one q
+        taken_q, taken_vt = points.q[rows], points.vt[rows]
+        spread = taken_q - np.mean(taken_q)
+        square = float(spread @ spread)
+        slope = float(spread @ taken_vt) / square if square > 0.0 else 0.0
+        vt = np.mean(taken_vt) + slope * (np.clip(q, low, high) - np.mean(taken_q))
         ifd = field_on_load(machine, data, np.full_like(q, p), q, vt)
         it = np.hypot(p, q) / vt
         yield PowerLevel(p, tuple(int(row) for row in np.sort(rows)), q, vt, it, ifd)
-
-
-def _voltage_along(q: Array, vt: Array, curve: Array) -> Array:
-    """Return the voltages on the line through those of some points, their mean for one q."""
-    spread = q - np.mean(q)
-    square = float(spread @ spread)
-    slope = float(spread @ vt) / square if square > 0.0 else 0.0
-    inside = np.clip(curve, q.min(), q.max())
-    return np.asarray(np.mean(vt) + slope * (inside - np.mean(q)))
-
-
-def _refuse_no_rest(machine: Machine, data: Values, points: PointsOnLoad) -> None:
-    ifd = field_on_load(machine, data, points.p, points.q, points.vt)
-    for row in np.flatnonzero(~np.isfinite(ifd))[:1]:
-        place = f"p {show(points.p[row])}, q {show(points.q[row])}, vt {show(points.vt[row])} pu"
-        raise RecordError(f"point {row + 1} ({place}): the machine has no rest there")
 
 
 def _reading_of(
@@ -179,7 +171,17 @@ def _verdict(
     fit: FittedPoints | None,
     causes: tuple[Cause, ...],
 ) -> Verdict:
-    reason = "; ".join(map(_match, readings.values()))
+    matches = []
+    for reading in readings.values():
+        beside = "within" if reading.matches else "beyond"
+        noise = "" if reading.noise is None else f", noise {reading.noise:.2g} pu"
+        worst = reading.worst
+        matches.append(
+            f"{reading.signal} differs by {reading.rms:.2g} pu rms, {beside} the limit of "
+            f"{reading.limit:.2g} pu, by {reading.residuals[worst]:+.2g} pu at most (point "
+            f"{worst + 1}){noise}"
+        )
+    reason = "; ".join(matches)
     if fit is not None and not fit.result.success:
         return Verdict(NOT_CONVERGED, fit.result.message, causes)
     if not all(reading.matches for reading in readings.values()):
@@ -187,15 +189,3 @@ def _verdict(
     if not all(parameter.determined for parameter in fitted.values()):
         return Verdict(MATCHES, reason, causes)
     return Verdict(GOOD, reason, causes)
-
-
-def _match(reading: FieldReading) -> str:
-    """Word the match of a field signal: rms beside the limit, and the noise."""
-    beside = "within" if reading.matches else "beyond"
-    noise = "" if reading.noise is None else f", noise {reading.noise:.2g} pu"
-    worst = reading.worst
-    return (
-        f"{reading.signal} differs by {reading.rms:.2g} pu rms, {beside} the limit of "
-        f"{reading.limit:.2g} pu, by {reading.residuals[worst]:+.2g} pu at most (point "
-        f"{worst + 1}){noise}"
-    )
