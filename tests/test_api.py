@@ -323,9 +323,6 @@ def test_a_result_is_drawn_beside_each_of_its_records(result):
 def test_a_record_that_cannot_be_drawn_is_refused(result):
     with pytest.raises(exfit.ExfitError, match="up: not a record of this fit; known: fit"):
         result.plot("up")
-    without = replace(result, comparisons=(replace(result.comparison, overlays={}),))
-    with pytest.raises(exfit.ExfitError, match="no samples of this record: fit again"):
-        without.plot()
 
 
 def test_a_result_is_read_back_from_its_folder(result, tmp_path):

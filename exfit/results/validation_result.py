@@ -73,6 +73,11 @@ class ValidationResult:
         return all(match.accepted for match in self.validation)
 
     @property
+    def holds(self) -> bool:
+        """Whether the values hold on the records: every validation is accepted."""
+        return self.accepted
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What must be known of the records, each with its name: steps found in them, and more."""
         return tuple(

@@ -3,8 +3,8 @@
 import re
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -16,15 +16,18 @@ from exfit.features.report.charts import drawing
 from exfit.features.report.sections import AGAINST, OF_VALIDATION, SECTIONS, ReportSection
 from exfit.features.report.sections.against import against
 from exfit.features.report.sections.matches import MatchView, OverlayChart, live_data
-from exfit.features.report.sections.other_program import NO_TWIN, has_no_equations
+from exfit.features.report.sections.texts import number
 from exfit.features.report.verdict import Headline, headline, headline_of_validation
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported, ValidationResult
+from exfit.show.blocks import Block
+from exfit.show.html import html as blocks_html
 from exfit.util.text import percentage, rounded
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
 CHART_STYLE = TEMPLATES / "chart.css"
@@ -41,17 +44,13 @@ HEAD = 2000  # characters at the beginning of a page, among which it says what m
 class Page:
     """What a page shows: its title, what it comes to, its sections with their content.
 
-    ``folder`` is where the results lie, for the commands on the page; ``fitted`` is whether values
-    were fitted; ``simulated_by`` is what shows how they behave, ``no_behaviour`` why nothing does.
+    ``folder`` is where the results lie, for the commands on the page.
     """
 
     title: str
     headline: Headline
     sections: Sequence[tuple[ReportSection, Any]]
     folder: Path
-    fitted: bool = True
-    simulated_by: str = "exfit"
-    no_behaviour: str = NO_BEHAVIOUR
 
 
 def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str:
@@ -64,29 +63,23 @@ def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str
 
 def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) -> Page:
     """Return what the page of a fit shows, beside an ``other`` fit where there is one."""
-    sections = [(section, section.content(result)) for section in SECTIONS]
+    sections = [(section, _content(section, result)) for section in SECTIONS]
     if other is not None:
         sections.insert(len(sections) - 1, (AGAINST, against(result, other)))
-    page = Page(f"{result.model}: {result.name}", headline(result), sections, folder)
-    return _with_other_program(page, result)
+    return Page(f"{result.model}: {result.name}", headline(result), sections, folder)
 
 
 def validation_page(result: ValidationResult, folder: Path) -> Page:
     """Return what the page of a validation shows: nothing of a search, which there was none."""
-    every = ((section, section.content(result)) for section in OF_VALIDATION)
+    every = ((section, _content(section, result)) for section in OF_VALIDATION)
     sections = [(section, content) for section, content in every if content]
     title = f"{result.model}: {result.name}"
-    page = Page(title, headline_of_validation(result), sections, folder, fitted=False)
-    return _with_other_program(page, result)
+    return Page(title, headline_of_validation(result), sections, folder)
 
 
-def _with_other_program(page: Page, result: Reported) -> Page:
-    """Return a page that names the twin as what shows how values behave, or its lack."""
-    if result.other_program is None:
-        return page
-    if has_no_equations(result):
-        return replace(page, simulated_by="", no_behaviour=f"{NO_TWIN}.".capitalize())
-    return replace(page, simulated_by="the twin in exfit")
+def _content(section: ReportSection, result: Reported) -> Any:
+    content = section.content(result)
+    return tuple(content) if isinstance(content, Iterator) else content
 
 
 def page_html(page: Page, interactive: bool = True) -> str:
@@ -102,9 +95,6 @@ def page_html(page: Page, interactive: bool = True) -> str:
             sections=page.sections,
             numbers={part.key: k for k, (part, _) in enumerate(page.sections, start=1)},
             folder=str(page.folder),
-            fitted=page.fitted,
-            simulated_by=page.simulated_by,
-            no_behaviour=page.no_behaviour,
             data=list(live_data(overlays)),
             css=style,
             script=_text("report.js") if interactive else "",
@@ -160,7 +150,8 @@ def environment() -> "Environment":
         lstrip_blocks=True,
     )
     shared.filters |= {
-        "number": _number,
+        "number": number,
+        "blocks": _blocks,
         "rounded": rounded,
         "percentage": percentage,
         "feature_cells": feature_cells,
@@ -176,6 +167,9 @@ def _is_finite(value: float | None) -> bool:
     return value is not None and isfinite(value)
 
 
-def _number(value: float | None, digits: int = 5) -> str:
-    """Return a number in a few digits, a dash where there is none."""
-    return "–" if value is None or not isfinite(value) else f"{value:.{digits}g}"
+def _blocks(blocks: Iterable[Block]) -> "Markup":
+    """Write the blocks of a section; their charts by the template of charts."""
+    from markupsafe import Markup
+
+    template: Any = environment().get_template("chart.jinja").module
+    return Markup(blocks_html(blocks, template.chart))

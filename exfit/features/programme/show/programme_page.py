@@ -41,7 +41,7 @@ def programme_page(result: ProgrammeResult, folder: Path) -> Page:
             sections += _of_test(test, f"test-{number}")
     if result.fit is None:
         form = _section("form", FORM, form_without_bumps(result), "form")
-        unit = _section("test", "Unit and test", unit_without_bumps(result), "unit_and_test")
+        unit = _section("test", "Unit and test", tuple(unit_without_bumps(result)), "blocks")
         signed = _section("signatures", "Revision and signatures", signatures(result), "signatures")
         whole = [form, *sections, unit, signed]
         return Page(f"Programme {result.name}", _headline(result), whole, folder)
@@ -79,10 +79,8 @@ def _of_machine_fit(name: str, result: FitResult, key: str) -> Sections:
     """Yield the sections of a test that determines data of the machine."""
     views = tuple(_with_key(view, key) for view in fitted_matches(result))
     yield _section(key, f"Test {name}: record", views, "fit")
-    yield _section(
-        f"{key}-parameters", f"Test {name}: parameters", parameters(result), "parameters"
-    )
-    yield _section(f"{key}-findings", f"Test {name}: findings", findings(result), "findings")
+    for what, blocks in (("parameters", parameters(result)), ("findings", findings(result))):
+        yield _section(f"{key}-{what}", f"Test {name}: {what}", tuple(blocks), "blocks")
 
 
 def _section(key: str, heading: str, content: Any, template: str) -> tuple[ReportSection, Any]:

@@ -1,25 +1,19 @@
 """What a reader must know beside the numbers."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 from exfit.results.model import FitResult
-from exfit.results.validation_result import ValidationResult
+from exfit.results.validation_result import Reported
+from exfit.show.blocks import Block, Heading, Note, remarks
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What the records leave unresolved, and the notes of the fit."""
-
-    unresolved: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-def findings_of_validation(result: ValidationResult) -> Findings:
-    """Return the notes on the records of a validation."""
-    return Findings((), result.notes)
-
-
-def findings(result: FitResult) -> Findings:
-    """Return the findings of a fit."""
-    uncertainty = result.knowledge
-    return Findings(() if uncertainty is None else uncertainty.sentences, result.notes)
+def findings(result: Reported) -> Iterator[Block]:
+    """Yield what the records leave unresolved, and the notes on a fit or a validation."""
+    knowledge = result.knowledge if isinstance(result, FitResult) else None
+    unresolved = () if knowledge is None else knowledge.sentences
+    for title, texts in (("Unresolved", unresolved), ("Notes", result.notes)):
+        if texts:
+            yield Heading(title, 2)
+            yield from remarks("", texts, "", "warning")
+    if not unresolved and not result.notes:
+        yield Note("None.")

@@ -1,54 +1,87 @@
 """The system near its state of rest: poles, margins, Bode figures."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from exfit.features.report.layout import HALF, LEVEL
+from exfit.features.report.sections.texts import DASH, no_behaviour, number, values_of
 from exfit.results.description import SmallSignalView
 from exfit.results.validation_result import Reported
-from exfit.show.blocks import Chart, Panel, Rule, Series
-from exfit.simulation.small_signal import Bode, Margins, SmallSignal
+from exfit.show.blocks import (
+    Block,
+    Chart,
+    Facts,
+    Heading,
+    Note,
+    Panel,
+    Rule,
+    Series,
+    Table,
+    TableColumn,
+    columns,
+    row,
+)
+from exfit.simulation.small_signal import Bode, Margins
 
 Rules = tuple[Rule, ...]
 
 HALF_TURN = Rule(-180.0, style="level")
 
 
-@dataclass(frozen=True)
-class BodeFigures:
-    """The small-signal view of some tests with its Bode figures."""
-
-    tests: str
-    view: SmallSignal | None
-    why: str
-    charts: tuple[Chart, ...]
-
-    @property
-    def response(self) -> str:
-        """What the response of the view is called: of a record that is played in no closed loop."""
-        return "" if self.view is None else _name_of_response(self.view)
-
-
-def _name_of_response(view: SmallSignal) -> str:
-    source, output = view.path
-    return "closed loop" if output == "vt" else f"response from {source} to {output}"
-
-
-def small_signal(result: Reported) -> tuple[BodeFigures, ...] | None:
-    """Return the small-signal views of a fit; None where the result does not hold them."""
+def small_signal(result: Reported) -> Iterator[Block]:
+    """Yield poles, margins and Bode figures of each test, or why there are none."""
     if result.behaviour is None:
-        return None
-    return tuple(
-        BodeFigures(
-            ", ".join(of_tests.tests),
-            of_tests.view,
-            of_tests.why,
-            tuple(_bodes(f"bode-{k}", of_tests)),
+        yield Note(no_behaviour(result), mark="faint")
+        return
+    yield Note(f"From the exact linearisation at rest, with {values_of(result)}.")
+    for k, of_tests in enumerate(result.behaviour.small_signal):
+        tests, view = ", ".join(of_tests.tests), of_tests.view
+        if view is None:
+            yield Note(f"{tests}: none, because {of_tests.why}.", mark="faint")
+            continue
+        source, output = view.path
+        # of a record that is played in there is no closed loop
+        closed = output == "vt"
+        response = "closed loop" if closed else f"response from {source} to {output}"
+        margins = view.margins if closed else None
+        width = "none" if view.bandwidth is None else f"{number(view.bandwidth, 4)} Hz"
+        yield Heading(tests, 2)
+        yield Facts(
+            (
+                ("gain margin", _margin(margins, "gain", " dB")),
+                ("phase margin", _margin(margins, "phase", "°")),
+                ("bandwidth (-3 dB)", width),
+                (f"peak of the {response}", f"{view.peak:.2f} dB"),
+            )
         )
-        for k, of_tests in enumerate(result.behaviour.small_signal)
+        numbers = ("real part (1/s)", "imaginary part (1/s)", "damping ratio", "frequency (Hz)")
+        yield Table(
+            (*columns(*numbers, numbers=numbers), TableColumn("states that take part", folds=True)),
+            tuple(
+                row(
+                    number(pole.value.real),
+                    f"± {number(abs(pole.value.imag))}" if pole.value.imag else "0",
+                    f"{pole.damping:.3f}",
+                    number(pole.frequency, 4) if pole.frequency else DASH,
+                    ", ".join(pole.states),
+                )
+                for pole in view.poles
+            ),
+            f"Poles{' of the closed loop' if closed else ''}, {tests}",
+            leading=0,
+        )
+        yield from _bodes(f"bode-{k}", of_tests)
+
+
+def _margin(margins: Margins | None, of: Literal["gain", "phase"], unit: str) -> str:
+    if margins is None:
+        return "no voltage loop"
+    margin, at = (
+        (margins.gain, margins.gain_at) if of == "gain" else (margins.phase, margins.phase_at)
     )
+    return "no crossover" if margin is None else f"{margin:.2f}{unit} at {number(at, 4)} Hz"
 
 
 def _bodes(key: str, of_tests: SmallSignalView) -> Iterator[Chart]:

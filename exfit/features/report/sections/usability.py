@@ -5,8 +5,11 @@ from math import isfinite
 from typing import NamedTuple
 
 from exfit.features.report.sections.other_program import NO_TWIN, has_no_equations
+from exfit.features.report.sections.texts import DASH, values_of
 from exfit.results.description import Behaviour
+from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported
+from exfit.show.blocks import Block, Cell, Note, Table, columns
 
 NOT_HELD = "not stated: the fit was interrupted"
 
@@ -28,6 +31,20 @@ def usability(result: Reported) -> tuple[UsabilityCheck, ...]:
     if behaviour is None:
         return no_usability(NO_TWIN if has_no_equations(result) else NOT_HELD)
     return (_initialises(behaviour), _no_disturbance(behaviour), _damping(behaviour))
+
+
+def usability_table(result: Reported) -> Iterator[Block]:
+    """Yield the checks of usability as a table, and what made them."""
+    words = {True: Cell("yes", "ok"), False: Cell("NO", "bad"), None: Cell(DASH)}
+    checks = usability(result)
+    rows = tuple((Cell(each.name), words[each.passed], Cell(each.result)) for each in checks)
+    title = "Usability of the model (cf. NERC MOD-026-1 R6)"
+    yield Table(columns("check", "passed", "result"), rows, title)
+    if not has_no_equations(result):
+        by = "exfit" if result.other_program is None else "the twin in exfit"
+        again = " The planner's program is to repeat it with the records that follow."
+        only = again if isinstance(result, FitResult) else ""
+        yield Note(f"By the simulation of {by}, with {values_of(result)}.{only}")
 
 
 def no_usability(why: str) -> tuple[UsabilityCheck, ...]:

@@ -1,0 +1,45 @@
+"""Blocks as HTML: every block is shown, and no text of one becomes a tag."""
+
+from pages import Page
+from payloads import MARKUP, Structure
+
+from exfit.show.blocks import Cell, Facts, Heading, Note, Table, Verbatim, columns
+from exfit.show.html import html
+
+
+def page_of(text):
+    """Return the page of blocks whose every text is the same."""
+    heads = columns(text, text, numbers=(text,))
+    return html(
+        [
+            Heading(text, 2),
+            Facts(((text, text),)),
+            Note(text, label=text, mark="bad"),
+            Note(text, "warning"),
+            Note(text, "warning"),
+            Table(heads, ((Cell(text), Cell(text, "bad")), (Cell(text), Cell(text))), text),
+            Verbatim(text),
+        ]
+    )
+
+
+def test_every_text_is_shown_and_none_becomes_a_tag():
+    plain = Structure(page_of("word"))
+    assert page_of("word").count("word") == 16  # that of the table names its region, too
+    for text in MARKUP:
+        if "`" not in text and ": " not in text:
+            assert Structure(page_of(text)).tags == plain.tags
+            Page(page_of(text))
+
+
+def test_warnings_that_follow_each_other_are_one_list():
+    page = Page(html([Note("a", "warning"), Note("b", "warning"), Note("c"), Note("d", "remedy")]))
+    assert [tag for tag, _ in page.tags] == ["ul", "li", "li", "p", "ul", "li"]
+
+
+def test_a_row_that_begins_with_a_doubt_is_shaded_and_lines_below_the_first_are_small():
+    table = Table(columns("a", "b"), ((Cell("x\nmeaning", "doubt"), Cell("why", "doubt")),), "t")
+    page = Page(html([table]))
+    assert ("tr", {"class": "vague"}) in page.tags
+    assert ("td", {"class": "why"}) in page.tags
+    assert page.tables["t"] == [["a", "b"], ["x meaning", "why"]]
