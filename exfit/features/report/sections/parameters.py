@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from exfit.case.saturation import MEANINGS
 from exfit.features.report.sections.texts import DASH, number
-from exfit.inference import Interval
+from exfit.inference.confidence import Interval
 from exfit.results.description import SheetRow
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.typical_values import DEVIATION, by_weight, moved_parameters
