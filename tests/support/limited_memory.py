@@ -11,7 +11,7 @@ import json, re, resource, sys
 from contextlib import suppress
 from pathlib import Path
 
-import numpy, scipy.io, scipy.signal, pyarrow.parquet, python_calamine, comtrade
+import numpy, scipy.signal, comtrade
 
 resource.setrlimit(resource.RLIMIT_AS, ({allowed}, {allowed}))
 
@@ -31,7 +31,8 @@ for name in sys.argv[1:]:
     except OSError:
         status = "VmHWM: 0 kB"
     peak = 1024 * int(re.search(r"VmHWM:\s*(\d+)", status)[1])
-    print(json.dumps([name, message, peak]), flush=True)
+    own = 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    print(json.dumps([name, message, max(peak, own)]), flush=True)
 """
 
 

@@ -7,8 +7,6 @@ import zlib
 
 import numpy as np
 
-from exfit.records.formats.parquet_pages import PACKED, CompactReader
-
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 RELATIONS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006"
@@ -118,7 +116,8 @@ def ods(rows):
     """Return an OpenDocument spreadsheet of these rows."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as book:
-        book.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        kind = "application/vnd.oasis.opendocument.spreadsheet"
+        book.writestr("mimetype", kind, zipfile.ZIP_STORED)  # as programs recognise it
         book.writestr(
             "content.xml",
             f'<office:document-content xmlns:office="{OFFICE}office:1.0" '
@@ -312,18 +311,19 @@ def parquet_that_lies(unpacked=2**31 - 1, rows=1000):
     from pyarrow import parquet as files
 
     stream = io.BytesIO()
-    table = pa.table({"t": np.arange(float(rows))})
+    schema = pa.schema([pa.field("t", pa.float64(), nullable=False)])
+    table = pa.table({"t": np.arange(float(rows))}, schema)
     files.write_table(table, stream, compression="none", use_dictionary=False)
     data = stream.getvalue()
-    start = files.ParquetFile(stream).metadata.row_group(0).column(0).data_page_offset
-    reader = CompactReader(data[start:])
-    packed = reader.integers_of_struct()[PACKED]
+    chunk = files.ParquetFile(stream).metadata.row_group(0).column(0)
+    start, packed = chunk.data_page_offset, 8 * rows
+    length = chunk.total_compressed_size - packed  # of the header of its only page
     sizes = b"".join(b"\x15" + varint(2 * size) for size in (0, unpacked, packed))
     values = b"\x2c\x15" + varint(2 * rows) + b"\x15\x00\x15\x06\x15\x06\x00"
-    filled = reader.at - len(sizes) - len(values) - 3  # of the statistics' room
+    filled = length - len(sizes) - len(values) - 3  # of the statistics' room
     header = sizes + values + b"\xa8" + varint(filled) + bytes(filled) + b"\x00"
-    assert len(header) == reader.at
-    return data[:start] + header + data[start + reader.at :]
+    assert len(header) == length
+    return data[:start] + header + data[start + length :]
 
 
 def varint(value):

@@ -14,6 +14,18 @@ def read_columns(path, names):
     return open_table(path).numbers(names)
 
 
+def in_this_process(read):
+    """Return a function that reads a file by a module of a binary format, without its child."""
+    from exfit.records.formats.columns import table_of
+    from exfit.records.formats.memory import memory_limit
+
+    def table(path, *sheet):
+        limit = memory_limit(path, None)
+        return table_of(path, read(path, *sheet), limit)
+
+    return table
+
+
 def everything(table):
     """Ask a table for all that it may hold, as a user might; what is refused is RecordError."""
     if table.clock:

@@ -2,10 +2,9 @@
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import date, datetime
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from exfit.errors import ExfitError, FileError
 from exfit.records.formats import WORKBOOKS
@@ -98,28 +97,12 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 def _workbook_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield the cells of each row of the only sheet with content behind its number."""
-    from exfit.records.formats.excel import sheets_of
+    from exfit.records.formats.child import texts_of_sheets
 
-    sheets = {
-        name: rows
-        for name, rows in sheets_of(path).items()
-        if any(cell != "" for row in rows for cell in row)
-    }
+    sheets = {name: rows for name, rows in texts_of_sheets(path).items() if any(map(any, rows))}
     if len(sheets) > 1:
         raise ExfitError(f"{path}: several sheets: {', '.join(sheets)}; leave one with the table")
     for rows in sheets.values():
-        for number, row in enumerate(rows, start=1):
-            cells = [_text(cell) for cell in row]
+        for number, cells in enumerate(rows, start=1):
             if any(cells):
                 yield number, cells
-
-
-def _text(cell: Any) -> str:
-    """Return what a cell of a workbook shows: whole numbers without a point."""
-    if isinstance(cell, bool):
-        return "yes" if cell else "no"
-    if isinstance(cell, float):
-        return str(int(cell)) if cell.is_integer() else repr(cell)
-    if isinstance(cell, datetime | date):
-        return cell.isoformat()
-    return str(cell).strip()

@@ -11,11 +11,12 @@ __all__ = ["PLAY_IN", "Table", "open_table"]
 COMTRADE = (".cfg", ".cff")
 BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
 PLAY_IN = ".plb"
+IN_CHILD = {".mat": "matlab", ".parquet": "parquet"}
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 
 def open_table(path: Path, sheet: str | None = None, memory: float | None = None) -> Table:
-    """Return the table of a file of any kind that is known, by its suffix; ``sheet`` of a workbook.
+    """Open a file of any kind that is known, by its suffix; ``sheet`` of a workbook.
 
     ``memory`` (GB) is what reading may take; None: 1 GB, or four times the file's size up to 4 GB.
     Raises RecordError for a file that cannot be read or needs more, and for a sheet of a file
@@ -23,23 +24,15 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
     """
     suffix = path.suffix.lower()
     if suffix in WORKBOOKS:
-        from exfit.records.formats.excel import read_excel
-
-        return read_excel(path, sheet, memory)
+        return _in_child("excel", path, sheet, memory)
     if sheet is not None:
         raise RecordError(f"{path}: a sheet, {sheet!r}, is given, but only workbooks have sheets")
     if suffix in COMTRADE or (suffix in BESIDE_CFG and siblings(path, ".cfg")):
         from exfit.records.formats.comtrade import read_comtrade
 
         return read_comtrade(path, memory)
-    if suffix == ".mat":
-        from exfit.records.formats.matlab import read_mat
-
-        return read_mat(path, memory)
-    if suffix == ".parquet":
-        from exfit.records.formats.parquet import read_parquet
-
-        return read_parquet(path, memory)
+    if suffix in IN_CHILD:
+        return _in_child(IN_CHILD[suffix], path, None, memory)
     if suffix == PLAY_IN:
         from exfit.records.formats.play_in import read_play_in
 
@@ -47,3 +40,9 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
     from exfit.records.formats.text import read_text_table
 
     return read_text_table(path, memory)
+
+
+def _in_child(module: str, path: Path, sheet: str | None, memory: float | None) -> Table:
+    from exfit.records.formats.child import read_table
+
+    return read_table(module, path, sheet, memory)

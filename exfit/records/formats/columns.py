@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from exfit.errors import RecordError
 from exfit.records.clock import find_clock, in_seconds, soc_in_seconds
 from exfit.records.epoch import are_soc
+from exfit.records.formats.memory import MemoryLimit
 from exfit.records.formats.table import (
     NONE,
     Array,
@@ -114,6 +115,41 @@ class Columns:
         return first + rest[0] if rest else first
 
 
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """Columns of a binary file as its reader finds them; ``fetch`` as that of `Columns`.
+
+    ``lengths`` are their numbers of samples. ``counted`` is what messages call a sample; ``rows``
+    are the numbers of samples in the file, None where these are counted from 1.
+    """
+
+    sha256: str
+    names: Sequence[str]
+    units: Mapping[str, str]
+    lengths: Sequence[int]
+    fetch: Callable[[int], NDArray[Any]]
+    counted: str
+    rows: Sequence[int] | None = None
+    stamps: Sequence[str] = ()
+
+
+def table_of(path: Path, contents: Contents, limit: MemoryLimit) -> Columns:
+    """Make a table of what was found in a file, whose columns take no more memory than allowed."""
+    rows, lengths = contents.rows, dict(zip(contents.names, contents.lengths, strict=True))
+    return Columns(
+        path=path,
+        sha256=contents.sha256,
+        names=tuple(contents.names),
+        units=contents.units,
+        fetch=contents.fetch,
+        where=lambda row: f"{path}: {contents.counted} {row + 1 if rows is None else rows[row]}",
+        refuse_larger=lambda columns: limit.check_columns(
+            [lengths.get(name, 0) for name in columns]
+        ),
+        stamps=tuple(contents.stamps),
+    )
+
+
 def missing_package(path: Path, package: str, extra: str) -> RecordError:
     """Return the error of an optional package that is not installed."""
     return RecordError(
@@ -125,7 +161,7 @@ def sound(path: Path, kind: str, read: Callable[[], T]) -> T:
     """Return what a package reads of a file; raises RecordError where it is not of that kind."""
     try:
         return read()
-    except RecordError:
+    except (RecordError, MemoryError):
         raise
     except BaseException as error:  # damaged files make a package fail in many ways
         if not (isinstance(error, Exception) or type(error).__name__ == PANIC):

@@ -14,14 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats import compound, xls
-from exfit.records.formats.archive import packed, unpacked
 from exfit.records.formats.cells import quoted
-from exfit.records.formats.columns import Columns, missing_package, sound
+from exfit.records.formats.columns import Contents, missing_package, sound
 from exfit.records.formats.heads import is_units, names_of, units_of
-from exfit.records.formats.memory import MemoryLimit, memory_limit
-from exfit.records.formats.sheet_size import CELL_BYTES, check_sheets
-from exfit.records.formats.table import Table, column_error, read_bytes
+from exfit.records.formats.table import column_error, read_bytes
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
@@ -31,7 +27,6 @@ Row = Sequence[Any]
 FEWEST_CELLS = 2  # of a row that holds a sample: the time and one signal
 STAMP_KINDS = ("timestamp", "time of day")  # kinds of cells
 WORKBOOK = "an Excel workbook"
-BINARY = "xl/workbook.bin"
 
 
 @dataclass(frozen=True)
@@ -46,8 +41,8 @@ class _Sheet:
     samples: tuple[int, ...]
 
 
-def read_excel(path: Path, sheet: str | None = None, memory: float | None = None) -> Table:
-    """Return the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xls) or an .ods.
+def read(path: Path, sheet: str | None = None) -> Contents:
+    """Read the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xls) or an .ods.
 
     Above the samples is a row of names, between them perhaps a row of units; what is
     higher, as titles do, is left out, and so are blank rows and columns. Timestamps
@@ -56,15 +51,13 @@ def read_excel(path: Path, sheet: str | None = None, memory: float | None = None
     Args:
         path: the workbook.
         sheet: the sheet's name; None: the only one with a table.
-        memory: what reading may take, GB.
 
     Raises:
-        RecordError: a file that is damaged or needs more memory, no table in it, several of them
-            and no sheet named, or the package python-calamine missing.
+        RecordError: a file that is damaged, no table in it, several of them and no sheet named, or
+            the package python-calamine missing.
     """
-    limit = memory_limit(path, memory)
     data = read_bytes(path)
-    tables = _tables(path, _workbook(path, data, limit), sheet)
+    tables = _tables(path, _workbook(path, data), sheet)
     if len(tables) > 1:
         names = ", ".join(repr(table.name) for table in tables)
         raise RecordError(f"{path}: name one of the sheets with a table: {names}")
@@ -73,40 +66,37 @@ def read_excel(path: Path, sheet: str | None = None, memory: float | None = None
         raise RecordError(
             f"{path}: no table{where}: a row of names above rows of numbers, {FEWEST_CELLS} or more"
         )
-    return _columns(path, hashlib.sha256(data).hexdigest(), tables[0], sheet is not None, limit)
+    return _contents(hashlib.sha256(data).hexdigest(), tables[0], sheet is not None, path)
 
 
-def sheets_of(path: Path) -> dict[str, list[Row]]:
-    """Return the cells of all sheets by name, those of a table of words among them.
+def texts_of_sheets(path: Path) -> dict[str, list[list[str]]]:
+    """Read the cells of all sheets as texts, by name; whole numbers have no point.
 
-    Raises RecordError for a file that is damaged or needs more memory than the usual limit.
+    Raises RecordError for a file that is damaged.
     """
-    book = _workbook(path, read_bytes(path), memory_limit(path, None))
-    return {name: sound(path, WORKBOOK, partial(_rows, book, name)) for name in book.sheet_names}
+    book = _workbook(path, read_bytes(path))
+    return {
+        name: [[*map(_text, row)] for row in sound(path, WORKBOOK, partial(_rows, book, name))]
+        for name in book.sheet_names
+    }
 
 
-def _workbook(path: Path, data: bytes, limit: MemoryLimit) -> "CalamineWorkbook":
+def _text(cell: Any) -> str:
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if isinstance(cell, float):
+        return str(int(cell)) if cell.is_integer() else repr(cell)
+    if isinstance(cell, datetime | date):
+        return cell.isoformat()
+    return str(cell).strip()
+
+
+def _workbook(path: Path, data: bytes) -> "CalamineWorkbook":
     try:
         from python_calamine import CalamineWorkbook
     except ImportError:
         raise missing_package(path, "python-calamine", "excel") from None
-
-    def opened() -> "CalamineWorkbook":
-        return CalamineWorkbook.from_filelike(_checked(path, data, limit))
-
-    return sound(path, WORKBOOK, opened)
-
-
-def _checked(path: Path, data: bytes, limit: MemoryLimit) -> io.BytesIO:
-    """Return a workbook whose sheets need no more memory than they may take, unpacked."""
-    if data.startswith(compound.MARK):
-        xls.check(data, limit)
-        return io.BytesIO(data)
-    entries = unpacked(data, limit)
-    if BINARY in entries:
-        raise RecordError(f"{path}: a binary workbook (.xlsb); save it as .xlsx")
-    check_sheets(entries, limit)
-    return packed(entries)
+    return sound(path, WORKBOOK, lambda: CalamineWorkbook.from_filelike(io.BytesIO(data)))
 
 
 def _tables(path: Path, book: "CalamineWorkbook", sheet: str | None) -> list[_Sheet]:
@@ -169,33 +159,29 @@ def _sheet(
     return _Sheet(name, rows, tuple(places), names, units_of(names, own_units), samples)
 
 
-def _columns(
-    path: Path, sha256: str, sheet: _Sheet, name_sheet: bool, limit: MemoryLimit
-) -> Columns:
-    place = f"{path}: sheet {sheet.name!r}, row" if name_sheet else f"{path}: row"
-
+def _contents(sha256: str, sheet: _Sheet, name_sheet: bool, path: Path) -> Contents:
+    counted = f"sheet {sheet.name!r}, row" if name_sheet else "row"
     samples = [sheet.rows[row] for row in sheet.samples]
-    held = CELL_BYTES * sum(map(len, sheet.rows))
-
-    def where(row: int) -> str:
-        return f"{place} {sheet.samples[row] + 1}"
 
     def fetch(at: int) -> NDArray[Any]:
-        return _column([*map(itemgetter(sheet.places[at]), samples)], sheet.names[at], where)
+        cells = [*map(itemgetter(sheet.places[at]), samples)]
+        return _column(
+            cells, sheet.names[at], lambda row: f"{path}: {counted} {sheet.samples[row] + 1}"
+        )
 
-    return Columns(
-        path=path,
+    return Contents(
         sha256=sha256,
         names=sheet.names,
         units=sheet.units,
+        lengths=[len(samples)] * len(sheet.names),
         fetch=fetch,
-        where=where,
-        refuse_larger=lambda columns: limit.check_columns([len(samples)] * len(columns), held),
-        stamps=tuple(
+        counted=counted,
+        rows=[row + 1 for row in sheet.samples],
+        stamps=[
             name
             for name, at in zip(sheet.names, sheet.places, strict=True)
-            if _kind(sheet.rows[sheet.samples[0]][at]) in STAMP_KINDS
-        ),
+            if _kind(samples[0][at]) in STAMP_KINDS
+        ],
     )
 
 

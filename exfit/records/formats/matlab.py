@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import struct
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats import mat4, mat5
-from exfit.records.formats.columns import Columns, sound
+from exfit.records.formats.columns import Contents, sound
 from exfit.records.formats.heads import units_of
-from exfit.records.formats.memory import MemoryLimit, memory_limit
-from exfit.records.formats.table import Array, Table, column_error, read_bytes
+from exfit.records.formats.table import Array, column_error, read_bytes
 
+HEAD, TAG = 128, 8  # bytes of a file's head and of an element's, in version 5
+ORDERS = {b"IM": "<", b"MI": ">"}  # of bytes, by the last two of the head
 HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_OFFSET = 512  # of the HDF5 signature in a file of version 7.3
 MATLAB = "a MATLAB file"
@@ -25,8 +26,8 @@ DEEPEST = 8  # structs in structs
 NamedVector = tuple[str, NDArray[Any]]
 
 
-def read_mat(path: Path, memory: float | None = None) -> Table:
-    """Return the table of a .mat file: its vectors, and the columns of its matrices.
+def read(path: Path) -> Contents:
+    """Read a .mat file: its vectors, and the columns of its matrices.
 
     Columns are called as in MATLAB: ``Ut`` for a vector, ``data(:,2)`` for a column of a matrix,
     ``s.Ut`` for a field of a struct and ``s(2).Ut`` where there are several. What Simulink saves
@@ -34,53 +35,54 @@ def read_mat(path: Path, memory: float | None = None) -> Table:
     ``s.signals(1).values``. Scalars are left out. Vectors may differ in length, as long as those
     requested together do not; complex numbers and text are refused when they are requested.
 
-    ``memory`` (GB) is what reading may take. Raises RecordError for a file that is damaged or needs
-    more, is of version 7.3 (HDF5), or without any vector.
+    Raises RecordError for a file that is damaged, of version 7.3 (HDF5), or without any vector.
     """
-    limit = memory_limit(path, memory)
     data = read_bytes(path)
     if data.startswith(HDF5) or data[HDF5_OFFSET:].startswith(HDF5):
         raise RecordError(
             f"{path}: version 7.3 (HDF5) is not read; in MATLAB: save('{path.name}', '-v7')"
         )
-    vectors = [
-        vector
-        for name, value in _loaded(path, data, limit).items()
-        for vector in _vectors(name, value)
-    ]
+    variables = _loaded(path, data).items()
+    vectors = [vector for name, value in variables for vector in _vectors(name, value)]
     names = tuple(name for name, _ in vectors)
-    lengths = {name: len(values) for name, values in vectors}
-    held = len(data) + sum(values.nbytes for _, values in vectors)
     if not any(_is_real(values) for _, values in vectors):
         raise RecordError(f"{path}: no vector of numbers in it; objects such as timeseries are not")
-    return Columns(
-        path=path,
+    return Contents(
         sha256=hashlib.sha256(data).hexdigest(),
         names=names,
         units=units_of(names),
+        lengths=[len(values) for _, values in vectors],
         fetch=lambda at: _numbers(path, *vectors[at]),
-        where=lambda row: f"{path}: sample {row + 1}",
-        refuse_larger=lambda columns: limit.check_columns(
-            [lengths.get(name, 0) for name in columns], held
-        ),
+        counted="sample",
     )
 
 
-def _loaded(path: Path, data: bytes, limit: MemoryLimit) -> dict[str, Any]:
-    """Return the variables of the file, in its order."""
+def _loaded(path: Path, data: bytes) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    if mat5.is_mat5(data):
-        sound(path, MATLAB, lambda: mat5.check(data, limit))
-    elif mat4.is_mat4(data):
-        sound(path, MATLAB, lambda: mat4.check(data, limit))
-    else:
+    if b"\0" not in data[:4] and data[HEAD - 2 : HEAD] not in ORDERS:
         raise RecordError(f"{path}: not {MATLAB}, or damaged: no head of version 4 to 7.2")
+    _refuse_cut_off(path, data)
     stream: Any = io.BytesIO(data)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of objects that SciPy cannot read
         variables = sound(path, MATLAB, lambda: loadmat(stream))
     return {name: value for name, value in variables.items() if not name.startswith("__")}
+
+
+def _refuse_cut_off(path: Path, data: bytes) -> None:
+    """Raise RecordError where the elements of a file of version 5 do not end with it.
+
+    SciPy takes what it finds until then. Source: MathWorks, "MAT-File Format", chapter 1.
+    """
+    if data[HEAD - 2 : HEAD] not in ORDERS or b"\0" in data[:4]:
+        return
+    at = HEAD
+    while at + TAG <= len(data):
+        kind, size = struct.unpack_from(ORDERS[data[HEAD - 2 : HEAD]] + "II", data, at)
+        at += TAG if kind >> 16 else TAG + size  # a small element has its size in the upper half
+    if at != len(data):
+        raise RecordError(f"{path}: not {MATLAB}, or damaged: its elements do not end with it")
 
 
 def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
@@ -101,9 +103,9 @@ def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
 def _of_structs(name: str, value: NDArray[Any], depth: int) -> Iterator[NamedVector]:
     """Yield the columns in the fields of a struct, or of several."""
     structs = value.ravel()
-    for at, struct in enumerate(structs):
+    for at, one in enumerate(structs):
         own = name if structs.size == 1 else f"{name}({at + 1})"
-        fields = {field: struct[field] for field in value.dtype.names or ()}
+        fields = {field: one[field] for field in value.dtype.names or ()}
         signals = fields.pop("signals", None) if "time" in fields else None
         for field, inner in fields.items():
             yield from _vectors(f"{own}.{field}", inner, depth + 1)

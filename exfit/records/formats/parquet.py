@@ -1,7 +1,7 @@
 """Parquet files, by pyarrow; a column is read when it is requested."""
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.columns import Columns, missing_package, sound
+from exfit.records.formats.columns import Contents, missing_package, sound
 from exfit.records.formats.heads import stated
-from exfit.records.formats.memory import memory_limit, readable
-from exfit.records.formats.parquet_pages import unpacked_bytes
-from exfit.records.formats.table import Table, column_error
+from exfit.records.formats.memory import readable
+from exfit.records.formats.table import column_error
 from exfit.records.units import unit_in
 from exfit.util.root import on_disk
 
@@ -22,55 +21,38 @@ if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
 PARQUET = "a Parquet file"
-ARROW_BYTES = 24  # of a sample, while a column becomes an array
 UNIT_KEYS = (b"unit", b"units")  # of a column's metadata
 
 
-def read_parquet(path: Path, memory: float | None = None) -> Table:
-    """Return the table of a Parquet file: its columns of numbers, timestamps and times of day.
+def read(path: Path) -> Contents:
+    """Read a Parquet file: its columns of numbers, timestamps and times of day.
 
     Nulls are missing samples; the unit is that of the column's metadata (unit or units), else of
-    its name. ``memory`` (GB) is what reading may take. Raises RecordError for a file that is
-    damaged or empty or needs more, or the package pyarrow missing.
+    its name. Raises RecordError for a file that is damaged or empty, or the package pyarrow
+    missing.
     """
     try:
         from pyarrow.parquet import ParquetFile
     except ImportError:
         raise missing_package(path, "pyarrow", "parquet") from None
-    limit = memory_limit(path, memory)
-    sha256 = _hash(path)
+    with readable(path), on_disk(path).open("rb") as data:
+        sha256 = hashlib.file_digest(data, "sha256").hexdigest()
 
     def opened() -> "ParquetFile":
         return ParquetFile(on_disk(path), page_checksum_verification=True)
 
-    def unpacked(columns: Sequence[str]) -> int:
-        def read() -> int:
-            with opened() as file, on_disk(path).open("rb") as data:
-                return unpacked_bytes(data, file.metadata, columns)
-
-        return sound(path, PARQUET, read)
-
     schema, rows = sound(path, PARQUET, lambda: _outline(opened))
     if rows == 0:
         raise RecordError(f"{path}: no samples in it")
-    names = tuple(schema.names)
-    return Columns(
-        path=path,
+    return Contents(
         sha256=sha256,
-        names=names,
+        names=schema.names,
         units=_units(schema),
+        lengths=[rows] * len(schema.names),
         fetch=lambda at: _fetch(path, opened, schema.field(at)),
-        where=lambda row: f"{path}: row {row + 1}",
-        refuse_larger=lambda columns: limit.check_columns(
-            [rows] * len(columns), max(ARROW_BYTES * rows, unpacked(columns))
-        ),
-        stamps=tuple(field.name for field in schema if _is_stamp(field.type)),
+        counted="row",
+        stamps=[field.name for field in schema if _is_stamp(field.type)],
     )
-
-
-def _hash(path: Path) -> str:
-    with readable(path), on_disk(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from openpyxl import Workbook
-from tables import damage, everything, refused
+from tables import damage, everything, in_this_process, refused
 
 from exfit.errors import RecordError
-from exfit.records.formats.excel import read_excel
+from exfit.records.formats import excel, open_table
+
+read_excel = in_this_process(excel.read)
 
 NAMES = ("Time", "Ut", "If")
 ROWS = [(0.0, 15.75, 700), (0.1, 15.8, 701), (0.2, 15.85, 702)]
@@ -248,4 +250,4 @@ def test_whatever_is_damaged_only_record_errors_come_out(book, inside, apply):
             for name, content in members.items():
                 archive.writestr(name, content)
     with suppress(RecordError):
-        everything(read_excel(path))
+        everything(open_table(path))

@@ -10,12 +10,14 @@ import pytest
 import scipy.io
 from hypothesis import HealthCheck, given, settings
 from scipy.io import savemat
-from tables import damage, everything, refused
+from tables import damage, everything, in_this_process, refused
 from tiers import few_of
 
 from exfit.errors import RecordError
-from exfit.records.formats.matlab import read_mat
+from exfit.records.formats import matlab, open_table
 from exfit.records.formats.table import increases
+
+read_mat = in_this_process(matlab.read)
 
 T = np.arange(6) * 0.01
 UT = 15.75 + 0.1 * T
@@ -171,7 +173,7 @@ def test_a_layout_that_would_end_python_is_refused(mat, at, new):
     path = mat({"t": T, "Ut": UT})
     data = path.read_bytes()
     path.write_bytes(data[:at] + new + data[at + len(new) :])
-    refused(lambda: read_mat(path), "bump.mat", "damaged")
+    refused(lambda: open_table(path), "bump.mat", "damaged")
 
 
 MATLABS_OWN = sorted((Path(scipy.io.__file__).parent / "matlab/tests/data").glob("*.mat"))
@@ -195,6 +197,7 @@ def test_no_file_of_matlab_that_scipy_reads_is_held_for_damaged():
     assert read > 50
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options", few_of([{"format": "4"}, {"format": "5"}, {"do_compression": True}], 1), ids=str
 )
@@ -208,7 +211,7 @@ def test_whatever_is_damaged_only_record_errors_come_out(tmp_path, options, appl
     savemat(path, {"t": T, "data": DATA} | fields, **options)
     path.write_bytes(apply(path.read_bytes()))
     with suppress(RecordError):
-        everything(read_mat(path))
+        everything(open_table(path))
 
 
 def test_several_infinite_numbers_are_no_time(mat):

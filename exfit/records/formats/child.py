@@ -1,0 +1,227 @@
+"""Binary files, read in a process of its own whose memory and time are limited.
+
+A file of a few kilobytes can declare, or unpack to, more than any computer holds, and a damaged one
+can end a package that reads it, and Python with it. The process of this one starts a child for such
+a file, and asks it for one column after the other: a line of JSON each way, then the bytes of the
+column. The child ends with the table.
+
+Memory is limited where the system limits the addresses of a process (Linux; macOS and Windows do
+not). Everywhere what a file says of its size is checked before it is read, and the child is ended
+when it takes too long.
+"""
+
+import json
+import os
+import sys
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import fields
+from importlib import import_module
+from io import BufferedReader
+from pathlib import Path
+from subprocess import PIPE, Popen
+from tempfile import TemporaryFile
+from threading import Timer
+from time import monotonic
+from typing import IO, Any, NoReturn, cast
+from weakref import finalize
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+from exfit.records.formats.columns import Columns, Contents, table_of
+from exfit.records.formats.memory import (
+    GIGABYTE,
+    HOW_TO_RAISE,
+    OWN,
+    MemoryLimit,
+    TooLargeError,
+    memory_limit,
+)
+from exfit.util.root import on_disk
+
+BOOT = (
+    "import sys; sys.path[:] = sys.argv[1:]; from exfit.records.formats.child import serve; serve()"
+)
+ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "RUST_BACKTRACE": "0"}
+PACKAGES = {"excel": "python_calamine", "matlab": "scipy.io", "parquet": "pyarrow.parquet"}
+LONGEST = (60.0, 10e-6)  # s to answer, and for each byte of the file
+ADDRESSES = 2e9  # bytes that libraries reserve, where the system does not say it
+OUT_OF_MEMORY = b"memory allocation"  # as Rust says it
+LEAST = 0.3e9  # bytes: with fewer addresses some packages read no file at all
+LAST_WORDS = 4096  # bytes of what the child said that are looked at
+
+
+def read_table(module: str, path: Path, sheet: str | None, memory: float | None) -> Columns:
+    """Read a binary file by a module of this package, in a child; ``memory`` in GB.
+
+    Raises RecordError for a file that is damaged or needs more memory or time than it may take, or
+    where the package that reads it is missing.
+    """
+    limit = memory_limit(path, memory)
+    child = _Child(limit, module, "read", sheet)
+    return table_of(path, Contents(fetch=child.column, **child.ask()), limit)
+
+
+def texts_of_sheets(path: Path) -> dict[str, list[list[str]]]:
+    """Read the cells of all sheets of a workbook as texts, by name; raises RecordError."""
+    child = _Child(memory_limit(path, None), "excel", "texts_of_sheets", None)
+    sheets: dict[str, list[list[str]]] = child.ask()
+    return sheets
+
+
+class _Child:
+    """The process that reads one file."""
+
+    def __init__(self, limit: MemoryLimit, module: str, function: str, sheet: str | None) -> None:
+        _refuse_larger_archive(limit)
+        self.limit = limit
+        self.first = [module, function, str(limit.path), sheet, limit.most]
+        self.errors = TemporaryFile()  # noqa: SIM115 - it ends with the process
+        self.process = Popen(
+            [sys.executable, "-P", "-c", BOOT, *sys.path],
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=self.errors,
+            env={**os.environ, **ENVIRONMENT},
+        )
+        finalize(self, _end, self.process, self.errors)
+
+    def ask(self, request: Any = None) -> Any:
+        """Send a request, the first time what to read; return the content of the answer."""
+        answer, _ = self._answer(self.first if request is None else request)
+        return answer
+
+    def column(self, at: int) -> NDArray[Any]:
+        """Fetch a column by its place."""
+        kind, data = self._answer(at)
+        return data.view(kind)
+
+    def _answer(self, request: Any) -> tuple[Any, NDArray[np.uint8]]:
+        requests = cast(IO[bytes], self.process.stdin)
+        answers = cast(BufferedReader, self.process.stdout)
+        seconds = LONGEST[0] + LONGEST[1] * self.limit.size
+        late, began = Timer(seconds, self.process.kill), monotonic()
+        late.daemon = True
+        late.start()
+        try:
+            requests.write(json.dumps(request).encode() + b"\n")
+            requests.flush()
+            error, memory, content, size = json.loads(answers.readline())
+            data = np.empty(size, np.uint8)
+            if answers.readinto(data.data) < size:
+                raise EOFError
+        except (OSError, EOFError, ValueError):
+            self._refuse_ended(seconds, monotonic() - began)
+        finally:
+            late.cancel()
+        if memory:
+            raise self._too_large()
+        if error is not None:
+            raise RecordError(error)
+        return content, data
+
+    def _refuse_ended(self, allowed: float, taken: float) -> NoReturn:
+        """Raise the error of a process that ended without an answer."""
+        self.process.kill()
+        code = self.process.wait()
+        if taken >= allowed:
+            raise RecordError(f"{self.limit.path}: reading it took longer than {allowed:.3g} s")
+        self.errors.seek(max(self.errors.seek(0, os.SEEK_END) - LAST_WORDS, 0))
+        if OUT_OF_MEMORY in self.errors.read():
+            raise self._too_large()
+        raise RecordError(
+            f"{self.limit.path}: damaged: it ended the process that read it (code {code})"
+        )
+
+    def _too_large(self) -> TooLargeError:
+        most = self.limit.most / GIGABYTE
+        return TooLargeError(
+            f"{self.limit.path}: reading needs more than {most:.3g} GB of memory, the limit; "
+            f"{HOW_TO_RAISE}"
+        )
+
+
+def _end(process: Popen[bytes], errors: IO[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for stream in (process.stdin, process.stdout, errors):
+        if stream is not None:
+            with suppress(OSError):  # of what the process did not take any more
+                stream.close()
+
+
+def _refuse_larger_archive(limit: MemoryLimit) -> None:
+    """Raise TooLargeError where the entries of an archive, as a workbook is, declare too much."""
+    try:
+        with zipfile.ZipFile(on_disk(limit.path)) as archive:
+            size = sum(entry.file_size for entry in archive.filelist)
+    except Exception:  # the package that reads it says what is wrong with it
+        return
+    limit.check(size, f"{size} bytes, unpacked")
+
+
+# ---- in the child
+
+
+def serve() -> None:
+    """Read the file that the first line of the input names, and answer for its columns."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what a package prints is no answer
+    requests = sys.stdin.buffer
+    module, function, path, sheet, most = json.loads(requests.readline())
+    with suppress(ImportError):  # said by the module itself
+        import_module(PACKAGES[module])
+    _limit_memory(most)
+    read = getattr(import_module(f"exfit.records.formats.{module}"), function)
+    found = _answered(answers, lambda: read(Path(path), *([] if sheet is None else [sheet])))
+    if isinstance(found, Contents):
+        for line in requests:
+            _answered(answers, lambda at=int(line): found.fetch(at))  # type: ignore[misc]
+
+
+def _answered(answers: IO[bytes], ask: Callable[[], Any]) -> Any:
+    """Answer with what a function returns, or why it does not."""
+    found: Any = None
+    content: Any
+    error, memory, data = None, False, b""
+    try:
+        found = ask()
+    except RecordError as fault:
+        error = str(fault)
+    except MemoryError:
+        memory = True
+    if isinstance(found, np.ndarray):
+        content, data = found.dtype.str, found.tobytes()
+    elif isinstance(found, Contents):
+        plain = (field.name for field in fields(found) if field.name != "fetch")
+        content = {name: getattr(found, name) for name in plain}
+    else:
+        content = found
+    answers.write(json.dumps([error, memory, content, len(data)]).encode() + b"\n")
+    answers.write(data)
+    answers.flush()
+    return found
+
+
+def _limit_memory(most: float) -> None:
+    """Limit the addresses of this process to those that it has and so many bytes more."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        used = float(pages * resource.getpagesize())
+    except OSError:
+        used = ADDRESSES
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    allowed = int(used + max(most - OWN, LEAST))
+    if hard != resource.RLIM_INFINITY:
+        allowed = min(allowed, hard)
+    with suppress(OSError, ValueError):  # macOS has the name, not the limit
+        resource.setrlimit(resource.RLIMIT_AS, (allowed, allowed))
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
