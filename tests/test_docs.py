@@ -232,7 +232,7 @@ def test_the_record_of_the_page_is_read_in_the_recorders_units(cases):
 
 
 def test_the_records_of_the_page_are_a_valid_part_of_a_case(cases):
-    (cases / "case.yaml").write_text(MACHINE + block("records.md", "yaml", 1), encoding="utf-8")
+    (cases / "case.yaml").write_text(MACHINE + block("records.md", "yaml", 2), encoding="utf-8")
     case = load_case(cases / "case.yaml")
     assert [recording.name for recording in case.recordings] == ["up", "on-line"]
     assert case.on_load
@@ -248,7 +248,7 @@ def test_the_phasors_of_the_page_are_a_valid_part_of_a_case(cases):
 
 def test_the_forms_of_the_reference_are_read(cases):
     """Each of them in its turn in place of the first, with the record that belongs to it."""
-    text = block("records.md", "yaml", 2)
+    text = block("records.md", "yaml", 3)
     (first, *others) = re.findall(r"^  (?:# )?(vref: .*)$", text, re.MULTILINE)
     assert len(others) == 4
     for form in (first, *others):

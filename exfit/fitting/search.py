@@ -23,7 +23,6 @@ from exfit.fitting.global_search import (
     judged_again,
     local_search,
 )
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import CENTRAL_STEP, LEAST_NOISE, ONE_SIDED_STEP, Residuals
@@ -282,17 +281,15 @@ def jacobian_error(jacobian: str, difference_step: float | None = None) -> float
 
 
 def searches_of(options: Estimate) -> estimate.Searches:
-    """Return the searches with the settings of a case."""
+    """Make the searches with the settings of a case."""
     dgn = estimate.LineSearch(
         capped=options.dgn.step == "capped", cut=CUTS[options.dgn.cut], armijo=options.armijo
     )
-    lm, armijo = options.lm, options.armijo
-    if lm.update == "ratio":
-        by_ratio = estimate.RatioDamping(lm.nu, lm.nu_min, lm.increase, lm.decrease)
-        return estimate.Searches(dgn=dgn, lm=by_ratio)
-    if lm.update == "armijo":
-        return estimate.Searches(dgn=dgn, lm=estimate.ArmijoDamping(lm.nu, armijo))
-    return estimate.Searches(dgn=dgn, lm=estimate.TrustRegion(lm.radius / UNIT, armijo))
+    if options.lm.update == "ratio":
+        return estimate.Searches(dgn=dgn, lm=estimate.RatioDamping(least=options.lm.nu_min))
+    if options.lm.update == "armijo":
+        return estimate.Searches(dgn=dgn, lm=estimate.ArmijoDamping(armijo=options.armijo))
+    return estimate.Searches(dgn=dgn, lm=estimate.TrustRegion(armijo=options.armijo))
 
 
 def refuse_unfit(case: Case, problem: FitProblem) -> None:

@@ -55,7 +55,7 @@ estimate:
   stop: {rmse: 2.0e-4}
   armijo: 1.0e-3
   dgn: {step: full, cut: half}
-  lm: {update: ratio, nu: 0.5, nu_min: 1.0e-6, increase: 4, decrease: 0.25}
+  lm: {update: ratio, nu_min: 1.0e-6}
   good_enough: {rmse: 3.0e-4}
 simulation: {step: 0.002, output_step: 0.01}
 validate:
@@ -127,8 +127,7 @@ def test_the_case_holds_what_the_file_says(case_file):
     assert (estimate.tolerance.gradient_absolute, estimate.difference_step) == (1e-9, 1e-5)
     assert (estimate.stop.rmse, estimate.armijo) == (2e-4, 1e-3)
     assert (estimate.dgn.step, estimate.dgn.cut) == ("full", "half")
-    lm = estimate.lm
-    assert (lm.update, lm.nu, lm.nu_min, lm.increase, lm.decrease) == ("ratio", 0.5, 1e-6, 4, 0.25)
+    assert (estimate.lm.update, estimate.lm.nu_min) == ("ratio", 1e-6)
     assert (estimate.good_enough.rmse, case.accept.rmse) == (3e-4, 1.5e-4)
     assert (case.simulation.step, case.simulation.output_step) == (0.002, 0.01)
     (validation,) = case.validations
@@ -176,9 +175,7 @@ def test_what_may_be_missing_has_a_default(case_file):
     assert estimate.good_enough is None
     assert estimate.tolerance.gradient_absolute is estimate.difference_step is estimate.stop is None
     assert (estimate.armijo, estimate.dgn.step, estimate.dgn.cut) == (1e-4, "capped", "parabola")
-    lm = estimate.lm
-    assert (lm.update, lm.radius, lm.nu) == ("radius", 0.5, None)
-    assert (lm.nu_min, lm.increase, lm.decrease) == (1e-3, 2.0, 0.5)
+    assert (estimate.lm.update, estimate.lm.nu_min) == ("radius", 1e-3)
     assert (case.simulation.step, case.simulation.output_step) == (0.001, 0.005)
     assert case.validations == ()
 
@@ -361,8 +358,12 @@ FORM = {
     "unknown cut": ("cut: half", "cut: third", "estimate.dgn.cut", ["parabola, half"]),
     "unknown step": ("step: full", "step: long", "estimate.dgn.step", ["capped, full"]),
     "unknown update": ("update: ratio", "update: rate", "estimate.lm.update", ["ratio?"]),
-    "no increase": ("increase: 4", "increase: 1", "estimate.lm.increase", ["1 is not above 1"]),
-    "no decrease": ("decrease: 0.25", "decrease: 1", "estimate.lm.decrease", ["1 is not below 1"]),
+    "factor on the damping": (
+        "nu_min: 1.0e-6",
+        "increase: 3",
+        "estimate.lm.increase",
+        ["unknown key", "nu_min"],
+    ),
     "no match": ("stop: {rmse: 2.0e-4}", "stop: {rmse: 0}", "estimate.stop.rmse", ["not above 0"]),
     "unknown key of a machine": (
         "machine: GENROU",
@@ -561,16 +562,10 @@ MEANING = {
         ["only with estimate.jacobian: central, forward or backward"],
     ),
     "damping of a radius": (
-        "update: ratio, nu: 0.5, nu_min: 1.0e-6, increase: 4, decrease: 0.25",
-        "increase: 3",
-        "estimate.lm.increase",
+        "update: ratio, nu_min: 1.0e-6",
+        "nu_min: 1.0e-6",
+        "estimate.lm.nu_min",
         ["only with estimate.lm.update: ratio"],
-    ),
-    "radius of a ratio": (
-        "nu: 0.5",
-        "radius: 0.5",
-        "estimate.lm.radius",
-        ["only with estimate.lm.update: radius"],
     ),
     "ramp in no time": ("step: 0.05", "step: 0.05, ramp: 0", "test.vref[0].ramp", ["0 is not abo"]),
     "step within a ramp": (

@@ -139,8 +139,16 @@ def test_armijos_constant_decides_how_often_a_step_is_halved():
 
 def test_the_damping_starts_and_changes_as_it_is_told():
     residuals = residuals_of("ac1a_typical", logarithmic=True)
-    lm = {"update": "ratio", "nu": 0.05, "nu_min": 1e-9, "increase": 2.5, "decrease": 0.2}
-    result = searched(residuals, "lm", 12, {"lm": lm})
+    searches = Searches(lm=RatioDamping(0.05, 1e-9, 2.5, 0.2))
+    result = least_squares(
+        residuals,
+        residuals.start,
+        residuals.exact,
+        method="lm",
+        max_iterations=12,
+        x_scale=UNIT,
+        searches=searches,
+    )
     rows = levenberg_marquardt(
         residuals, residuals.exact, residuals.start, result.nit, 0.05, 1e-9, 2.5, 0.2
     )

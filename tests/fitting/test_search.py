@@ -5,7 +5,8 @@ import pytest
 from records import case_of, config, several
 from records import recording as recorded
 
-from exfit.estimate import STATUS, Stop
+from exfit.estimate import STATUS, Searches, Stop, TrustRegion, least_squares
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.search import JACOBIANS, fitted, jacobian_error, search
 from exfit.results.model import AT_TOLERANCE
 from exfit.util.text import to_json
@@ -105,9 +106,18 @@ def test_a_phase_without_a_limit_of_its_own_has_the_usual_one(tmp_path):
 
 
 def test_a_radius_limits_the_first_step_of_levenberg_marquardt(tmp_path):
+    residuals, _ = searched(tmp_path, config("ac1a_typical"), iterations=1)
     for radius in (0.1, 0.2):
-        settings = {"strategy": "lm", "iterations": 1, "lm": {"radius": radius}}
-        _, result = searched(tmp_path, config("ac1a_typical"), **settings)
+        result = least_squares(
+            residuals,
+            residuals.start,
+            residuals.exact,
+            residuals.bounds,
+            "lm",
+            max_iterations=1,
+            x_scale=residuals.units,
+            searches=Searches(lm=TrustRegion(radius / UNIT)),
+        )
         assert result.history[1].step_norm == pytest.approx(radius, rel=0.1)  # Moré's slack
 
 
@@ -115,7 +125,7 @@ def test_the_default_settings_written_out_are_the_default(tmp_path):
     written = {
         "armijo": 1e-4,
         "dgn": {"step": "capped", "cut": "parabola"},
-        "lm": {"update": "radius", "radius": 0.5},
+        "lm": {"update": "radius"},
         "iterations": {"gn": 100, "dgn": 100, "lm": 100},
         "tolerance": {"gradient": 1e-8, "step": 1e-10},
     }

@@ -39,13 +39,6 @@ from exfit.plants import KINDS, PlantKind
 from exfit.util.strategies import DEFAULT_SEARCH
 
 WITH_PARAMETERS = ("parameters", "plant", "stabiliser", "governor")
-LM_UPDATES = {
-    "radius": ("radius",),
-    "nu": ("ratio", "armijo"),
-    "nu_min": ("ratio",),
-    "increase": ("ratio",),
-    "decrease": ("ratio",),
-}  # settings of Levenberg-Marquardt by the updates that use them
 
 
 def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[Fault]:
@@ -167,11 +160,9 @@ def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
         if key in estimate and jacobian == "exact":
             differences = "central, forward or backward"
             yield estimate.at(key).fault(f"only with estimate.jacobian: {differences}")
-    lm = estimate.at("lm")
-    update = lm.content.get("update", "radius")
-    for key, needed in LM_UPDATES.items():
-        if key in lm and update in ("radius", "ratio", "armijo") and update not in needed:
-            yield lm.at(key).fault(f"only with estimate.lm.update: {' or '.join(needed)}")
+    update = estimate.at("lm").content.get("update", "radius")
+    if "nu_min" in estimate.at("lm") and update in ("radius", "armijo"):
+        yield estimate.at("lm", "nu_min").fault("only with estimate.lm.update: ratio")
     if "starts" in estimate and estimate.content.get("search", DEFAULT_SEARCH) == "local":
         yield estimate.at("starts").fault("only with estimate.search: global")
     if (

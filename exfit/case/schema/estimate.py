@@ -101,25 +101,9 @@ class LmSection(Section):
         "the ratio of achieved to promised decrease; or, with armijo, the norm of the gradient, "
         "and steps are cut in half until Armijo's rule holds.",
     )
-    radius: Positive = Field(
-        default=0.5,
-        description="Largest first step, in scaled parameters; on the log scale 0.5 is a factor "
-        "of 1.6. update: radius only.",
-    )
-    nu: NotNegative | None = Field(
-        default=None,
-        description="Damping at the start, with armijo everywhere; default: the norm of the "
-        "gradient there. update: ratio or armijo only.",
-    )
     nu_min: Positive = Field(
         default=1e-3,
         description="Least damping after an increase; a lower one counts as 0. update: ratio only.",
-    )
-    increase: Annotated[Finite, Field(gt=1), USABLE] = Field(
-        default=2.0, description="Factor on the damping after a poor trial. update: ratio only."
-    )
-    decrease: Annotated[Finite, Field(gt=0, lt=1), USABLE] = Field(
-        default=0.5, description="Factor on the damping after a good trial. update: ratio only."
     )
 
 
