@@ -45,7 +45,7 @@ def text_of(content: object, **labels: Any) -> str:
 def read_kept(
     file: Path, kind: type[Content], under: str | None = None, **labels: Any
 ) -> Content | None:
-    """Read what a file of the store holds; None where there is none of this form and these labels.
+    """Read what a file of the store holds; None unless it has this form and these labels.
 
     ``under`` is its key there, None where it has the labels beside its own. Anyone may have changed
     the file since: what is not ours is as if it was not there.

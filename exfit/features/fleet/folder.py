@@ -23,12 +23,13 @@ from exfit.errors import ExfitError
 from exfit.features.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
 from exfit.runs.names import distinct_names
 from exfit.runs.store import read_kept, text_of
+from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import prepare, write, write_quickly, write_together
 from exfit.util.typed import plain
 
 INDEX, CASES = "index", "cases"
-RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
-WHOLE_PROGRAMME, FIT_OF_PROGRAMME = "programme.json", "fit"
+SUMMARY, FAILED = "summary.json", "failed.json"
+FIT_OF_PROGRAMME = "fit"
 VERSION = 1  # of a summary; one of another version is made again
 KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
 KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
@@ -140,7 +141,7 @@ def case_path(folder: Path, case: str) -> Path:
 
 def is_done(folder: Path, key: str) -> bool:
     """Look for the fit of a key, whole."""
-    return any((folder / key / name).is_file() for name in (RESULT, WHOLE_PROGRAMME))
+    return any((folder / key / name).is_file() for name in (WHOLE_FIT, WHOLE_PROGRAMME))
 
 
 def failure_of(folder: Path, key: str) -> Failure | None:
@@ -217,7 +218,7 @@ def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
 def _stamps(folder: Path) -> Iterator[tuple[str, int, int]]:
     for entry in (folder / INDEX).glob("*.json"):
         yield from _stamp(entry)
-    for outcome in (RESULT, WHOLE_PROGRAMME, FAILED):
+    for outcome in (WHOLE_FIT, WHOLE_PROGRAMME, FAILED):
         for file in folder.glob(f"*/{outcome}"):
             yield from _stamp(file)
 

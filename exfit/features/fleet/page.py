@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import kept_rows
-from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.folder import FAILED, Fleet
 from exfit.features.fleet.sisters import (
     OUTLIER,
     SisterGroup,
@@ -25,8 +25,9 @@ from exfit.features.report.page import TEMPLATES, environment
 from exfit.inference.outliers import FEWEST, LEVEL
 from exfit.results.side_by_side import NOT_ACCEPTED
 from exfit.results.verdict import GOOD, MATCHES, VerdictWords
+from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 
-REPORT, RESULT, FAILED = "report.html", "result.json", "failed.json"
+REPORT = "report.html"
 MOST_PICTURES = 3  # of a case: more are in its report
 MOST_SISTERS = 40  # of a table; of more units only those that stand out are in it
 STATUSES = ("failed", "timed out", "crashed", "refused", "not run", "no record")
@@ -231,7 +232,7 @@ def _case_view(fleet: Fleet, case: CaseSummary, remarks: Mapping[tuple[str, str]
 def _link(folder: Path, case: CaseSummary) -> str:
     """Return the file of a case, relative to the page, that says most of it; "" without any."""
     if case.key.isalnum() and case.key.isascii():
-        for file in (REPORT, RESULT, FAILED):
+        for file in (REPORT, WHOLE_FIT, WHOLE_PROGRAMME, FAILED):
             if (folder / case.key / file).is_file():
                 return f"{case.key}/{file}"
     return ""

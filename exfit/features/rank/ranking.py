@@ -185,7 +185,7 @@ def _criteria(models: Sequence[Likelihood], counts: Sequence[int]) -> list[float
 def _refuted(
     models: Sequence[Likelihood], counts: Sequence[int], judged: Sequence[bool]
 ) -> list[bool]:
-    """Return which models another describes strongly better than.
+    """Find the models that another one describes the records strongly better than.
 
     What a better model has in more parameters counts against it; what it has in fewer does not
     count for it: that a model is larger than it need be is no evidence against it.
@@ -202,18 +202,18 @@ def _refuted(
 
 
 def _gap(better: Likelihood, model: Likelihood, more: int) -> float:
-    """Return by how much the criterion of a model exceeds that of another, never by its size."""
+    """Excess of the criterion of a model over that of another, never by its size."""
     gain = model.deviance(better.effective) - better.deviance(better.effective)
     return gain - max(more, 0) * log(max(float(np.sum(better.effective)), 1.0))
 
 
 def _effective(errors: Array) -> float:
-    """Return how many independent samples errors are worth: all of them where they are white."""
+    """Number of independent samples that errors are worth: all of them where they are white."""
     return float(len(errors)) if is_white(whiteness(errors)) else effective_samples(errors)
 
 
 def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
-    """Yield what the records say of the models, and of which they say nothing."""
+    """Yield the sentences about models that the records tell apart, and about those they do not."""
     judged = [model for model in models if model.refuted_by is not None]
     if len(judged) > 1:
         yield _judgement(judged)
@@ -227,7 +227,7 @@ def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
 
 
 def _judgement(judged: Sequence[RankedModel]) -> str:
-    """Return which of several models the records do not refute."""
+    """Select the models that the records do not refute."""
     possible = [model.name for model in judged if model.possible]
     typical = dict.fromkeys(name for model in judged for name in model.typical_machine)
     if typical and len(possible) < len(judged):
