@@ -10,23 +10,21 @@ from exfit.models.blocks import (
     smaller,
     where,
 )
+from exfit.models.rows import shared
 from exfit.models.sheet import sheet
 
 # the limits of the alternator that the edition of 2016 gave to all its types, out of reach
-FLOOR = sheet(("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"))
+FLOOR = sheet(*shared(VEMIN=0.0))
 FIELD_LIMITS = (
-    *sheet(("VFEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current")),
+    *sheet(*shared(VFEMAX=99.0)),
     *FLOOR,
 )
 # the source of the regulator's power stage: terminal voltage alone, and a ceiling 1.5 times that
 SUPPLY = sheet(
     ("SW1", 1.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
-    ("KP", 1.0, "pu", (0.01, 100.0), "potential source gain"),
-    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
-    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    *shared(KP=1.0, KI=0.0, XL=0.0, THETAP=0.0),
     ("KC1", 0.05, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
-    ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    *shared(VBMAX=1.5),
 )
 
 

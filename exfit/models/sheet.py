@@ -107,15 +107,19 @@ Sheet = tuple[Parameter, ...]
 Row = tuple[str, float, str, Limits, str] | tuple[str, float, str, Limits, str, SearchRange]
 
 
-def sheet(*rows: Row) -> Sheet:
-    """Return the data sheet of rows (symbol, typical value, unit, (low, high), meaning).
+def sheet(*rows: Row | Parameter) -> Sheet:
+    """Make the data sheet of rows (symbol, typical value, unit, (low, high), meaning).
 
     FREE, or another range of search, behind the meaning marks what a bump test is fitted for.
+    Rows that exciters share stand among them as ``*shared(TR=0.0, KA=46.0)`` (`exfit.models.rows`).
     """
-    return tuple(
-        Parameter(symbol, typical, unit, *limits, meaning, *search)
-        for symbol, typical, unit, limits, meaning, *search in rows
-    )
+    return tuple(row if isinstance(row, Parameter) else _parameter(*row) for row in rows)
+
+
+def _parameter(
+    symbol: str, typical: float, unit: str, limits: Limits, meaning: str, *search: SearchRange
+) -> Parameter:
+    return Parameter(symbol, typical, unit, *limits, meaning, *search)
 
 
 def renamed(rows: Sheet, **symbols: str) -> Sheet:

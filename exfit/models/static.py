@@ -2,6 +2,7 @@
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import compound_source, rectifier, smaller, where
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, SearchRange, sheet
 
 SUPPLY_SWITCH = sheet(
@@ -11,20 +12,15 @@ SUPPLY_SWITCH = sheet(
 SUPPLY = (
     *SUPPLY_SWITCH,
     *sheet(
-        ("KP", 1.0, "pu", (0.01, 100.0), "potential source gain"),
-        ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
-        ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
-        ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
-        ("KC", 0.05, "pu", (0.0, 100.0), "rectifier loading factor"),
-        ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        *shared(KP=1.0, KI=0.0, XL=0.0, THETAP=0.0, KC=0.05, VBMAX=1.5),
     ),
 )
 # a PI with a small derivative, in front of the gain of the edition of 2005, which then stays fixed
 PID = sheet(
     ("KPR", 1.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KIR", 0.5, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+    *shared(KIR=0.5),
     ("KDR", 0.02, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    ("TDR", 0.1, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
+    *shared(TDR=0.1),
     ("VPIDMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
     ("VPIDMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
 )

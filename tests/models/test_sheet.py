@@ -9,6 +9,7 @@ from oracle import lively_values, system_of
 from exfit.errors import SimulationError
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
+from exfit.models.rows import ROWS as SHARED_ROWS
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
@@ -85,3 +86,13 @@ def test_an_integral_gain_of_the_other_sign_starts_from_rest(name, gain):
     vt = simulator.samples(values, ("vt",))[0]
     # an unstable loop lets rounding grow, in 0.2 s by far less than this
     assert np.max(np.abs(vt - vt[0])) < 1e-9
+
+
+@pytest.mark.parametrize("symbol", SHARED_ROWS)
+def test_a_shared_row_is_of_several_exciters(symbol):
+    same = [
+        name
+        for name, model in MODELS.items()
+        if SHARED_ROWS[symbol] in [row._replace(typical=0.0) for row in model.sheet]
+    ]
+    assert len(same) > 1

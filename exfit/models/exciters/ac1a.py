@@ -26,41 +26,18 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.sheet import (
-    AS_IN_PSSE,
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    LOADING,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import AS_IN_PSSE, LOADING, record, sheet
 
 ALIASES = ("ESAC1A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VAMAX", 14.5, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -14.5, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02, VAMAX=14.5, VAMIN=-14.5),
     ("VRMAX", 6.03, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VRMIN", -5.43, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TE=0.8, KF=0.03, TF=1.0),
     ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 0.38, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 4.18, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.10, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.14, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=0.38, KE=1.0, E1=4.18, SE1=0.10, E2=3.14, SE2=0.03),
 )
 
 RECORDS = (

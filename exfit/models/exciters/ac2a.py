@@ -36,44 +36,21 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.sheet import (
-    AS_IN_PSSE,
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    LOADING,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import AS_IN_PSSE, FREE, LOADING, record, sheet
 
 ALIASES = ("ESAC2A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VAMAX", 8.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -8.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02, VAMAX=8.0, VAMIN=-8.0),
     ("KB", 25.0, "pu", (0.01, 10000.0), "second stage gain", FREE),
     ("VRMAX", 105.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    ("TE", 0.6, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("VFEMAX", 4.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
+    *shared(TE=0.6, VFEMAX=4.4),
     ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current", FREE),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(KF=0.03, TF=1.0),
     ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 0.35, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 4.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.037, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.3, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.012, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=0.35, KE=1.0, E1=4.4, SE1=0.037, E2=3.3, SE2=0.012),
 )
 
 RECORDS = (

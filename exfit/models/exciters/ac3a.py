@@ -36,44 +36,20 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import (
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    LOADING,
-    OF_A_LIST,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FEEDBACK, LOADING, OF_A_LIST, record, sheet
 
 ALIASES = ("ESAC3A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("KA", 45.62, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.013, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TE", 1.17, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("VEMIN", 0.1, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=45.62, TA=0.013, VAMAX=1.0, VAMIN=-0.95, TE=1.17, VEMIN=0.1),
     ("KR", 3.77, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
     ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TF=1.0),
     ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN"),
     ("EFDN", 2.36, "pu", (0.0, 100.0), "field voltage where the feedback gain changes"),
     ("KC", 0.104, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 0.499, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("VFEMAX", 16.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
-    ("E1", 6.24, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 1.143, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 4.68, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.1, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=0.499, KE=1.0, VFEMAX=16.0, E1=6.24, SE1=1.143, E2=4.68, SE2=0.1),
 )
 
 RECORDS = (

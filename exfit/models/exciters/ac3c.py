@@ -47,7 +47,8 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac3a
-from exfit.models.sheet import FREE, OF_TWO_PROGRAMS, ONE_GATE, SearchRange, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, sheet
 
 ALIASES = ("ESAC3C",)
 
@@ -55,9 +56,9 @@ SHEET = (
     *ac3a.SHEET,
     *sheet(
         ("KPR", 1.0, "pu", (0.0, 100000.0), "proportional gain"),
-        ("KIR", 0.5, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+        *shared(KIR=0.5),
         ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain"),
-        ("TDR", 0.1, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
+        *shared(TDR=0.1),
         ("VPIDMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
         ("VPIDMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
     ),

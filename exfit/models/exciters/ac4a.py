@@ -16,21 +16,19 @@ separate model.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag
-from exfit.models.sheet import AS_IN_PSSE, FREE, LAG_OF_TC, LEAD_OF_TB, REGULATOR_LAG, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import AS_IN_PSSE, LAG_OF_TC, LEAD_OF_TB, record, sheet
 
 ALIASES = ("ESAC4A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("VIMAX", 10.0, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
-    ("VIMIN", -10.0, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    *shared(TR=0.0, VIMAX=10.0, VIMIN=-10.0),
     ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
-    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    *shared(KA=200.0, TA=0.015),
     ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
     ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
-    ("KC", 0.0, "pu", (0.0, 100.0), "rectifier loading factor"),
+    *shared(KC=0.0),
 )
 
 RECORDS = (record("ESAC4A", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),)

@@ -22,35 +22,20 @@ and 0 here, 1 and 1 (which cancel) elsewhere.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import exciter, exciter_demand, lag, lead_lag, limited_lag, washout
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    OF_A_LIST,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import LAG_OF_KF, OF_A_LIST, REGULATOR_LAG, record, sheet
 
 ALIASES = ("ESAC5A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    *shared(TR=0.0, KA=400.0),
     ("TA", 0.02, "s", (0.001, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMAX=7.3, VRMIN=-7.3),
     ("KE", 1.0, "pu", (0.001, 10.0), "exciter constant"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TE=0.8, KF=0.03, TF1=1.0),
     ("TF2", 0.8, "s", (0.0, 100.0), "stabilising feedback lag", LAG_OF_KF),
     ("TF3", 0.0, "s", (0.0, 100.0), "stabilising feedback lead"),
-    ("E1", 5.6, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.86, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 4.2, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.5, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(E1=5.6, SE1=0.86, E2=4.2, SE2=0.5),
 )
 
 RECORDS = (record("ESAC5A", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2"),)

@@ -32,44 +32,28 @@ from exfit.models.blocks import (
     rectifier,
     rectifier_supply,
 )
-from exfit.models.sheet import (
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FREE,
-    LAG_OF_TC,
-    LEAD_OF_TB,
-    LOADING,
-    OF_A_LIST,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, LOADING, OF_A_LIST, record, sheet
 
 ALIASES = ("ESAC6A",)
 
 SHEET = sheet(
-    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 536.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    *shared(TR=0.02, KA=536.0),
     ("TA", 0.086, "s", (0.0, 100.0), "regulator lag", FREE),
     ("TK", 0.18, "s", (0.0, 100.0), "regulator lead", FREE),
     ("TB", 9.0, "s", (0.0, 100.0), "second regulator lag", LAG_OF_TC),
     ("TC", 3.0, "s", (0.0, 100.0), "second regulator lead", LEAD_OF_TB),
-    ("VAMAX", 75.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -75.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VAMAX=75.0, VAMIN=-75.0),
     ("VRMAX", 44.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VRMIN", -36.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    ("TE", 1.0, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    *shared(TE=1.0),
     ("VFELIM", 19.0, "pu", (-9999.0, 9999.0), "field current where the limiter begins"),
     ("KH", 92.0, "pu", (0.0, 10000.0), "gain of the field current limiter"),
     ("VHMAX", 75.0, "pu", (0.0, 9999.0), "ceiling of the field current limiter"),
     ("TH", 0.08, "s", (0.0, 100.0), "field current limiter lag"),
     ("TJ", 0.02, "s", (0.0, 100.0), "field current limiter lead"),
     ("KC", 0.173, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 1.91, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.6, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 7.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.214, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 5.55, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.044, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=1.91, KE=1.6, E1=7.4, SE1=0.214, E2=5.55, SE2=0.044),
 )
 
 RECORDS = (

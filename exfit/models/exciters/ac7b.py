@@ -36,45 +36,27 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.sheet import (
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FREE,
-    LOADING,
-    OF_A_LIST,
-    SearchRange,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, LOADING, OF_A_LIST, SearchRange, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.0),
     ("KPR", 4.24, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
     ("KIR", 4.24, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
     ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain of the regulator"),
-    ("TDR", 0.03, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
-    ("VRMAX", 5.79, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -5.79, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(TDR=0.03, VRMAX=5.79, VRMIN=-5.79),
     ("KPA", 65.36, "pu", (0.0, 100000.0), "proportional gain of the amplifier", FREE),
     ("KIA", 59.69, "pu/s", (0.0, 100000.0), "integral gain of the amplifier", FREE),
     ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "amplifier ceiling"),
     ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "amplifier floor"),
-    ("KP", 4.96, "pu", (0.01, 100.0), "potential source gain"),
+    *shared(KP=4.96),
     ("KL", 10.0, "pu", (0.0, 9999.0), "lower limit of the field voltage per field current"),
     ("KF1", 0.212, "pu", (0.0, 100.0), "feedback gain of the generator field voltage", FREE),
     ("KF2", 0.0, "pu", (0.0, 100.0), "feedback gain of the exciter field current"),
     ("KF3", 0.0, "pu", (0.0, 100.0), "stabilising feedback gain"),
     ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", SearchRange(needs="KF3")),
     ("KC", 0.18, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 0.02, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("TE", 1.1, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("VFEMAX", 6.9, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
-    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-    ("E1", 6.3, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.44, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 4.725, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.075, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=0.02, KE=1.0, TE=1.1, VFEMAX=6.9, VEMIN=0.0, E1=6.3, SE1=0.44, E2=4.725, SE2=0.075),
 )
 
 RECORDS = (

@@ -46,6 +46,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import ac7b
+from exfit.models.rows import shared
 from exfit.models.sheet import OF_TWO_PROGRAMS, TWO_GATES, record, sheet
 
 ALIASES = ("ESAC7C",)
@@ -55,7 +56,7 @@ SHEET = (
     *(row for row in SUPPLY if row.symbol not in ("KP", "KC1", "VBMAX")),
     *sheet(
         ("KC1", 0.2, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
-        ("VBMAX", 7.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        *shared(VBMAX=7.0),
         ("SW2", 1.0, "1", (1.0, 2.0), "supply of the amplifier: 1 VB, 2 field voltage"),
         ("KR", 4.0, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
     ),

@@ -26,39 +26,22 @@ from exfit.models.blocks import (
     rectifier,
     rectifier_supply,
 )
-from exfit.models.sheet import (
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FREE,
-    LOADING,
-    OF_A_LIST,
-    SearchRange,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, LOADING, OF_A_LIST, SearchRange, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.0),
     ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KIR", 5.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+    *shared(KIR=5.0),
     ("KDR", 10.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    ("TDR", 0.1, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
+    *shared(TDR=0.1),
     ("VPIDMAX", 999.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
     ("VPIDMIN", -999.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
     ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
     ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    ("VRMAX", 35.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TE", 1.2, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("VFEMAX", 6.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
-    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    *shared(VRMAX=35.0, VRMIN=0.0, TE=1.2, VFEMAX=6.0, VEMIN=0.0),
     ("KC", 0.55, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 1.1, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 9.0, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 6.5, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=1.1, KE=1.0, E1=9.0, SE1=3.0, E2=6.5, SE2=0.3),
 )
 
 RECORDS = (

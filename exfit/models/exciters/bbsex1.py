@@ -22,17 +22,17 @@ than at the summing point.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag, limited_lead_lag
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.01, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.01),
     ("K", 300.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
     ("T1", 6.0, "s", (0.0, 100.0), "regulator lag", SearchRange(unlike="T2")),
     ("T2", 1.0, "s", (0.0, 100.0), "regulator lead", SearchRange(unlike="T1")),
     ("T3", 0.05, "s", (0.0, 100.0), "second regulator lead"),
     ("T4", 0.01, "s", (0.0, 100.0), "second regulator lag"),
-    ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -5.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMAX=5.0, VRMIN=-5.0),
     ("EFDMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("EFDMIN", -5.0, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
 )

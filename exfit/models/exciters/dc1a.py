@@ -27,35 +27,17 @@ from exfit.models.commutators import (
     excited,
     regulator_input,
 )
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    OF_A_LIST,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import OF_A_LIST, record, sheet
 
 ALIASES = ("ESDC1A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 46.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.06, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    *shared(TR=0.0, KA=46.0, TA=0.06, TB=0.0, TC=0.0),
     ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    ("VRMIN", -0.9, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMIN=-0.9),
     ("KE", 0.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 0.46, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.1, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 3.1, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.33, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 2.3, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.1, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(TE=0.46, KF=0.1, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
 )
 
 RECORDS = (

@@ -30,6 +30,7 @@ from exfit.models.commutators import (
     regulator_input,
 )
 from exfit.models.exciters import dc1a
+from exfit.models.rows import shared
 from exfit.models.sheet import OF_TWO_PROGRAMS, record, sheet
 
 ALIASES = ("ESDC1C",)
@@ -38,7 +39,7 @@ SHEET = (
     *dc1a.SHEET,
     *sheet(
         ("VEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter voltage"),
-        ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+        *shared(VEMIN=0.0),
     ),
 )
 

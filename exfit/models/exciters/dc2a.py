@@ -28,35 +28,17 @@ from exfit.models.commutators import (
     excited,
     regulator_input,
 )
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    OF_A_LIST,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import OF_A_LIST, record, sheet
 
 ALIASES = ("ESDC2A",)
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 300.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0),
     ("VRMAX", 4.95, "pu", (-9999.0, 9999.0), "regulator ceiling at rated voltage, or 0"),
     ("VRMIN", -4.9, "pu", (-9999.0, 9999.0), "regulator floor at rated voltage"),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 1.33, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 0.675, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 3.05, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.279, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 2.29, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.117, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(TE=1.33, KF=0.02, TF=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
 )
 
 RECORDS = (

@@ -24,21 +24,18 @@ KE .05, VR 1/0): with those the rheostat hunts on open circuit.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import exciter, exciter_demand, lag, limited_integrator, where
-from exfit.models.sheet import EXCITER_LAG, FREE, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.0),
     ("KV", 0.1, "pu", (0.001, 10.0), "setting of the fast raise and lower contacts"),
     ("VRMAX", 4.0, "pu", (-9999.0, 9999.0), "voltage of the raise contact"),
     ("VRMIN", -0.9, "pu", (-9999.0, 9999.0), "voltage of the lower contact"),
     ("TRH", 60.0, "s", (0.01, 1000.0), "travel time of the rheostat", FREE),
-    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    *shared(TE=0.5),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
-    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-    ("E1", 3.375, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.267, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.15, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.068, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(VEMIN=0.0, E1=3.375, SE1=0.267, E2=3.15, SE2=0.068),
 )
 
 RECORDS = (

@@ -43,37 +43,23 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FREE,
-    LAG_OF_KF,
-    REGULATOR_LAG,
-    SearchRange,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 DOUBT = "rests on one public diagram for the load of its supply (KC1), that of InterPSS"
 SHEET = (
     *sheet(
-        ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+        *shared(TR=0.0),
         ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-        ("KIR", 20.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+        *shared(KIR=20.0),
         ("KDR", 20.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-        ("TDR", 0.01, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
-        ("VRMAX", 2.7, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-        ("VRMIN", -2.7, "pu", (-9999.0, 9999.0), "regulator floor"),
+        *shared(TDR=0.01, VRMAX=2.7, VRMIN=-2.7),
         ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-        ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+        *shared(TA=0.02),
         ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
-        ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+        *shared(TE=0.8),
         ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
-        ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-        ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-        ("E1", 2.33, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-        ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),
-        ("E2", 1.75, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-        ("SE2", 0.08, "pu", (0.0, 100.0), "saturation at E2"),
+        *shared(TF=1.0, VEMIN=0.0, E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
     ),
     *SUPPLY,
 )

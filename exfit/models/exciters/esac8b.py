@@ -14,24 +14,18 @@ AC8B (2005) is another model, with KC, KD and limits of the PID and of VE.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import exciter, exciter_demand, lag, limited_lag, pi_rest, pid
-from exfit.models.sheet import EXCITER_LAG, FREE, SearchRange, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.0),
     ("KP", 40.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
     ("KI", 10.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
     ("KD", 15.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
     ("TD", 0.02, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KD")),
     ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
     ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    ("VRMAX", 35.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TE", 1.2, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("E1", 9.0, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 6.5, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(VRMAX=35.0, VRMIN=0.0, TE=1.2, KE=1.0, E1=9.0, SE1=3.0, E2=6.5, SE2=0.3),
 )
 
 RECORDS = (record("ESAC8B", "TR KP KI KD TD KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),)

@@ -30,20 +30,13 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FREE,
-    LAG_OF_KF,
-    LOADING,
-    SearchRange,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, LOADING, SearchRange, record, sheet
 
 ALIASES = ("EXAC1M",)
 
 SHEET = sheet(
-    ("TR", 0.016668, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.016668),
     ("TA", 0.8, "s", (0.0, 100.0), "first regulator lead", SearchRange(unlike="TB")),
     ("TB", 0.1, "s", (0.0, 100.0), "first regulator lag", SearchRange(unlike="TA")),
     ("TC", 0.6, "s", (0.0, 100.0), "second regulator lead", SearchRange(unlike="TD")),
@@ -52,17 +45,10 @@ SHEET = sheet(
     ("T1", 1.0, "s", (0.0, 100.0), "lag of the exciter's field current"),
     ("K16", 1.0, "pu", (0.0, 1000.0), "feedback gain of the lagged field current"),
     ("KF", 20.0, "pu", (0.0, 1000.0), "stabilising feedback gain", FREE),
-    ("TF", 1.6, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("VRMAX", 14.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -12.6, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TE", 2.0, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("E1", 3.01, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.01, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 5.01, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.2, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(TF=1.6, VRMAX=14.0, VRMIN=-12.6, TE=2.0, E1=3.01, SE1=0.01, E2=5.01, SE2=0.2),
     ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 0.0, "pu", (0.0, 100.0), "demagnetising factor"),
-    ("KE", 0.8, "pu", (0.0, 10.0), "exciter constant"),
+    *shared(KE=0.8),
 )
 
 RECORDS = (

@@ -35,41 +35,21 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters.ac3a import feedback
-from exfit.models.sheet import (
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    LOADING,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FEEDBACK, LOADING, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("KA", 78.04, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.013, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TE", 3.71, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=78.04, TA=0.013, VAMAX=1.0, VAMIN=-0.95, TE=3.71),
     ("KLV", 0.167, "pu", (0.0, 1000.0), "gain of the low voltage limiter"),
     ("KR", 6.99, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
     ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TF=1.0),
     ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN"),
     ("EFDN", 1.603, "pu", (0.0, 100.0), "field voltage where the feedback gain changes"),
     ("KC", 0.14, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 1.02, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    *shared(KD=1.02, KE=1.0),
     ("VLV", 0.46, "pu", (-9999.0, 9999.0), "field voltage of the low voltage limiter"),
-    ("E1", 4.64, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.186, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 6.19, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 1.391, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(E1=4.64, SE1=0.186, E2=6.19, SE2=1.391),
 )
 
 RECORDS = (

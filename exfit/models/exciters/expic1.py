@@ -40,10 +40,11 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.compound import supply
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.0),
     ("KA", 3.15, "pu/s", (0.001, 100000.0), "integral gain of the PI", FREE),
     ("TA1", 1.0, "s", (0.0, 100.0), "lead of the PI", FREE),
     ("VR1", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PI"),
@@ -51,22 +52,17 @@ SHEET = sheet(
     ("TA2", 0.01, "s", (0.0, 100.0), "regulator lag"),
     ("TA3", 0.0, "s", (0.0, 100.0), "regulator lead"),
     ("TA4", 0.0, "s", (0.0, 100.0), "second regulator lag"),
-    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMAX=1.0, VRMIN=-0.87),
     ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
     ("TF1", 1.0, "s", (0.0, 100.0), "stabilising feedback time constant"),
     ("TF2", 0.0, "s", (0.0, 100.0), "stabilising feedback lag"),
     ("EFDMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
     ("EFDMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
-    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    *shared(KE=1.0),
     ("TE", 0.0, "s", (0.0, 100.0), "exciter time constant"),
-    ("E1", 2.8, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.08, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.7, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.33, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(E1=2.8, SE1=0.08, E2=3.7, SE2=0.33),
     ("KP", 6.5, "pu", (0.0, 100.0), "potential source gain"),
-    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("KC", 0.08, "pu", (0.0, 100.0), "rectifier loading factor"),
+    *shared(KI=0.0, KC=0.08),
 )
 
 RECORDS = (

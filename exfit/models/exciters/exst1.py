@@ -16,21 +16,14 @@ OEL, which here are added to the error.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag, regulator_output, washout
-from exfit.models.sheet import FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
-    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("VIMAX", 0.2, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
-    ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
-    ("TB", 1.0, "s", (0.0, 100.0), "regulator lag"),
-    ("KA", 80.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.05, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    *shared(TR=0.02, VIMAX=0.2, VIMIN=-0.2, TC=1.0, TB=1.0, KA=80.0, TA=0.05),
     ("VRMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -3.0, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("KF", 0.1, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(KC=0.2, KF=0.1, TF=1.0),
 )
 
 RECORDS = (record("EXST1", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF"),)

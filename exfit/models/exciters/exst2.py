@@ -22,21 +22,15 @@ OEL other than at the summing point.
 from exfit.engine.trace import Signal
 from exfit.models.blocks import lag, limited_integrator, limited_lag, washout
 from exfit.models.compound import supply
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 120.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.15, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VRMAX", 2.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -2.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=2.0, VRMIN=-2.0),
     ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
-    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 0.53, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TE=0.5, KF=0.02, TF=0.53),
     ("KP", 0.9, "pu", (0.0, 100.0), "potential source gain"),
-    ("KI", 1.86, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor"),
+    *shared(KI=1.86, KC=0.1),
     ("EFDMAX", 2.8, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
 )
 

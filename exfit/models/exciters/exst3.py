@@ -29,12 +29,11 @@ from exfit.models.blocks import (
     rectifier,
     smaller,
 )
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("VIMAX", 0.2, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
-    ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    *shared(TR=0.0, VIMAX=0.2, VIMIN=-0.2),
     ("KJ", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
     ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
@@ -42,14 +41,11 @@ SHEET = sheet(
     ("TA", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop", FREE),
     ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
     ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
-    ("KG", 1.0, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
-    ("KP", 6.15, "pu", (0.01, 100.0), "potential source gain"),
-    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+    *shared(KG=1.0, KP=6.15, KI=0.0),
     ("EFDMAX", 6.9, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
-    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("XL", 0.081, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+    *shared(KC=0.2, XL=0.081),
     ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
-    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    *shared(THETAP=0.0),
 )
 
 RECORDS = (

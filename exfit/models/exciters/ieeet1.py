@@ -19,22 +19,15 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import commutator_start, exciter, lag, limited_lag, washout
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
-    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 50.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.06, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    *shared(TR=0.02, KA=50.0, TA=0.06),
     ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMIN=-7.3),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.08, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 3.1, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.33, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 2.3, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.1, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(TE=0.5, KF=0.08, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
 )
 
 RECORDS = (

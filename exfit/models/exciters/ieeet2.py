@@ -20,23 +20,17 @@ Not modelled: UEL or OEL at the summing point.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import commutator_start, exciter, lag, limited_lag, washout
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import LAG_OF_KF, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    *shared(TR=0.0, KA=400.0, TA=0.02),
     ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMIN=-7.3),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TE=0.8, KF=0.03, TF1=1.0),
     ("TF2", 0.8, "s", (0.01, 100.0), "second stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 4.18, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.1, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.14, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(E1=4.18, SE1=0.1, E2=3.14, SE2=0.03),
 )
 
 RECORDS = (record("IEEET2", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2"),)

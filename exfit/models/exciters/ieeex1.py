@@ -21,33 +21,15 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import commutator_start, exciter, lag, lead_lag, limited_lag, washout
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    OF_A_LIST,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import OF_A_LIST, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 40.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.04, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    *shared(TR=0.0, KA=40.0, TA=0.04, TB=0.0, TC=0.0),
     ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VRMIN=-7.3),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 2.4, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.03, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 5.0, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.5, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
 )
 
 RECORDS = (

@@ -49,34 +49,22 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import (
-    DEMAGNETISING,
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    LOADING,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, LOADING, record, sheet
 
 ALIASES = ("REXSYS",)
 
 SHEET = sheet(
-    ("TR", 0.01, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.01),
     ("KVP", 30.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
     ("KVI", 25.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
     ("VIMAX", 0.5, "pu", (0.0, 9999.0), "limit of the voltage error, of both signs"),
-    ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    *shared(TA=0.01),
     ("TB1", 0.0, "s", (0.0, 100.0), "regulator lag"),
     ("TC1", 0.0, "s", (0.0, 100.0), "regulator lead"),
     ("TB2", 0.0, "s", (0.0, 100.0), "second regulator lag"),
     ("TC2", 0.0, "s", (0.0, 100.0), "second regulator lead"),
-    ("VRMAX", 15.4, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -12.3, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 0.7, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(VRMAX=15.4, VRMIN=-12.3, KF=0.02, TF=0.7),
     ("TF1", 0.0, "s", (0.0, 100.0), "stabilising feedback lead"),
     ("TF2", 0.0, "s", (0.0, 100.0), "stabilising feedback lag"),
     ("FBF", 1.0, "1", (0.0, 2.0), "fed back: 0 VR, 1 VFE, 2 efd"),
@@ -86,14 +74,9 @@ SHEET = sheet(
     ("VFMAX", 15.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VFMIN", -12.3, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
     ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current"),
-    ("KE", 0.5, "pu", (0.0, 10.0), "exciter constant"),
-    ("TE", 0.7, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    *shared(KE=0.5, TE=0.7),
     ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 0.5, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
-    ("E1", 2.525, "pu", (0.0, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.1, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 3.367, "pu", (0.0, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.23, "pu", (0.0, 100.0), "saturation at E2"),
+    *shared(KD=0.5, E1=2.525, SE1=0.1, E2=3.367, SE2=0.23),
     ("FLIMF", 0.0, "1", (0.0, 1.0), "share of the limits that follows VT"),
 )
 

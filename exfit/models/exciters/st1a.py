@@ -36,7 +36,8 @@ from exfit.models.blocks import (
     regulator_output,
     washout,
 )
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, SearchRange, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import LAG_OF_TC, LEAD_OF_TB, SearchRange, record, sheet
 
 ALIASES = ("ESST1A",)
 
@@ -45,20 +46,17 @@ KF_ALONE = SearchRange(high=1.0, instead_of=("TB", "TC"))
 TF_ALONE = SearchRange(needs="KF", instead_of=("TB", "TC"))
 
 SHEET = sheet(
-    ("TR", 0.04, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("VIMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
-    ("VIMIN", -99.0, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    *shared(TR=0.04, VIMAX=99.0, VIMIN=-99.0),
     ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
     ("TC1", 0.0, "s", (0.0, 100.0), "second regulator lead"),
     ("TB1", 0.0, "s", (0.0, 100.0), "second regulator lag"),
-    ("KA", 190.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    *shared(KA=190.0),
     ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    ("VAMAX", 14.5, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -14.5, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(VAMAX=14.5, VAMIN=-14.5),
     ("VRMAX", 7.8, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -6.7, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    ("KC", 0.08, "pu", (0.0, 100.0), "rectifier loading factor"),
+    *shared(KC=0.08),
     ("KF", 0.001, "pu", (0.0, 10.0), "stabilising feedback gain", KF_ALONE),
     ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", TF_ALONE),
     ("KLR", 4.54, "pu", (0.0, 1000.0), "field current limiter gain"),

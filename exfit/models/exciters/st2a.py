@@ -18,32 +18,17 @@ where PSS/E's EXST2A has them and no gate.
 from exfit.engine.trace import Signal
 from exfit.models.blocks import lag, larger, limited_integrator, limited_lag, washout
 from exfit.models.compound import supply
-from exfit.models.sheet import (
-    AS_IN_PSSE,
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.rows import shared
+from exfit.models.sheet import AS_IN_PSSE, record, sheet
 
 ALIASES = ("ESST2A", "EXST2A")
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 120.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.15, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=1.0, VRMIN=0.0),
     ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
-    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    *shared(TE=0.5, KF=0.05, TF=1.0),
     ("KP", 4.88, "pu", (0.0, 100.0), "potential source gain"),
-    ("KI", 8.0, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("KC", 1.82, "pu", (0.0, 100.0), "rectifier loading factor"),
+    *shared(KI=8.0, KC=1.82),
     ("EFDMAX", 4.5, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
 )
 

@@ -41,6 +41,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import st2a
+from exfit.models.rows import shared
 from exfit.models.sheet import OF_TWO_PROGRAMS, not_searched, record, sheet
 from exfit.models.static import PID
 
@@ -50,9 +51,7 @@ SHEET = (
     *not_searched(st2a.SHEET, "KA"),
     *PID,
     *sheet(
-        ("XL", 0.081, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
-        ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
-        ("VBMAX", 9.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        *shared(XL=0.081, THETAP=0.0, VBMAX=9.0),
     ),
 )
 

@@ -16,30 +16,23 @@ only. Not modelled: UEL at the summing point, and VGMAX of later editions.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, pi, pi_rest, smaller, source_voltage
-from exfit.models.sheet import FREE, REGULATOR_LAG, record, sheet
+from exfit.models.rows import shared
+from exfit.models.sheet import FREE, record, sheet
 
 ALIASES = ("ESST4B",)
 
 # the gains are those that OpenIPSL compared with PSS/E: the samples of the standard cut a loop
 
 SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.0),
     ("KPR", 2.97, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
     ("KIR", 2.97, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
-    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    *shared(VRMAX=1.0, VRMIN=-0.87, TA=0.02),
     ("KPM", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field voltage loop", FREE),
     ("KIM", 0.2, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop", FREE),
     ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
     ("VMMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
-    ("KG", 0.1, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
-    ("KP", 6.73, "pu", (0.01, 100.0), "potential source gain"),
-    ("KI", 0.1, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("VBMAX", 8.41, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
-    ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
-    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    *shared(KG=0.1, KP=6.73, KI=0.1, VBMAX=8.41, KC=0.1, XL=0.0, THETAP=0.0),
 )
 
 RECORDS = (

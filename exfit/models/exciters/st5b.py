@@ -23,10 +23,11 @@ has the gate; while none acts they have no effect.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import Limited, clip, lag, larger, limited_lag, limited_lead_lag, smaller
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.02),
     ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead", SearchRange(unlike="TB1")),
     ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag", SearchRange(unlike="TC1")),
     ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead", SearchRange(unlike="TB2")),
@@ -35,7 +36,7 @@ SHEET = sheet(
     ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling, and at rated voltage"),
     ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor, and at rated voltage"),
     ("T1", 0.004, "s", (0.0, 10.0), "firing circuit time constant", FREE),
-    ("KC", 0.004, "pu", (0.0, 100.0), "rectifier loading factor"),
+    *shared(KC=0.004),
 )
 
 RECORDS = (

@@ -21,10 +21,11 @@ gate (OEL = 1 in a PSS/E record) or behind it (OEL = 2).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, pi_rest, pid, smaller
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.012, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.012),
     ("KPA", 18.038, "pu", (0.0, 100000.0), "proportional gain", FREE),
     ("KIA", 45.094, "pu/s", (0.0, 100000.0), "integral gain", FREE),
     ("KDA", 0.1, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDA")),
@@ -38,7 +39,7 @@ SHEET = sheet(
     ("ILR", 4.164, "pu", (0.0, 9999.0), "field current limit"),
     ("VRMAX", 4.81, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -3.85, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    ("KG", 1.0, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
+    *shared(KG=1.0),
     ("TG", 0.02, "s", (0.001, 10.0), "feedback lag of the field voltage loop", FREE),
 )
 

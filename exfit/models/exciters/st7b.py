@@ -29,10 +29,11 @@ test unlimited.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, smaller
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
 
 SHEET = sheet(
-    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
+    *shared(TR=0.02),
     ("TG", 1.0, "s", (0.0, 100.0), "lead of the measured voltage"),
     ("TF", 1.0, "s", (0.0, 100.0), "lag of the measured voltage"),
     ("VMAX", 1.6, "pu", (-9999.0, 9999.0), "ceiling of the reference"),
@@ -42,8 +43,7 @@ SHEET = sheet(
     ("VRMIN", -4.5, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
     ("KH", 1.0, "pu", (0.0, 100.0), "feedback to the high-value gate"),
     ("KL", 1.0, "pu", (0.0, 100.0), "feedback to the low-value gate"),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
-    ("TB", 1.0, "s", (0.0, 100.0), "regulator lag"),
+    *shared(TC=1.0, TB=1.0),
     ("KIA", 1.0, "pu", (0.0, 10.0), "feedback gain, 1 for an integral"),
     ("TIA", 3.0, "s", (0.01, 100.0), "feedback time constant, that of the integral", FREE),
 )

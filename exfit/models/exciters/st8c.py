@@ -40,6 +40,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.phasors import modulus
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, ONE_GATE, record, sheet
 from exfit.models.static import SUPPLY_SWITCH
 
@@ -47,7 +48,7 @@ ALIASES = ("ESST8C",)
 
 SHEET = (
     *sheet(
-        ("TR", 0.012, "s", (0.0, 1.0), "voltage transducer lag"),
+        *shared(TR=0.012),
         ("KPR", 20.0, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
         ("KIR", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
         ("VPIMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the field current reference"),
@@ -58,15 +59,13 @@ SHEET = (
         ("VAMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the field current loop"),
         ("KA", 1.0, "pu", (0.01, 100000.0), "regulator gain"),
         ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", FREE),
-        ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-        ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
+        *shared(VRMAX=1.0, VRMIN=-0.87),
         ("KF", 1.0, "pu", (0.0, 100.0), "feedback gain of the field current"),
         ("TF", 0.02, "s", (0.0, 10.0), "feedback lag of the field current", FREE),
         ("KC1", 0.05, "pu", (0.0, 100.0), "rectifier loading factor"),
-        ("KP", 6.0, "pu", (0.01, 100.0), "potential source gain"),
+        *shared(KP=6.0),
         ("KI1", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
-        ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
-        ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+        *shared(XL=0.0, THETAP=0.0),
         ("VB1MAX", 8.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
         ("KC2", 0.05, "pu", (0.0, 100.0), "loading factor of the second rectifier, on load"),
         ("KI2", 0.5, "pu", (0.0, 100.0), "gain of the second source, on load"),

@@ -29,6 +29,7 @@ which are 0, 10000, 2, 0.0018, 0 and 1.2 there: most leave out what they act on.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, smaller, washout
+from exfit.models.rows import shared
 from exfit.models.sheet import FREE, ONE_GATE, record, sheet
 from exfit.models.static import SUPPLY, supply
 
@@ -36,16 +37,15 @@ ALIASES = ("ESST9C",)
 
 SHEET = (
     *sheet(
-        ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
+        *shared(TR=0.02),
         ("TCD", 0.06, "s", (0.0, 10.0), "time constant of the derivative"),
         ("TBD", 0.03, "s", (0.0, 10.0), "lag of the derivative"),
         ("ZA", 0.036, "pu", (0.0, 9999.0), "dead band of the derivative"),
-        ("KA", 12.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+        *shared(KA=12.0),
         ("KU", 100.0, "1", (0.0, 1e6), "gain of the change to TAUEL while UEL has the gate"),
         ("TA", 2.0, "s", (0.01, 100.0), "time constant of the integral", FREE),
         ("TAUEL", 3.0, "s", (0.01, 100.0), "that of the integral while UEL has the gate"),
-        ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-        ("VRMIN", -0.866, "pu", (-9999.0, 9999.0), "regulator floor"),
+        *shared(VRMAX=1.0, VRMIN=-0.866),
         ("KAS", 6.1, "pu", (0.01, 1000.0), "gain of the power converter"),
         ("TAS", 0.01, "s", (0.0, 10.0), "firing circuit time constant", FREE),
     ),
