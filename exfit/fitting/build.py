@@ -38,9 +38,8 @@ from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import system_of
 from exfit.plants import NETWORK, REFERENCES, VT0, PlantKind
 from exfit.records.record import Record
-from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput
+from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput, SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.splines import SplinedInput
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

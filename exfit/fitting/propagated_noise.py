@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from exfit.dsp.noise import noise
 from exfit.errors import SimulationError
 from exfit.fitting.setup import ExperimentSetup
-from exfit.simulation.inputs import RecordedInput
+from exfit.simulation.inputs import RecordedInput, SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.splines import SplinedInput
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

@@ -8,7 +8,7 @@ from exfit.engine.trace import Signal
 from exfit.models.machines import Axes, Machine
 from exfit.models.phasors import modulus
 from exfit.models.sheet import Model
-from exfit.plants.governing import REFERENCE, governing, governor_rest
+from exfit.plants.controls import REFERENCE, governing, governor_rest, stabiliser_rest, stabilising
 from exfit.plants.limiting import (
     limited_inputs,
     limiters_rest,
@@ -34,7 +34,6 @@ from exfit.plants.parts import (
     values_of,
 )
 from exfit.plants.plant import Attached, Stabilised, Swing
-from exfit.plants.stabilising import stabiliser_rest, stabilising
 
 # the rotor's angle to where the voltage behind R + jX is at the start (rad), its speed less 1 (pu)
 ROTOR = ("delta", "dw")

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.system import System
-from exfit.simulation.grid import GridSegment
 from exfit.simulation.inputs import Direction, Inputs
+from exfit.simulation.interpolation import GridSegment
 
 Array = NDArray[np.float64]
 

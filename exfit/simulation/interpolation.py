@@ -4,17 +4,35 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache, cached_property
 from math import prod
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.sampling import SampleRows
-from exfit.simulation.grid import ON_GRID, GridSegment
 
+ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
 Array = NDArray[np.float64]
-
 BLOCK = 1 << 16  # samples that are read at a time
 NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
+
+
+class GridSegment(NamedTuple):
+    """Equal steps of the grid between two changes of the inputs."""
+
+    start: float
+    step: float
+    steps: int
+
+    @property
+    def end(self) -> float:
+        """Where it ends, s."""
+        return self.start + self.step * self.steps
+
+    @property
+    def times(self) -> Array:
+        """Its grid points (n + 1,), s."""
+        return np.linspace(self.start, self.end, self.steps + 1)
 
 
 @cache

@@ -11,7 +11,7 @@ from exfit.engine.system import System
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.plants import VT0
-from exfit.simulation.grid import ON_GRID
+from exfit.simulation.interpolation import ON_GRID
 from exfit.simulation.kernels import linear_kernel, places_of_time_constants, time_constants
 from exfit.simulation.limits import acting_at_rest, limits_passed
 

@@ -2,32 +2,161 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
+from math import log, sqrt
+from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from exfit.dsp.noise import MEDIAN_DEVIATION, spread
 from exfit.fitting.channels import noise_shape
 from exfit.fitting.experiment import Channel
 from exfit.fitting.propagated_noise import carried_noise
 from exfit.fitting.residuals import LEAST_NOISE, scatter_of
-from exfit.inference.noise import whiteness
+from exfit.inference.noise import effective_samples, whiteness
+from exfit.inference.quantiles import chi_square_tail
 from exfit.results.comparisons import Overlay
 from exfit.results.verdict import ResidualTests
+from exfit.util.sorting import median
 from exfit.verdict.causes import Evidence, FittedRecord
-from exfit.verdict.residual_noise import (
-    Scatter,
-    excess,
-    largest_deviation,
-    moving_median,
-    rest_scatter,
-    sample_scatter,
-    step_pattern,
-    white_scatter,
-    with_carried,
-)
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+
+# variance of the logarithm of a standard deviation, times the number of samples it is taken from
+OF_RMS = 0.5  # (Kendall & Stuart 1977, section 10.9)
+OF_SCATTER = 2.0  # by the median of second differences: simulated, for 100 to 5000 samples
+OF_FOURTH_DIFFERENCES = 2.8  # by theirs: simulated, for 720 samples
+OF_SPREAD = 1.36  # by the median deviation (Rousseeuw & Croux 1993)
+FEWEST_AT_REST = 20  # samples from which a record's scatter at rest is taken
+MOST_STEPS = 10  # whose patterns are tested
+STRETCHES = 50  # of a record: a deviation that lasts as long is seen in a figure of it
+FEWEST_IN_STRETCH = 10  # samples
+OVERLAPS = 4  # windows that a sample lies in
+MEDIAN_ERROR = 1.17  # relative, of the median magnitude of noise, times the root of the samples
+RARE = 3.0  # standard errors that the largest of all stretches of noise hardly exceeds
+
+
+class Scatter(NamedTuple):
+    """A standard deviation, the variance of its logarithm, the share that inputs carry."""
+
+    std: float
+    log_variance: float
+    carried: float = 0.0
+
+
+def sample_scatter(std: float, samples: int) -> Scatter:
+    """Return the scatter from sample to sample, by the median of second differences (`dsp.noise`).
+
+    The residuals are as many ``samples``; so is their own share of the variance here.
+    """
+    return Scatter(std, (OF_RMS + OF_SCATTER) / samples)
+
+
+def white_scatter(std: float, samples: int) -> Scatter:
+    """Return the scatter of residuals that are weighted by the noise of what drives them.
+
+    It is as certain as the scatter of these signals, by the median of fourth differences.
+    """
+    return Scatter(std, (OF_RMS + OF_FOURTH_DIFFERENCES) / samples)
+
+
+def rest_scatter(at_rest: Array, samples: int) -> Scatter | None:
+    """Return the scatter of a record at rest (K,), for residuals of so many ``samples``.
+
+    A straight line is removed: a drift is no scatter. Samples that are alike at rest count as
+    fewer, and residuals alike. None where there are too few, or all are equal.
+    """
+    count = len(at_rest)
+    if count < FEWEST_AT_REST:
+        return None
+    clock = np.linspace(-1.0, 1.0, count)
+    level = at_rest - np.mean(at_rest)
+    level -= clock * float(clock @ level) / float(clock @ clock)
+    std = float(spread(level))
+    if std == 0.0:
+        return None
+    independent = effective_samples(level)
+    return Scatter(std, OF_SPREAD / independent + OF_RMS * count / (independent * samples))
+
+
+def with_carried(scatter: Scatter, carried: Array) -> Scatter:
+    """Return a scatter with the noise that recorded inputs carry into the response.
+
+    Given are realisations (K, M) of it; what the residuals hold of it is one more.
+    """
+    variance = float(np.mean(carried**2))
+    total = scatter.std**2 + variance
+    if variance == 0.0:
+        return scatter
+    share = variance / total
+    own = (1.0 - share) ** 2 * scatter.log_variance
+    independent = float(np.mean([effective_samples(realisation) for realisation in carried]))
+    of_carried = share**2 * (1.0 + 1.0 / len(carried)) * OF_RMS / independent
+    return Scatter(sqrt(total), own + of_carried, share)
+
+
+def excess(rmse: float, scatter: Scatter) -> float:
+    """Return the probability that noise of this scatter leaves residuals as large as ``rmse``.
+
+    The logarithm of their ratio is taken as normal.
+    """
+    if rmse <= 0.0 or scatter.std <= 0.0:
+        return float(rmse <= scatter.std)
+    return 1.0 - NormalDist().cdf(log(rmse / scatter.std) / sqrt(scatter.log_variance))
+
+
+def step_pattern(errors: Array, steps: Sequence[int]) -> float | None:
+    """Return the probability that white noise has sums as large as this after its steps.
+
+    From the beginning and from each of the places ``steps`` on, the errors (M,) are divided into
+    parts of 1, 2, 4 ... samples. Each part's sum, over the root of its length and the standard
+    deviation of all errors, is standard normal; the sum of their squares is chi-square, its
+    degrees of freedom as many as the parts. None without errors.
+    """
+    if not np.any(errors):
+        return None
+    starts = _parts(len(errors), steps)
+    sums = np.add.reduceat(errors, starts)
+    lengths = np.diff([*starts, len(errors)])
+    statistic = float(np.sum(sums**2 / lengths)) / float(np.mean(errors**2))
+    return chi_square_tail(statistic, len(starts))
+
+
+def _parts(count: int, steps: Sequence[int]) -> list[int]:
+    """Return where the parts of a pattern begin."""
+    inside = sorted({step for step in steps if 0 < step < count})[:MOST_STEPS]
+    return [
+        first + 2**k - 1
+        for first, last in pairwise([0, *inside, count])
+        for k in range((last - first).bit_length())
+        if first + 2**k - 1 < last
+    ]
+
+
+def largest_deviation(errors: Array, scatter: float) -> float:
+    """Return what half of the errors (M,) of some fiftieth of a record exceed, noise deducted.
+
+    It is the largest median magnitude in windows of at least ten samples, less (in squares) what
+    that of noise of this scatter hardly exceeds. Spikes do not move it.
+    """
+    largest = float(np.max(moving_median(np.abs(errors))))
+    rare = 1.0 + RARE * MEDIAN_ERROR / sqrt(stretch(len(errors)))
+    return sqrt(max(largest**2 - (MEDIAN_DEVIATION * scatter * rare) ** 2, 0.0))
+
+
+def moving_median(samples: Array) -> Array:
+    """Return the medians of samples (M,) in windows of a stretch, which overlap."""
+    width = stretch(len(samples))
+    return np.asarray(median(sliding_window_view(samples, width)[:: max(1, width // OVERLAPS)]))
+
+
+def stretch(count: int) -> int:
+    """Return how many of ``count`` samples a deviation lasts that is seen in their figure."""
+    return min(max(count // STRETCHES, FEWEST_IN_STRETCH), count)
 
 
 def residual_tests(evidence: Evidence) -> tuple[ResidualTests, ...]:

@@ -22,9 +22,17 @@ from exfit.results.verdict import REJECTED, Cause
 from exfit.simulation.inputs import InputStep
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
-from exfit.verdict.causes.linear import LinearFit, blocks, linear_model, moving
 from exfit.verdict.causes.steps import correct_instant, correct_step
-from exfit.verdict.causes.trials import Opened, freed_within, with_freed, with_opened
+from exfit.verdict.causes.trials import (
+    LinearFit,
+    Opened,
+    blocks,
+    freed_within,
+    linear_model,
+    moving,
+    with_freed,
+    with_opened,
+)
 from exfit.verdict.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from exfit.results.intervals.minima import minima_notes, minima_of
 from exfit.results.model import FitResult, Iteration
 from exfit.util.versions import versions
 from exfit.verdict.causes import Pace
-from exfit.verdict.causes.pace import time_for_causes
+from exfit.verdict.causes.evidence import time_for_causes
 from exfit.verdict.rule import verdict_of
 from exfit.workflows.case_search import STAGES, SearchState, in_turn
 from exfit.workflows.descriptions.case_description import (

@@ -19,9 +19,8 @@ from exfit.models.speed_multiplier import times_speed
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.unit import UnitOnLoad
-from exfit.simulation.inputs import Inputs, InputStep
+from exfit.simulation.inputs import Inputs, InputStep, SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.splines import SplinedInput
 
 
 def named(kind):

@@ -22,7 +22,6 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.plants import SATURATION, VT0
 from exfit.plants.open_circuit import open_circuit
-from exfit.simulation.grid import GridSegment
 from exfit.simulation.inputs import (
     Direction,
     Inputs,
@@ -31,7 +30,7 @@ from exfit.simulation.inputs import (
     each,
     grid_segments,
 )
-from exfit.simulation.interpolation import Interpolation
+from exfit.simulation.interpolation import GridSegment, Interpolation
 from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.substeps import MOST_SUBSTEPS

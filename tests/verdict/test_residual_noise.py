@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from exfit.dsp.noise import noise
-from exfit.verdict.residual_noise import (
+from exfit.verdict.residual_tests import (
     excess,
     largest_deviation,
     rest_scatter,

@@ -10,8 +10,7 @@ from tiers import few_of
 from exfit.case.load import load_case
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.verdict import rule
-from exfit.verdict.causes.linear import linear_model
-from exfit.verdict.causes.trials import freed_within, refitted, with_freed
+from exfit.verdict.causes.trials import freed_within, linear_model, refitted, with_freed
 from exfit.verdict.score_tests import Held, _linearised, _score, _spread
 from exfit.workflows import fit
 

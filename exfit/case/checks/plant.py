@@ -70,7 +70,7 @@ def stabiliser_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> It
 
 def governor_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
     """Yield a governor that does not act, or does not hold the power at the start."""
-    from exfit.plants.governing import rests_at
+    from exfit.plants.controls import rests_at
 
     section = content.at("governor")
     tests = (content, *content.at("records").entries, *content.at("validate").entries)
@@ -166,7 +166,7 @@ def _number_of_inputs(section: ContentNode, model: Model) -> Iterator[Fault]:
 
 def _output_at_rest(section: ContentNode, model: Model) -> Iterator[Fault]:
     """Yield a stabiliser that moves the voltage of a unit at rest: its washout is left out."""
-    from exfit.plants.stabilising import HEARD, rests_with_output
+    from exfit.plants.controls import HEARD, rests_with_output
 
     values = _start_values(section, model)
     inputs = tuple(entry.text or "" for entry in section.at("inputs").entries) or model.inputs

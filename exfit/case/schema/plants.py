@@ -23,7 +23,7 @@ from exfit.case.schema.values import (
 )
 from exfit.models import MACHINE_NAMES
 from exfit.plants import PLACES, PowerAt, Swing
-from exfit.plants.stabilising import HEARD
+from exfit.plants.controls import HEARD
 
 if TYPE_CHECKING:
     Heard = str

@@ -3,10 +3,10 @@
 SUGGESTIONS = {"grid event": "suggestion:event_sections"}
 PLANTS = {"grid-playback": "grid_playback:GRID_PLAYBACK"}
 INPUT_NOISE = {
-    "weighted search": "driving_noise.weighing:weighted_search",
-    "without bias": "driving_noise.weighing:without_bias",
+    "weighted search": "input_noise:weighted_search",
+    "without bias": "input_noise:without_bias",
 }
-CAUSES_BEFORE_FIT = {"records of events": "before_fit:event_causes"}
+CAUSES_BEFORE_FIT = {"records of events": "record_causes:event_causes"}
 CAUSES_AT_REST = {"record of the event": "record_causes:wrong_event"}
 CAUSES_OF_EVENTS = {
     "equation of the speed": "unit_causes:other_swing",

@@ -5,19 +5,27 @@ exciter: where the recorded power swings otherwise by far, the record is not tha
 """
 
 from collections.abc import Iterator, Mapping
-from math import hypot, sqrt
+from dataclasses import replace
+from math import hypot, pi, sqrt
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.case.case import Case
+from exfit.case.schema import Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.dsp.sampling import sampling_of
+from exfit.errors import SimulationError
+from exfit.fitting.build import build_experiment
+from exfit.fitting.recorded.event import with_rest
+from exfit.fitting.recordings import record_of
 from exfit.records.record import Record
+from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, Overlay
 from exfit.results.verdict import Cause
 from exfit.signals import SIGNALS
-from exfit.verdict.causes.evidence import Evidence
-from exfit.verdict.causes.suspicion import CERTAIN, Suspicion
+from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion
 
 Array = NDArray[np.float64]
 
@@ -51,6 +59,19 @@ LEAST_ALIKE = 0.85  # correlation of swings that are the same but for a delay
 SIGN_BEFORE_DELAY = 0.05  # of the correlation: with as little to choose it is the sign
 GAINED_BY_DELAY = 0.15  # of the correlation
 DRIVING = ("vt", "angle", "frequency")
+Values = Mapping[str, float]
+DEGREES = 180.0 / pi
+# what may have become of an angle -> the words for it, and what turns it back
+WRONG_ANGLES: Mapping[float, tuple[str, str]] = {
+    -1.0: ("with the other sign", "scale: -1 on the channel angle turns it"),
+    1.0 / DEGREES: (
+        "divided by 57.3",
+        "degrees are taken for radians: the unit of the angle is deg",
+    ),
+    DEGREES: ("times 57.3", "radians are taken for degrees: the unit of the angle is rad"),
+}
+FAR_BETTER = 0.25  # of the mismatch: what is left of it with another angle
+STILL_UNLIKE = 0.2  # of the sizes of both: a better one is not right
 
 
 def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
@@ -365,3 +386,61 @@ def _delay(time: Array, measured: Array, simulated: Array) -> tuple[float, float
     ]
     lag, alike = min(peaks, key=lambda peak: abs(peak[0]), default=(0, best))
     return lag * step, alike
+
+
+def event_causes(case: Case, recording: Recording) -> tuple[Cause, ...]:
+    """Find what is wrong with the record of an event: its clock, its levels, its swings.
+
+    Each of these hides what comes after it.
+    """
+    record = record_of(case, recording)
+    of_clock = tuple(clock_causes(record))
+    if of_clock:
+        return of_clock
+    steady = with_rest(recording.test, record).steady
+    if steady is None:
+        return ()
+    of_record = record_causes(record, steady)
+    if of_record:
+        return of_record
+    comparison = _compared(case, recording)
+    if comparison is None:
+        return ()
+    of_swings = tuple(swing_causes(comparison, steady))
+    if of_swings and "p" in comparison.overlays and "angle" in record.signals:
+        of_angle = _other_angle(case, recording, record, steady, mismatch(comparison, steady))
+        return of_angle or of_swings
+    return of_swings
+
+
+def _compared(case: Case, recording: Recording) -> Comparison | None:
+    """Return the match with the response to the start values, None where there is none."""
+    values = case.values()
+    try:
+        setup = build_experiment(case, recording, values)
+        ready = setup.with_enough_substeps(setup.with_start_values(values))
+        return compare_with_record(ready, ready.name, values)
+    except SimulationError:  # a fit reports it
+        return None
+
+
+def _other_angle(
+    case: Case, recording: Recording, record: Record, steady: float, before: float
+) -> tuple[Cause, ...]:
+    """Return what was taken for the angle where with another one the power matches far better."""
+    for factor, (words, remedy) in WRONG_ANGLES.items():
+        signals = {**record.signals, "angle": factor * record.signals["angle"]}
+        turned = replace(record, signals=MappingProxyType(signals))
+        comparison = _compared(case.with_record(turned, recording.name), recording)
+        if comparison is None:
+            continue
+        after = mismatch(comparison, steady)
+        if after < min(FAR_BETTER * before, STILL_UNLIKE):
+            return (
+                Cause(
+                    f"with the angle {words}, p swings as the response: {100.0 * after:.2g} % of "
+                    f"both is left between them, with the angle as it is {100.0 * before:.2g} %",
+                    remedy,
+                ),
+            )
+    return ()

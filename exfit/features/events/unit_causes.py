@@ -20,8 +20,7 @@ from exfit.fitting.system import system_of
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
 from exfit.results.verdict import Cause
-from exfit.verdict.causes.evidence import Evidence
-from exfit.verdict.causes.suspicion import Suspicion, likelihood, suspected
+from exfit.verdict.causes.evidence import Evidence, Suspicion, likelihood, suspected
 from exfit.verdict.causes.trials import Trial, always, freed_within, refitted, tried, with_freed
 from exfit.verdict.causes.unit import STRUCTURE
 

@@ -9,7 +9,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.setup import ExperimentSetup
-from exfit.simulation.splines import SplinedInput
+from exfit.simulation.inputs import SplinedInput
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,7 @@ from exfit.fitting.levels import deviation, initial_level
 from exfit.fitting.recorded.switchings import Switching
 from exfit.records.record import Record
 from exfit.signals import RESTING
-from exfit.simulation.inputs import InputStep, RecordedInput
-from exfit.simulation.splines import SplinedInput
+from exfit.simulation.inputs import InputStep, RecordedInput, SplinedInput
 from exfit.util.text import show
 
 Array = NDArray[np.float64]

@@ -15,8 +15,7 @@ from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recordings import record_of
 from exfit.records.record import Record
-from exfit.simulation.inputs import InputStep, RecordedInput
-from exfit.simulation.splines import SplinedInput
+from exfit.simulation.inputs import InputStep, RecordedInput, SplinedInput
 from exfit.util.sorting import median
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.results.intervals.value_shifts import shifts_by_values
+from exfit.results.intervals.value_errors import shifts_by_values
 from exfit.results.typical_values import DEVIATION, TypicalValue, typical_values_used
 
 Array = NDArray[np.float64]

@@ -14,18 +14,23 @@ from exfit.case.case import Case
 from exfit.registry import parts
 from exfit.results.verdict import Cause
 from exfit.verdict.causes.channels import clipped_channel, wrong_offset, wrong_scale, wrong_start
-from exfit.verdict.causes.evidence import Evidence, FittedRecord
-from exfit.verdict.causes.pace import OutOfTime, Pace
+from exfit.verdict.causes.evidence import (
+    Evidence,
+    FittedRecord,
+    OutOfTime,
+    Pace,
+    Recogniser,
+    Suspicion,
+)
 from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
 from exfit.verdict.causes.rest import unsteady_record, wrong_levels, wrong_voltage
 from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
-from exfit.verdict.causes.suspicion import Recogniser, Suspicion
-from exfit.verdict.causes.typical import typical_values
 from exfit.verdict.causes.unit import (
     fixed_values,
     machine_data,
     narrow_bound,
     not_ended,
+    typical_values,
     with_model,
     wrong_limit,
 )

@@ -13,9 +13,8 @@ from exfit.fitting.residuals import Residuals
 from exfit.plants import VT0
 from exfit.results.comparisons import Overlay
 from exfit.results.verdict import Cause
-from exfit.verdict.causes.evidence import Evidence, FittedRecord
+from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion
 from exfit.verdict.causes.lines import offset_found
-from exfit.verdict.causes.suspicion import Suspicion
 from exfit.verdict.causes.trials import Opened, Trial, always, tried, with_experiment, with_opened
 
 Array = NDArray[np.float64]

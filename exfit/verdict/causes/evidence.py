@@ -1,12 +1,16 @@
-"""What is known of a fit when its causes are looked for."""
+"""What recognisers of causes work with: the evidence of a fit, the pace, and their suspicions."""
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf, log
+from typing import NamedTuple
 
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
+from exfit.estimate import Progress
 from exfit.fitting.residuals import Residuals, noise_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -14,7 +18,77 @@ from exfit.results.comparisons import Comparison
 from exfit.results.intervals.determination import NEEDS_PROFILE
 from exfit.results.recorder_averages import RecorderAverages
 from exfit.results.typical_values import TypicalValue
-from exfit.verdict.causes.pace import Pace
+from exfit.results.verdict import Cause
+
+LEAST_TIME = 30.0  # s
+TIMES_SEARCH = 3.0  # times what the search took
+LEAST_GAIN = 10.0  # of the log-likelihood: chi-square 20, beyond what any of twenty trials gains
+LEAST_SHARE = 0.25  # of the error beyond the noise: a cause that explains less is not named
+TINY_COST = 1e-300  # a record without noise may be matched exactly
+CERTAIN, LAST = inf, -inf  # likelihoods of what needs no comparison
+
+
+class OutOfTime(Exception):
+    """The time for causes is over."""
+
+
+def time_for_causes(given: float | None, search: float) -> float:
+    """Return the time (s) for causes: as it is given, or by what the ``search`` took (s)."""
+    return max(LEAST_TIME, TIMES_SEARCH * search) if given is None else given
+
+
+class Pace:
+    """Watches the search for causes: announces its trials, and ends it when its time is over.
+
+    The time (s) is that of ``clock``, processor time by default, from now on. ``untried`` are the
+    causes that were not tried, or not to the end; ``interrupted`` whether an interruption left
+    them.
+    """
+
+    def __init__(
+        self,
+        seconds: float = inf,
+        watch: Callable[[Progress], object] = lambda _: None,
+        clock: Callable[[], float] = time.process_time,
+    ) -> None:
+        self.seconds, self.watch, self.clock = seconds, watch, clock
+        self.untried: tuple[str, ...] = ()
+        self.interrupted = False
+        self._until = clock() + seconds
+        self._done, self._total, self._lowest, self._tried = 0, 0, inf, False
+
+    def counts(self, done: int, total: int, cost: float) -> None:
+        """Count how many causes are done; ``cost`` is that without any."""
+        self._lowest = min(self._lowest, cost)
+        self._done, self._total = done, total
+
+    def goes_on(self, cost: float = inf) -> None:
+        """Announce the cost of a trial; raises OutOfTime where its time is over."""
+        if self.clock() > self._until:
+            raise OutOfTime
+        self._lowest = min(self._lowest, cost)
+        self._announce(self._done if self._tried else 0)
+        self._tried = True
+
+    def ended(self) -> None:
+        """Announce that all are done, where one needed a trial."""
+        if self._tried:
+            self._announce(self._total)
+
+    def _announce(self, done: int) -> None:
+        self.watch(Progress("causes", done, self._total, self._lowest))
+
+    def stopped(self, untried: tuple[str, ...], interrupted: bool) -> None:
+        """Keep what an interruption, or the end of the time, has left untried."""
+        self.untried, self.interrupted = untried, interrupted
+
+    @property
+    def sentence(self) -> str:
+        """What was not tried and why, "" where all was."""
+        if not self.untried:
+            return ""
+        why = "interrupted" if self.interrupted else f"beyond estimate.causes, {self.seconds:.3g} s"
+        return f"not tried as causes ({why}): {', '.join(self.untried)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,3 +202,37 @@ class Evidence:
             return ()
         parameters = self.uncertainty.confidence.parameters
         return tuple(name for name in self.own if parameters[name].why == NEEDS_PROFILE)
+
+
+class Suspicion(NamedTuple):
+    """A cause, and the logarithm of the likelihood of the record with it.
+
+    It is that of white noise of unknown size, -M/2 log(cost), less log(M)/2 for each number that
+    is found with it (Schwarz 1978).
+    """
+
+    cause: Cause
+    likelihood: float
+
+
+Recogniser = Callable[[Evidence], Iterator[Suspicion]]  # yields the causes of one kind
+
+
+def likelihood(evidence: Evidence, cost: float, numbers: int = 0) -> float:
+    """Return the log-likelihood of the record at a cost, with so many more numbers found."""
+    samples = max(1, evidence.residuals.samples)
+    return -0.5 * samples * log(max(cost, TINY_COST)) - 0.5 * numbers * log(samples)
+
+
+def suspected(
+    evidence: Evidence, cost: float, numbers: int, cause: Cause, prior: float = 0.0
+) -> Iterator[Suspicion]:
+    """Yield a cause if the ``cost`` with it is so much lower that it is worth naming.
+
+    ``prior`` is the logarithm of how much likelier it is than others, before any record.
+    """
+    gained = likelihood(evidence, cost, numbers) - likelihood(evidence, evidence.cost)
+    share = (evidence.cost - cost) / max(evidence.cost - evidence.noise_cost, TINY_COST)
+    beyond_noise = evidence.cost > evidence.noise_cost
+    if gained > LEAST_GAIN and (share > LEAST_SHARE or not beyond_noise):
+        yield Suspicion(cause, likelihood(evidence, cost, numbers) + prior)

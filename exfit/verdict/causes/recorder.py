@@ -16,11 +16,18 @@ from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.ripple import MAINS, Ripple
 from exfit.results.verdict import Cause
 from exfit.util.sorting import median
-from exfit.verdict.causes.evidence import Evidence
-from exfit.verdict.causes.linear import LinearFit, blocks, linear_fit
+from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, suspected
 from exfit.verdict.causes.lines import delay_found
-from exfit.verdict.causes.suspicion import CERTAIN, LAST, Suspicion, suspected
-from exfit.verdict.causes.trials import Opened, Trial, tried, with_experiment, with_opened
+from exfit.verdict.causes.trials import (
+    LinearFit,
+    Opened,
+    Trial,
+    blocks,
+    linear_fit,
+    tried,
+    with_experiment,
+    with_opened,
+)
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]

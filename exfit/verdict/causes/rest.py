@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 
 from exfit.results.verdict import Cause
-from exfit.verdict.causes.evidence import Evidence
-from exfit.verdict.causes.suspicion import CERTAIN, LAST, Suspicion
+from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion
 from exfit.verdict.run_quality import other_levels, unsteady_signals
 
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond

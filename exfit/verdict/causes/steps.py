@@ -13,11 +13,18 @@ from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.results.verdict import Cause
 from exfit.simulation.inputs import InputStep
 from exfit.simulation.simulator import Simulator
-from exfit.verdict.causes.evidence import Evidence, FittedRecord
-from exfit.verdict.causes.linear import LinearFit, linear_fit
+from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion
 from exfit.verdict.causes.lines import delay_found, step_found
-from exfit.verdict.causes.suspicion import Suspicion
-from exfit.verdict.causes.trials import Opened, Trial, always, tried, with_experiment, with_opened
+from exfit.verdict.causes.trials import (
+    LinearFit,
+    Opened,
+    Trial,
+    always,
+    linear_fit,
+    tried,
+    with_experiment,
+    with_opened,
+)
 
 Array = NDArray[np.float64]
 

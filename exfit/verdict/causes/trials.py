@@ -1,4 +1,4 @@
-"""Fits with one thing more left open: what the record would be matched by."""
+"""One thing more left open, by a fit or in the linear model: what would match the record."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -8,20 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.errors import SimulationError
 from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
-from exfit.verdict.causes.evidence import Evidence
-from exfit.verdict.causes.suspicion import Suspicion, suspected
+from exfit.verdict.causes.evidence import Evidence, Suspicion, suspected
 
 Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 25  # of each phase: to compare causes, not to print digits
 AT_NOISE = 1.2  # times the cost of the noise: a descent that ends so low needs no other
 TOLERANCE = 1e-3  # of a step and of the gradient, in the units of the search
+Mask = NDArray[np.bool_]
+DEPENDENT = 1e-9  # of the longest column: a column that is shorter without the others is none
 
 
 class Opened(NamedTuple):
@@ -128,3 +131,61 @@ def tried(
     likely = None if trial is None else cause(trial)
     if trial is not None and likely is not None:
         yield from suspected(evidence, trial.cost, numbers, likely, prior(trial))
+
+
+class Explained(NamedTuple):
+    """The cost that is left when columns are added to a linear model, and their coefficients."""
+
+    cost: float
+    coefficients: Array
+
+
+class LinearFit(NamedTuple):
+    """The weighted errors (M,) of a fit, and an orthonormal basis (M, K) of what it can move."""
+
+    errors: Array
+    basis: Array
+
+    def beyond(self, columns: Array) -> Array:
+        """Return what of columns (M, ...) the parameters cannot do."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns), dtype=np.float64)
+
+    def with_columns(self, columns: Array) -> Explained:
+        """Return what is left when columns (M, C) are fitted too, beside the parameters."""
+        own, errors = self.beyond(columns), self.beyond(self.errors)
+        coefficients, *_ = np.linalg.lstsq(own, errors, rcond=DEPENDENT)
+        left = errors - own @ coefficients
+        return Explained(0.5 * float(left @ left), np.asarray(-coefficients, dtype=np.float64))
+
+
+def linear_fit(evidence: Evidence) -> LinearFit | None:
+    """Return the linear model at the solution, None where it has no finite derivatives.
+
+    A parameter on a bound does not move.
+    """
+    try:
+        errors, slopes = evidence.residuals.errors(evidence.solution.x)
+    except SimulationError:
+        return None
+    if not np.isfinite(slopes).all():
+        return None
+    return linear_model(errors, slopes[:, moving(evidence)])
+
+
+def moving(evidence: Evidence) -> Mask:
+    """Return which free parameters are not on a bound."""
+    low, high = evidence.residuals.bounds
+    return np.asarray((evidence.solution.x > low) & (evidence.solution.x < high))
+
+
+def linear_model(errors: Array, slopes: Array) -> LinearFit:
+    """Return the linear model of errors (M,) by their derivatives (M, N)."""
+    basis, triangle = np.linalg.qr(slopes)
+    sizes = np.abs(np.diag(triangle))
+    return LinearFit(errors, basis[:, sizes > DEPENDENT * np.max(sizes, initial=0.0)])
+
+
+def blocks(evidence: Evidence) -> list[list[slice]]:
+    """Return where the errors of each channel of each record are among all of them."""
+    places = iter(slices(evidence.residuals.sizes))
+    return [[next(places) for _ in each.channels] for each in evidence.residuals.experiments]

@@ -12,13 +12,19 @@ from exfit.estimate import Stop
 from exfit.fitting.parameters import FreeParameter
 from exfit.inference.wording import listed
 from exfit.plants import MACHINE
+from exfit.results.typical_values import DEVIATION, first_of, moved_parameters
 from exfit.results.verdict import Cause
 from exfit.simulation.limit_hits import Extreme, extremes
-from exfit.verdict.causes.evidence import Evidence
-from exfit.verdict.causes.linear import DEPENDENT, linear_fit
+from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, likelihood
 from exfit.verdict.causes.lines import freeing
-from exfit.verdict.causes.suspicion import CERTAIN, Suspicion, likelihood
-from exfit.verdict.causes.trials import Trial, freed_within, tried, with_freed
+from exfit.verdict.causes.trials import (
+    DEPENDENT,
+    Trial,
+    freed_within,
+    linear_fit,
+    tried,
+    with_freed,
+)
 
 LARGEST_FACTOR = 4.0  # of a fixed value
 WIDER = 10.0  # times: how much farther a bound is put
@@ -213,3 +219,18 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
         "compare others: exfit rank CASE --models A,B",
     )
     return [*suspicions, Suspicion(cause, own)]
+
+
+def typical_values(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the typical values that the parameters of the unit rest on."""
+    names = [*evidence.typical_values]
+    if not names:
+        return
+    first = evidence.typical_values[names[0]]
+    moved = moved_parameters(first, evidence.values)
+    cause = Cause(
+        f"{first_of(names)} {'is' if len(names) == 1 else 'are'} typical: if {names[0]} "
+        f"({first.value:g}) were {100.0 * DEVIATION:g} % off, that would move {moved}",
+        "give the unit's own values, and say under sources where they come from",
+    )
+    yield Suspicion(cause, LAST)

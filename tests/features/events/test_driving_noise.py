@@ -10,8 +10,8 @@ import yaml
 from grid_events import TRUTH, event_case, recorded
 
 from exfit.case.load import load_case
-from exfit.features.events.driving_noise import responses
-from exfit.features.events.driving_noise.responses import carried_noise, noise_of_inputs, with_added
+from exfit.features.events import input_noise
+from exfit.features.events.input_noise import carried_noise, noise_of_inputs, with_added
 from exfit.fitting.build import build_experiments
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.workflows import fit
@@ -21,7 +21,7 @@ WRONG = 1.02  # of X''d: residuals show no such error by themselves
 FACTORS = (0.0, 0.01, 0.1, 1.0)  # of NOISE: the stator makes five times as much of it
 STEP = 1e-5  # of a sample, for a difference quotient
 
-WHY_NOT = "exfit.features.events.driving_noise.weighing.why_not_weighted"
+WHY_NOT = "exfit.features.events.input_noise.why_not_weighted"
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +57,8 @@ def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, m
     case = load_case(event_case(folder, "plain", free=False))
     (setup,) = build_experiments(case)
     values = case.values()
-    monkeypatch.setattr(responses, "noise_of_inputs", lambda _: {"vt": 1.0, "angle": 1.0})
-    monkeypatch.setattr(responses, "noise_of_channel", lambda _: 1.0)
+    monkeypatch.setattr(input_noise, "noise_of_inputs", lambda _: {"vt": 1.0, "angle": 1.0})
+    monkeypatch.setattr(input_noise, "noise_of_channel", lambda _: 1.0)
     carried = carried_noise(setup, values).carried
     samples, resting = len(columns["t"]), np.count_nonzero(columns["t"] < setup.test.steady)
     first = {"vt": 0, "angle": samples, "p": 2 * samples, "q": 2 * samples + resting}[signal]

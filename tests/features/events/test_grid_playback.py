@@ -18,9 +18,8 @@ from exfit.models.exciters import ac8b
 from exfit.models.machines import MACHINES
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, VT0
 from exfit.plants.unit import UnitOnLoad
-from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
+from exfit.simulation.inputs import Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.splines import SplinedInput
 
 GENROU = MACHINES["GENROU"]
 OF_MACHINE = {

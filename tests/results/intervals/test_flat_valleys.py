@@ -5,7 +5,7 @@ import pytest
 from records import case_of, config, write
 
 from exfit import workflows
-from exfit.results.intervals.valleys import is_way, valleys
+from exfit.results.intervals.minima import is_way, valleys
 from exfit.results.search_summary import search_summary
 from exfit.util.text import rounded_value
 
@@ -79,7 +79,7 @@ def test_a_ridge_parts_valleys_and_a_refuted_minimum_lies_in_none(monkeypatch, c
     def where_it_is_low(residuals, point, k, allowed):
         return point if residuals.costs([point])[0] <= allowed else None
 
-    monkeypatch.setattr("exfit.results.intervals.valleys._on_floor", where_it_is_low)
+    monkeypatch.setattr("exfit.results.intervals.minima._on_floor", where_it_is_low)
     minima = [ONE, 0.9 * ONE, OTHER]
     assert valleys(Plane(cost), minima, 0, 1.0) == numbers
 
@@ -90,5 +90,5 @@ def test_a_way_that_jumps_is_none(monkeypatch):
     def aside(residuals, point, k, allowed):
         return np.array([point[0], 2.0 * (abs(point[0]) < 0.3)])
 
-    monkeypatch.setattr("exfit.results.intervals.valleys._on_floor", aside)
+    monkeypatch.setattr("exfit.results.intervals.minima._on_floor", aside)
     assert not is_way(Plane(lambda x, y: 0.0), ONE, OTHER, 1.0)

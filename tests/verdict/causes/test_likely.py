@@ -2,7 +2,7 @@
 
 from exfit.results.verdict import Cause
 from exfit.verdict.causes import FAR_LESS_LIKELY, Suspicion, likely
-from exfit.verdict.causes.suspicion import CERTAIN, LAST
+from exfit.verdict.causes.evidence import CERTAIN, LAST
 
 
 def suspicions(*likelihoods):

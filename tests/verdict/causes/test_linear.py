@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.verdict.causes.linear import LinearFit
+from exfit.verdict.causes.trials import LinearFit
 
 RNG = np.random.default_rng(8)
 BASIS, _ = np.linalg.qr(RNG.standard_normal((200, 3)))

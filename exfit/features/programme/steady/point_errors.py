@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.features.programme.steady.point_fit import FittedPoints, PointProblem, linearisation
-from exfit.results.intervals.value_errors import widened_by
-from exfit.results.intervals.value_shifts import first_order_shifts
+from exfit.results.intervals.value_errors import first_order_shifts, widened_by
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import BREAKER, GOVERNOR, NETWORK
-from exfit.plants.governing import rests_at
+from exfit.plants.controls import rests_at
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.kernels import parameters_used
