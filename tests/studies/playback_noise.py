@@ -118,7 +118,7 @@ def fits(count, free, times=1.0, driving=1.0, same=False, search="local", plain=
         case = Path(folder) / "case.yaml"
         case.write_text(yaml.safe_dump(content(free, search)))
         reason = mock.patch(
-            "exfit.features.events.driving_noise.weighing.why_not_weighted",
+            "exfit.features.events.input_noise.why_not_weighted",
             return_value="in this study",
         )
         for seed in range(first, first + count):

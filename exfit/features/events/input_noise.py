@@ -34,8 +34,8 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.whitening import CarriedNoise, whitening
 from exfit.inference.wording import digits, listed
 from exfit.plants.playback import initial
+from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.splines import SplinedInput
 
 ORDER = 4  # of the differences that show the noise of a signal which swings
 PULSE = 1e-5  # pu or rad: the response to it is linear, and far above rounding
