@@ -15,6 +15,7 @@ feature is imported before it is used:
               context that provides an `exfit.fitting.program.Program`
     FAULTS    what contradicts itself in a case, by the kind of its plant: given its content and
               its parts
+    PICTURES  what draws models: "overview" writes a page of some of them to a folder
     CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of a misfit, by what it looks at
 
 The core asks for plugs here and names no feature.

@@ -9,6 +9,7 @@ import click
 
 from exfit.cli import completion
 from exfit.cli.options import print_json
+from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
     from exfit.models.machines import Machine
@@ -39,11 +40,14 @@ def models(name: str | None, folder: Path | None) -> None:
     }
     every: Iterable[Model | Machine] = chain(exciters, machines, *added.values())
     if folder is not None:
+        from exfit.registry import parts
         from exfit.show import run_folder
-        from exfit.show.catalogue_page import write_overview
 
+        overview = parts("PICTURES").get("overview")
+        if overview is None:
+            raise ExfitError("--plot: exfit has no feature here that draws models")
         run_folder.refuse_unwritable(folder)
-        write_overview(folder, [_model(name)] if name else every)
+        overview.load()(folder, [_model(name)] if name else every)
         terminal.written(terminal.console(), folder)
     elif name is None:
         terminal.show(terminal.console(), shown.catalogue(exciters, machines, added))

@@ -1,12 +1,10 @@
 """Whether the parts of a result that is read fit together: lengths of samples, names."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.features.programme.steady.saturation_result import SaturationResult
-from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.description import Behaviour
@@ -117,48 +115,5 @@ def _of_behaviour(behaviour: Behaviour) -> Iterator[str]:
             yield "small_signal: not one response for each frequency"
 
 
-def steady_contradictions(result: SaturationResult | VCurve) -> Iterator[str]:
-    """Yield what of the result of a test at rest contradicts the rest of it."""
-    if isinstance(result, SaturationResult):
-        yield from _of_saturation(result)
-    else:
-        yield from _of_points_on_load(result)
-
-
-def _of_saturation(result: SaturationResult) -> Iterator[str]:
-    if result.form not in [curve.form for curve in result.curves]:
-        yield f"curves: none of form {result.form}"
-    if not _alike((result.vt, result.ifd, result.direction)) or not result.vt.size:
-        yield "vt, ifd, direction: not one value for each point"
-    if any(not 0 <= point < len(result.vt) for point in result.left_out):
-        yield "left_out: not a point of the test"
-    for curve in result.curves:
-        if not _alike((curve.vt, curve.ifd, curve.low, curve.high)) or not curve.vt.size:
-            yield f"curves: {curve.form}: not one value for each point"
-        if not curve.ifd_base.value > 0.0:
-            yield f"curves: {curve.form}: ifd_base {curve.ifd_base.value:g} is not above 0"
-
-
-def _of_points_on_load(result: VCurve) -> Iterator[str]:
-    readings = [
-        samples
-        for reading in result.readings.values()
-        for samples in (reading.measured, reading.simulated)
-    ]
-    if not _alike((result.p, result.q, result.vt, *readings)) or not result.p.size:
-        yield "p, q, vt, readings: not one value for each point"
-    for level in result.levels:
-        if not _alike((level.q, level.vt, level.it, level.ifd)):
-            yield f"levels: {level.p:g} pu: not one value for each point of its curve"
-        if any(not 0 <= point < len(result.p) for point in level.points):
-            yield f"levels: {level.p:g} pu: not a point of the test"
-
-
 def _increases(time: Array) -> bool:
     return time.ndim == 1 and bool(np.all(time[1:] > time[:-1]))
-
-
-def _alike(rows: Iterable[Array]) -> bool:
-    """Return whether rows of numbers are of the same length."""
-    shapes = {row.shape for row in rows}
-    return len(shapes) == 1 and len(shapes.pop()) == 1

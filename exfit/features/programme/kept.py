@@ -8,9 +8,9 @@ from typing import Any
 from exfit.errors import ExfitError
 from exfit.features.programme.case.programme import Programme, ProgrammeStep
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
+from exfit.features.programme.steady.consistency import contradictions_at_rest
 from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.features.programme.steady.v_curve_result import VCurve
-from exfit.results.consistency import steady_contradictions
 from exfit.results.description import UnitDescription
 from exfit.results.io import load_result, result_text
 from exfit.results.model import FitResult
@@ -85,7 +85,7 @@ def result_kept(step: ProgrammeStep, key: str, folder: Path) -> StepResult | Non
     if step.kind in RESULTS:
         labels = {"version": VERSION, "key": key}
         result = store.read_kept(file, RESULTS[step.kind], under="result", **labels)
-        return None if result is None or any(steady_contradictions(result)) else result
+        return None if result is None or any(contradictions_at_rest(result)) else result
     try:
         fit = load_result(file)
     except ExfitError:

@@ -56,7 +56,7 @@ ABOUT = (
 
 
 def sample_response(model: Model) -> Response:
-    """Return the response of a model with its typical data to a step of 5 %."""
+    """Simulate a model with its typical data, given a step of 5 %."""
     inputs, times = Inputs(0.0, SECONDS, (STEP,)), np.linspace(0.0, SECONDS, SAMPLES)
     if model.name in WITHOUT_PLANT:
         values = {**typical(model.sheet), VT0: 1.0}

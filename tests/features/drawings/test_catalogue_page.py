@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from oracle import WITHOUT_PLANT
 
+from exfit.features.drawings import catalogue_page
+from exfit.features.drawings.catalogue_page import sample_response
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.show import catalogue_page
 from exfit.show import figures as plots
-from exfit.show.catalogue_page import sample_response
 
 
 @pytest.mark.parametrize(
