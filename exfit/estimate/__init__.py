@@ -2,17 +2,16 @@
 
 Arrays in, result out: minimise f(x) = 1/2 sum(fun(x)^2) over low <= x <= high.
 
-One loop (`run`) serves all methods. In each iteration a *search* (`gauss_newton`, `trust_region`)
-tries points that the linear model fun(x + d) = fun(x) + J d proposes (`linear`). Each has its
-settings (`searches`); `damping_ratio` is Levenberg-Marquardt as a textbook has it. That linear
-problem is itself solved within the bounds (`bounded`), by an active set that starts afresh every
-time: a variable rests on a bound exactly as long as the model wants it there. Directions that J
-does not see at all are left alone; those it sees weakly are taken in full, but no variable moves
-farther than recent steps have proved good, unless a search takes the full step.
+One loop (`run`) serves all methods. In each iteration a *search* (`searches`) tries points that the
+linear model fun(x + d) = fun(x) + J d proposes (`linear`). That linear problem is itself solved
+within the bounds, by an active set that starts afresh every time: a variable rests on a bound
+exactly as long as the model wants it there. Directions that J does not see at all are left alone;
+those it sees weakly are taken in full, but no variable moves farther than recent steps have proved
+good, unless a search takes the full step.
 
-A search is a generator, which yields what it asks for and is sent the answer (`requests`); so
-many are advanced in lock-step (`lockstep`), and one alone is a stack of one. Based on it are the
-search from many starts (`multistart`) and the profiles of single parameters (`profile`).
+A search is a generator, which yields what it asks for and is sent the answer (`problem`); so many
+are advanced in lock-step (`lockstep`), and one alone is a stack of one. Based on it are the search
+from many starts (`multistart`) and the profiles of single parameters (`profile`).
 
 Sources: Levenberg 1944; Marquardt 1963; Armijo 1966; Moré 1978 (the Levenberg-Marquardt
 algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10; Kelley 1999,
@@ -25,18 +24,20 @@ from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
     from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
-    from exfit.estimate.damping_armijo import ArmijoDamping
-    from exfit.estimate.damping_ratio import RatioDamping
-    from exfit.estimate.gauss_newton import LineSearch
-    from exfit.estimate.problem import half_square
+    from exfit.estimate.problem import Functions, OneByOne, half_square
     from exfit.estimate.profile_side import ProfileEnd
     from exfit.estimate.profiling import CostProfile, LowerMinimum, profile, profiles
-    from exfit.estimate.requests import Functions, OneByOne
-    from exfit.estimate.search import to_half, to_parabola
-    from exfit.estimate.searches import Searches
+    from exfit.estimate.searches import (
+        ArmijoDamping,
+        LineSearch,
+        RatioDamping,
+        Searches,
+        TrustRegion,
+        to_half,
+        to_parabola,
+    )
     from exfit.estimate.solver import Descent, least_squares
     from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
-    from exfit.estimate.trust_region import TrustRegion
 
 __all__ = [
     "STATUS",
@@ -68,32 +69,32 @@ __all__ = [
 ]
 
 _MODULES = {
-    "ArmijoDamping": "exfit.estimate.damping_armijo",
+    "ArmijoDamping": "exfit.estimate.searches",
     "CostProfile": "exfit.estimate.profiling",
     "LowerMinimum": "exfit.estimate.profiling",
     "Descent": "exfit.estimate.solver",
-    "Functions": "exfit.estimate.requests",
-    "LineSearch": "exfit.estimate.gauss_newton",
+    "Functions": "exfit.estimate.problem",
+    "LineSearch": "exfit.estimate.searches",
     "LocalMinimum": "exfit.estimate.starts",
     "MultistartResult": "exfit.estimate.starts",
-    "OneByOne": "exfit.estimate.requests",
+    "OneByOne": "exfit.estimate.problem",
     "ProfileEnd": "exfit.estimate.profile_side",
     "Progress": "exfit.estimate.answer",
-    "RatioDamping": "exfit.estimate.damping_ratio",
+    "RatioDamping": "exfit.estimate.searches",
     "Result": "exfit.estimate.answer",
     "STATUS": "exfit.estimate.answer",
     "Searches": "exfit.estimate.searches",
     "SolverIteration": "exfit.estimate.answer",
     "Stop": "exfit.estimate.answer",
-    "TrustRegion": "exfit.estimate.trust_region",
+    "TrustRegion": "exfit.estimate.searches",
     "half_square": "exfit.estimate.problem",
     "least_squares": "exfit.estimate.solver",
     "multistart": "exfit.estimate.starts",
     "profile": "exfit.estimate.profiling",
     "profiles": "exfit.estimate.profiling",
     "spread": "exfit.estimate.starts",
-    "to_half": "exfit.estimate.search",
-    "to_parabola": "exfit.estimate.search",
+    "to_half": "exfit.estimate.searches",
+    "to_parabola": "exfit.estimate.searches",
 }
 
 

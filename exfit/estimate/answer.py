@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.estimate.arrays import Array
+from exfit.estimate.problem import Array
 
 
 class Stop(Enum):

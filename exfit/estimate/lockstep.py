@@ -16,9 +16,9 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from exfit.estimate.arrays import Array
-from exfit.estimate.requests import (
+from exfit.estimate.problem import (
     Answer,
+    Array,
     Functions,
     JacobianAt,
     Request,

@@ -1,15 +1,180 @@
 """What a search makes small: asked for, counted, differentiated, and never trusted to be finite."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, nan
-from typing import Literal
+from math import inf, isfinite, nan, sqrt
+from typing import Literal, Protocol, TypeVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from exfit.estimate.arrays import EPS, UNSEEN, Array
-from exfit.estimate.box import Box
-from exfit.estimate.requests import Functions, Steps, jacobian_at, residuals_at
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+EPS = float(np.finfo(np.float64).eps)
+TINY = float(np.finfo(np.float64).tiny)
+UNSEEN = 1e-11  # share of the largest singular value: below it is only rounding
+
+
+def norm(x: Array) -> float:
+    """Return the Euclidean norm of x (N,), in a third of the time of NumPy's."""
+    return sqrt(float(x @ x))
+
+
+@dataclass(frozen=True)
+class Box:
+    """The bounds, and the distance that counts as one unit of each variable; all (N,)."""
+
+    low: Array
+    high: Array
+    unit: Array
+
+    def projected(self, x: Array, gradient: Array) -> Array:
+        """Return the gradient without the components that push out of an active bound."""
+        held = ((x <= self.low) & (gradient > 0.0)) | ((x >= self.high) & (gradient < 0.0))
+        return np.where(held, 0.0, gradient)
+
+    def inside(self, x: Array) -> Array:
+        """Return x without the rounding error that may have carried it outside."""
+        return np.minimum(np.maximum(x, self.low), self.high)
+
+
+def checked(
+    x0: ArrayLike, bounds: tuple[ArrayLike, ArrayLike], x_scale: ArrayLike | None
+) -> tuple[Array, Box]:
+    """Return the start and its box, or raise ValueError."""
+    x = np.array(x0, dtype=np.float64, ndmin=1)
+    if x.ndim != 1 or x.size == 0 or not np.isfinite(x).all():
+        raise ValueError("x0 must be finite numbers in one dimension")
+    low, high = (alike(b, x, "bounds") for b in bounds)
+    for j in np.flatnonzero(~(low <= high)):
+        raise ValueError(f"bounds[{j}]: {low[j]} exceeds {high[j]}")
+    for j in np.flatnonzero((x < low) | (x > high)):
+        raise ValueError(f"x0[{j}]: {x[j]} lies outside {low[j]} ... {high[j]}")
+    unit = typical(x, high - low) if x_scale is None else alike(x_scale, x, "x_scale")
+    if not (np.isfinite(unit).all() and (unit > 0.0).all()):
+        raise ValueError("x_scale must be finite and positive")
+    return x, Box(low, high, unit)
+
+
+def alike(values: ArrayLike, x: Array, name: str) -> Array:
+    """Return the values, one for each variable, or raise ValueError."""
+    try:
+        return np.broadcast_to(np.asarray(values, dtype=np.float64), x.shape)
+    except ValueError:
+        raise ValueError(f"{name} must be a number or have the shape {x.shape}") from None
+
+
+def typical(x: Array, width: Array) -> Array:
+    """Return the size a variable seems to have: its start's, or a tenth of its range."""
+    size = np.maximum(abs(x), np.where(np.isfinite(width), 0.1 * width, 0.0))
+    return np.where(size > 0.0, size, 1.0)
+
+
+Function = Callable[[Array], ArrayLike]
+Done = TypeVar("Done")
+
+
+class Functions(Protocol):
+    """What is made small: residuals of several points at once, and their Jacobians."""
+
+    def residuals(self, points: Sequence[Array]) -> Sequence[Array]:
+        """Return the residuals (M,) at each of S points (N,), not finite where there are none."""
+
+    def jacobians(self, points: Sequence[Array]) -> Sequence[Array]:
+        """Return the Jacobian (M, N) at each of S points (N,), not finite where there is none."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ResidualsAt:
+    """Asks for the residuals at some points (N,)."""
+
+    functions: Functions
+    points: Sequence[Array]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JacobianAt:
+    """Asks for the Jacobian at a point (N,)."""
+
+    functions: Functions
+    point: Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TriangleOf:
+    """Asks for R of the QR decomposition of a matrix (M, N): (min(M, N), N)."""
+
+    matrix: Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SingularValuesOf:
+    """Asks for U, s and V' of a matrix."""
+
+    matrix: Array
+
+
+Request = ResidualsAt | JacobianAt | TriangleOf | SingularValuesOf
+Answer = Sequence[Array] | Array
+Steps = Generator[Request, Answer, Done]
+
+
+def residuals_at(functions: Functions, points: Sequence[Array]) -> Steps[Sequence[Array]]:
+    """Ask for the residuals (M,) at some points."""
+    return cast(Sequence[Array], (yield ResidualsAt(functions, points)))
+
+
+def jacobian_at(functions: Functions, point: Array) -> Steps[Array]:
+    """Ask for the Jacobian (M, N) at a point."""
+    return cast(Array, (yield JacobianAt(functions, point)))
+
+
+def triangle_of(matrix: Array) -> Steps[Array]:
+    """Ask for R of the QR decomposition of a matrix."""
+    return cast(Array, (yield TriangleOf(matrix)))
+
+
+def singular_values_of(matrix: Array) -> Steps[Sequence[Array]]:
+    """Ask for U, s and V' of a matrix."""
+    return cast(Sequence[Array], (yield SingularValuesOf(matrix)))
+
+
+@dataclass(frozen=True, eq=False)
+class OneByOne:
+    """The user's functions of one point, which are never trusted to be finite.
+
+    Where arithmetic fails the residuals are one nan, and so is the Jacobian.
+    """
+
+    fun: Function
+    jac: Function | None = None
+
+    def residuals(self, points: Sequence[Array]) -> Sequence[Array]:
+        """Return fun at each point."""
+        return [self._residuals(x) for x in points]
+
+    def jacobians(self, points: Sequence[Array]) -> Sequence[Array]:
+        """Return jac at each point."""
+        return [self._jacobian(x) for x in points]
+
+    def _residuals(self, x: Array) -> Array:
+        try:
+            r = np.array(self.fun(x.copy()), dtype=np.float64, ndmin=1)
+        except ArithmeticError:
+            return np.full(1, np.nan)
+        if r.ndim != 1:
+            raise ValueError(f"fun must return residuals in one dimension, not {r.shape}")
+        return r
+
+    def _jacobian(self, x: Array) -> Array:
+        if self.jac is None:
+            raise TypeError("jac: missing")
+        try:
+            return np.array(self.jac(x.copy()), dtype=np.float64, ndmin=2)
+        except ArithmeticError:
+            return np.full((1, 1), np.nan)
+
 
 Differences = Literal["2-point", "3-point"]
 

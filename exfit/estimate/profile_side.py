@@ -13,12 +13,18 @@ from math import inf, isfinite, sqrt
 
 import numpy as np
 
-from exfit.estimate.arrays import TINY, UNSEEN, Array
-from exfit.estimate.bounded import bounded_minimum
-from exfit.estimate.box import Box
-from exfit.estimate.linear import LinearModel, linearise, solve
-from exfit.estimate.problem import Point, Problem, half_square
-from exfit.estimate.requests import Functions, Steps
+from exfit.estimate.linear import LinearModel, bounded_minimum, linearise, solve
+from exfit.estimate.problem import (
+    TINY,
+    UNSEEN,
+    Array,
+    Box,
+    Functions,
+    Point,
+    Problem,
+    Steps,
+    half_square,
+)
 
 FINE = 2e-3  # of the rise: what a refit may leave, a thousandth of the way to the crossing
 MOST_CORRECTIONS = 15  # of a refit: it starts near its end

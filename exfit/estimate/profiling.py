@@ -12,13 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exfit.estimate.answer import Progress
-from exfit.estimate.arrays import Array
-from exfit.estimate.box import Box, checked
 from exfit.estimate.linear import linearise
 from exfit.estimate.lockstep import finish, finish_all
-from exfit.estimate.problem import Problem
+from exfit.estimate.problem import (
+    Array,
+    Box,
+    Function,
+    Functions,
+    OneByOne,
+    Problem,
+    Steps,
+    checked,
+)
 from exfit.estimate.profile_side import NOTHING, ProfileEnd, Side, Spot, Valley
-from exfit.estimate.requests import Function, Functions, OneByOne, Steps
 from exfit.estimate.solver import Descent
 
 POINTS = 5  # from the minimum to the rise: enough for a smooth figure

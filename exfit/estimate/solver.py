@@ -8,15 +8,20 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike
 
 from exfit.estimate.answer import Result, SolverIteration
-from exfit.estimate.arrays import Array
-from exfit.estimate.box import checked
 from exfit.estimate.lockstep import finish
-from exfit.estimate.problem import RELATIVE_STEP, Differences, EvaluationLimit, Problem
-from exfit.estimate.requests import Functions, OneByOne, Steps
-from exfit.estimate.run import SearchRun
+from exfit.estimate.problem import (
+    RELATIVE_STEP,
+    Array,
+    Differences,
+    EvaluationLimit,
+    Functions,
+    OneByOne,
+    Problem,
+    Steps,
+    checked,
+)
+from exfit.estimate.run import MOST_ITERATIONS, STRATEGIES, Rules, SearchRun
 from exfit.estimate.searches import BENDING, USUAL, Searches
-from exfit.estimate.stopping import MOST_ITERATIONS, Rules
-from exfit.estimate.strategies import STRATEGIES
 from exfit.util.strategies import DEFAULT_STRATEGY
 
 

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from exfit.fitting.descents import minimum_near
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.residuals import LEAST_NOISE, Residuals, SimulationCounter
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.simulation_counter import SimulationCounter
 
 Array = NDArray[np.float64]
 

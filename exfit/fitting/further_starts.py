@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from exfit.estimate import Descent, spread
 from exfit.fitting.forms.legs import legs_of
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import SideBySide
-from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.fitting.residuals import SideBySide, SimulationCounter
 from exfit.util.strategies import DEFAULT_STRATEGY
 
 Array = NDArray[np.float64]

@@ -6,6 +6,7 @@ They are functions of the scaled free parameters; what is known beforehand adds 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,6 @@ from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.simulation.substeps import NO_SUBSTEPS
 
 if TYPE_CHECKING:
@@ -30,6 +30,20 @@ ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
 MOST_NUMBERS_AT_ONCE = 1 << 21  # of Jacobians that are made together: 16 MB
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
+
+
+class SimulationCounter:
+    """Counts simulations, in whatever threads they run, and the most sub-steps of any of them."""
+
+    def __init__(self) -> None:
+        self.simulations, self.substeps = 0, 1
+        self._lock = Lock()
+
+    def add(self, simulations: int, substeps: int = 1) -> None:
+        """Add simulations, with the sub-steps that they took where these are known."""
+        with self._lock:
+            self.simulations += simulations
+            self.substeps = max(self.substeps, substeps)
 
 
 @dataclass(frozen=True)

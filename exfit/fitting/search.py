@@ -25,9 +25,14 @@ from exfit.fitting.global_search import (
 )
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.program import Program
-from exfit.fitting.residuals import CENTRAL_STEP, LEAST_NOISE, ONE_SIDED_STEP, Residuals
+from exfit.fitting.residuals import (
+    CENTRAL_STEP,
+    LEAST_NOISE,
+    ONE_SIDED_STEP,
+    Residuals,
+    SimulationCounter,
+)
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.util.strategies import (

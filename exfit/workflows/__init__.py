@@ -209,7 +209,7 @@ def validation_result(
     from exfit.results.model import FitResult
     from exfit.util.versions import versions
     from exfit.workflows import validation
-    from exfit.workflows.descriptions.validation_description import validation_result
+    from exfit.workflows.validation import validation_result
 
     if isinstance(values, FitResult):
         sources = values.sources

@@ -2,16 +2,23 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.setup import ExperimentSetup
 from exfit.results.description import Behaviour, FlatRun, HitLimits, SmallSignalView
+from exfit.simulation.inputs import Inputs
 from exfit.simulation.limit_hits import limits_hit
+from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import small_signal
-from exfit.workflows.model_check import FLAT_DRIFT, flat_drift
 
 Values = Mapping[str, float]
 TestWithValues = tuple[ExperimentSetup, Values]
+
+FLAT_SECONDS = 60.0
+FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
+FLAT_DRIFT = 1e-9  # pu
 
 
 def behaviour_of(
@@ -26,6 +33,17 @@ def behaviour_of(
         small_signal=tuple(_small_signal(tests)),
         limits=tuple(_limits(setup, values) for setup, values in (*tests, *others)),
     )
+
+
+def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
+    """Find how far signals stray from their start (pu) in FLAT_SECONDS without any change.
+
+    ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
+    is no rest.
+    """
+    still = Simulator(simulator.system, Inputs(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
+    flat, _ = still.samples(values, tuple(signals))
+    return float(np.max(np.abs(flat - flat[0])))
 
 
 def _flat_run(experiment: Experiment, values: Values) -> FlatRun:

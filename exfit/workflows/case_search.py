@@ -26,9 +26,9 @@ from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
+from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.registry import parts
 from exfit.results.intervals.determination import (
     NEEDS_PROFILE,

@@ -15,20 +15,20 @@ from exfit.util.versions import versions
 from exfit.verdict.causes import Pace
 from exfit.verdict.causes.evidence import time_for_causes
 from exfit.verdict.rule import verdict_of
-from exfit.workflows.case_search import STAGES, SearchState, in_turn
-from exfit.workflows.descriptions.case_description import (
+from exfit.workflows.case_description import (
     criteria_of,
     fixed_values,
     identified_values,
     input_hashes,
     input_names,
     of_limiters,
+    other_program_of,
     parts_of,
     tests_of,
     text_of,
     values_by_part,
 )
-from exfit.workflows.descriptions.other_program import other_program_of
+from exfit.workflows.case_search import STAGES, SearchState, in_turn
 from exfit.workflows.given_values import given_values
 from exfit.workflows.iteration_responses import LiveResponse, live_response
 from exfit.workflows.solution import (

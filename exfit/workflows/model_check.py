@@ -16,11 +16,10 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.models.blocks import SHORTEST
 from exfit.signals import OF_FLAT_RUN
-from exfit.simulation.inputs import Inputs
-from exfit.simulation.simulator import Simulator
 from exfit.verdict.causes.before_fit import case_warnings, event_warnings, record_warnings
 from exfit.verdict.diagnostics import diagram_notes, search_range_notes
 from exfit.verdict.run_quality import typical_notes, unstable_rest_notes
+from exfit.workflows.behaviour import FLAT_DRIFT, flat_drift
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -29,9 +28,6 @@ STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
 AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
 COLUMN_ROUNDING = 1e-12  # of the largest column
 SMALLEST_COLUMN = float(np.finfo(float).tiny)
-FLAT_SECONDS = 60.0
-FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
-FLAT_DRIFT = 1e-9  # pu
 
 
 @dataclass(frozen=True)
@@ -133,17 +129,6 @@ def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[s
     for experiment in experiments:
         simulator = experiment.with_inputs(values)
         yield from unstable_rest_notes(simulator, experiment.parameters(values))
-
-
-def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
-    """Return how far signals stray from their start (pu) in FLAT_SECONDS without any change.
-
-    ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
-    is no rest.
-    """
-    still = Simulator(simulator.system, Inputs(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
-    flat, _ = still.samples(values, tuple(signals))
-    return float(np.max(np.abs(flat - flat[0])))
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

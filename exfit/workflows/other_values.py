@@ -22,7 +22,7 @@ from exfit.results.comparisons import Comparison
 from exfit.results.model import Iteration
 from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.util.strategies import PHASES
-from exfit.workflows.descriptions.case_description import fixed_values
+from exfit.workflows.case_description import fixed_values
 
 Values = Mapping[str, float]
 

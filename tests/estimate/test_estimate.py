@@ -15,12 +15,9 @@ from tiers import few_of
 
 from exfit import estimate
 from exfit.estimate import least_squares
-from exfit.estimate.bounded import bounded_minimum
-from exfit.estimate.damping_armijo import ArmijoDamping
-from exfit.estimate.damping_ratio import RatioDamping
-from exfit.estimate.gauss_newton import FullStep, LineSearch
-from exfit.estimate.strategies import STRATEGIES
-from exfit.estimate.trust_region import TrustRegion
+from exfit.estimate.linear import bounded_minimum
+from exfit.estimate.run import STRATEGIES
+from exfit.estimate.searches import ArmijoDamping, FullStep, LineSearch, RatioDamping, TrustRegion
 from exfit.util.strategies import PHASES
 from exfit.util.strategies import STRATEGIES as EXPLANATIONS
 

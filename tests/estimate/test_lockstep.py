@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from exfit.estimate.lockstep import ABREAST, finish, finish_all
-from exfit.estimate.requests import (
+from exfit.estimate.problem import (
     OneByOne,
     jacobian_at,
     residuals_at,

@@ -8,8 +8,8 @@ from more_garbow_hillstrom import numbers
 from scipy.stats import t as student
 
 from exfit.estimate import LowerMinimum, OneByOne, ProfileEnd, least_squares, profile, profiles
-from exfit.estimate.box import checked
 from exfit.estimate.lockstep import finish
+from exfit.estimate.problem import checked
 from exfit.estimate.profiling import finish_sides, sides_of, valley_about
 
 FREE = (-np.inf, np.inf)

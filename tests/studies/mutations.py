@@ -33,7 +33,7 @@ MODULES = {
         ("tests/inference", "tests/test_inference_confidence.py"),
     ),
     "trust_region": (
-        ("exfit/estimate/trust_region.py",),
+        ("exfit/estimate/searches.py",),
         ("tests/estimate", "tests/test_estimate.py tests/test_estimate_runs.py"),
     ),
     "trace": (

@@ -21,8 +21,8 @@ from related_work import Estimate, Residuals, each, local, matched, show
 
 from exfit.case.load import load_case
 from exfit.fitting.problem import problem_of
+from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import search
-from exfit.fitting.simulation_counter import SimulationCounter
 
 CASE = load_case(CONFIGS / "ac1a_typical.yaml")  # its settings are the defaults
 

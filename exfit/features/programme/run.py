@@ -28,7 +28,7 @@ from exfit.records.reading import file_hash
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, Iteration
 from exfit.runs.runner import AS_CASES_SAY, FitSettings, run_in_turn
-from exfit.workflows.descriptions.case_description import parts_of
+from exfit.workflows.case_description import parts_of
 from exfit.workflows.model_check import Check
 
 Progress = Iteration | estimate.Progress

@@ -11,7 +11,9 @@ from exfit.case.schema import (
     AngleTable,
     BumpTest,
     ChannelSection,
+    Filter,
     FindableStep,
+    MedianSection,
     PhasesSection,
     Recording,
     Reference,
@@ -20,24 +22,82 @@ from exfit.case.schema import (
     Unknown,
 )
 from exfit.fitting.nuisances.parameters import OPENING, prefix_of
+from exfit.fitting.program import Program
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import driving_after_opening
 from exfit.inference.confidence import Interval
 from exfit.plants import NETWORK, REFERENCES
+from exfit.plants.playback import initial
 from exfit.records.reading import file_hash
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
 from exfit.results.description import (
     NetworkParameter,
+    OtherProgram,
     PartDescription,
     RecordedTest,
     SheetRow,
 )
 from exfit.results.model import FittedParameter
+from exfit.signals import COMPARED_IN_EVENT, unit_of_signal
 from exfit.util.criteria import Criteria
 from exfit.util.root import on_disk
-from exfit.util.text import rounded_value
-from exfit.workflows.descriptions.played_description import played_in
+from exfit.util.text import rounded_value, show
+
+RESTING = ("vt", *COMPARED_IN_EVENT)  # in the order in which a rest is described
+SWING = {
+    "power": "swing equation: Pm is a power, its torque (Pm - D dw) / (1 + dw)",
+    "torque": "swing equation: Pm is a torque, less D dw",
+}
+
+
+def played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Iterator[str]:
+    """Yield how a record was played in; nothing where it was not.
+
+    ``view`` is the case with the plant of the record.
+    """
+    if not setup.driving:
+        return
+    yield f"recorded {' and '.join(setup.driving)} played in"
+    if setup.test.steady is not None:
+        levels = ", ".join(_levels(setup))
+        yield f"at rest until {setup.test.steady:.4g} s" + (f" with {levels}" if levels else "")
+    if view.kind.has_machine and view.kind.has_exciter:
+        yield SWING[getattr(view.plant, "swing", "power")]
+    masks = (*recording.record.mask, *(switching.masked for switching in setup.switchings))
+    left_out = ", ".join(f"{start:.4g} ... {end:.4g} s" for start, end in masks)
+    if left_out:
+        yield f"left out of the comparison: {left_out}"
+    everything = _filter(recording.record.filter)
+    if everything:
+        yield f"all channels {everything}"
+    yield from _filters(recording)
+
+
+def _levels(setup: ExperimentSetup) -> Iterator[str]:
+    """Yield the levels at the start that the record gives."""
+    for signal in RESTING:
+        level = setup.experiment.own.get(initial(signal))
+        if level is not None and signal in setup.record.signals:
+            yield f"{signal} {level:.4g} {unit_of_signal(signal)}"
+
+
+def _filters(recording: Recording) -> Iterator[str]:
+    """Yield the filters of the channels."""
+    for signal, channel in recording.record.channels.items():
+        text = _filter(channel.filter)
+        if text:
+            yield f"{signal} {text}"
+
+
+def _filter(given: Filter | None) -> str:
+    """Return a filter in words; "" for none."""
+    if given is None:
+        return ""
+    if isinstance(given, MedianSection):
+        return f"as medians of {given.median} samples"
+    return f"below {show(given.lowpass)} Hz"
+
 
 Estimated = tuple[float, float | None]  # a value, and half of its 95 % interval
 Identified = Mapping[str, Estimated]  # what a fit found about its records, by name
@@ -288,3 +348,14 @@ def identified_values(
 def _half_of(interval: Interval | None) -> float | None:
     low, high = interval or (None, None)
     return None if low is None or high is None else 0.5 * (high - low)
+
+
+def other_program_of(
+    case: Case, program: Program | None, setups: Sequence[ExperimentSetup]
+) -> OtherProgram | None:
+    """Describe what simulated settled tests, with its runs until now; None where exfit did."""
+    section = case.external
+    if section is None or program is None:
+        return None
+    differences = program.differences(setups)
+    return OtherProgram(section.simulator, section.twin, program.runs, program.failed, differences)

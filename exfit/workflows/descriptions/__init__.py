@@ -1,1 +1,0 @@
-"""A case and its records in words, as a report shows them."""
