@@ -206,7 +206,7 @@ def _faults(check: Callable[[Any], object], subjects: Iterable[object]) -> Itera
 
 
 def _repeated(kind: str, given: Sequence[object], identities: Sequence[object]) -> Iterator[str]:
-    """Yield what is given more than once, whatever it is called."""
+    """Yield repetitions, by what was given and not by its name."""
     for identity, count in Counter(identities).items():
         if count > 1:
             yield f"{kind} {given[identities.index(identity)]}: given {count} times"

@@ -182,7 +182,6 @@ def stop(client: "Client", workers: list[str], batch: str) -> None:
 
 
 def _differences(there: Mapping[str, str], here: Mapping[str, str]) -> str:
-    """Return in what the versions of a worker differ from those of this computer."""
     return ", ".join(
         f"{name} {there.get(name, 'missing')}, here {version}"
         for name, version in here.items()

@@ -89,7 +89,6 @@ def _stroke(points: Sequence[Point]) -> str:
 
 
 def _corners(points: Sequence[Point]) -> Iterator[Point]:
-    """Yield the points at which a line bends."""
     last = points[0]
     yield last
     for point, after in pairwise(points[1:]):
@@ -199,12 +198,10 @@ def _summary(cases: Sequence[CaseSummary]) -> dict[str, Any]:
 
 
 def _style(outcome: str) -> str:
-    """Return the class of an outcome in the style sheet."""
     return STYLES.get(outcome, "bad")
 
 
 def _rank(outcome: str) -> tuple[int, str]:
-    """Return the place of an outcome, the best first."""
     words = (*VERDICTS, *STATUSES)
     return (words.index(outcome) if outcome in words else len(words)), outcome
 

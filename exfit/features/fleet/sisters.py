@@ -164,7 +164,6 @@ def _unit(case: CaseSummary) -> tuple[str, ...]:
 
 
 def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
-    """Return a parameter of all sisters that were fitted with it."""
     values = [
         SisterValue(case.name, own.value, own.low, own.high, missing_interval(case, name))
         for case in cases

@@ -173,7 +173,6 @@ def batch(console: Console, fleet: Fleet) -> None:
 
 
 def _outcomes(fleet: Fleet) -> Iterator[Block]:
-    """Yield how many cases came to what, and those that need attention."""
     counts = Counter(case.outcome for case in fleet.cases).most_common()
     rows = (row(outcome, str(count), mark=MARKS.get(outcome, "bad")) for outcome, count in counts)
     yield Table(columns("outcome", "cases", numbers=("cases",)), tuple(rows))
@@ -189,7 +188,6 @@ def _outcomes(fleet: Fleet) -> Iterator[Block]:
 
 
 def _duration(seconds: float) -> str:
-    """Return a time in round words."""
     if seconds < LONG_WAIT:
         return f"{seconds:.0f} s"
     if seconds < 2 * HOUR:
@@ -202,5 +200,4 @@ def _plural(count: int, word: str) -> str:
 
 
 def _name(case: str) -> str:
-    """Return the name of a case's file."""
     return case.rsplit("/", 1)[-1].removesuffix(".yaml")

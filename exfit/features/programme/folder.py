@@ -84,7 +84,6 @@ def _figure_at_rest(result: SaturationResult | VCurve, name: str) -> PlannedFigu
 
 
 def _missing(folder: Path, planned: Callable[[], PlannedFigures]) -> PlannedFigures:
-    """Return the figures whose files are not in a folder."""
     return {name: figure for name, figure in planned().items() if not (folder / name).is_file()}
 
 

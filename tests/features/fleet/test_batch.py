@@ -280,3 +280,17 @@ def test_a_programme_of_which_a_test_fails_has_failed_with_its_reason(tmp_path, 
 def test_without_workers_a_batch_fits_in_this_process(cases):
     fleet = exfit.batch(cases, "fleet", workers=0)
     assert [case.status for case in fleet.cases] == ["done"] * len(NAMES)
+
+
+def test_an_interruption_without_workers_keeps_what_is_done(cases):
+    def interrupted(result, folder):
+        if result.case.stem == "c":
+            raise KeyboardInterrupt
+        return ()
+
+    fleet = exfit.batch(cases, "fleet", workers=0, further=[interrupted])
+    assert fleet.interrupted
+    states = {case.name: case.status for case in fleet.cases}
+    assert states == {"a": "done", "b": "done", "c": "not run", "d": "not run"}
+    again = exfit.batch(cases, "fleet", workers=0)
+    assert {case.status for case in again.cases} == {"done"}

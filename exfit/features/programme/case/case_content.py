@@ -155,12 +155,10 @@ def _places_of_recording(place: Place, index: int) -> dict[Place, Place | None]:
 
 
 def _recording(test: Content) -> Content:
-    """Return a test as a record of a case."""
     return _without(test, OF_PROGRAMME)
 
 
 def _starts(free: Mapping[str, Any]) -> Content:
-    """Return the start of each parameter that can be read."""
     starts = {
         name: section.get("start") for name, section in free.items() if isinstance(section, dict)
     }

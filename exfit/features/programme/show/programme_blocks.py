@@ -61,7 +61,7 @@ def checked_step(checked: CheckedStep) -> Iterator[Block]:
 
 
 def _at_rest(test: FinishedTest) -> Iterator[Block]:
-    """Yield what a test at rest gives; nothing of a fit."""
+    """Yield the result of a test at rest; nothing of a fit."""
     if isinstance(test.result, SaturationResult):
         mark = fits.MARKS.get(test.verdict, "bad") if test.holds else "bad"
         yield paragraph(f"verdict: {test.verdict}: {test.reason}", mark)
@@ -126,7 +126,6 @@ def saturation(result: SaturationResult) -> Iterator[Block]:
 
 
 def _quantities(result: SaturationResult) -> Iterator[tuple[str, MeasuredValue, str]]:
-    """Yield what the test gives: its name, value and unit."""
     curve = result.curve
     name = "exciter field current" if result.exciter else "base of ifd"
     yield f"{name}, 1 pu on the air-gap line", curve.ifd_base, result.unit
