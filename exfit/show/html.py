@@ -42,7 +42,7 @@ def _pieces(blocks: Iterable[Block], draw: Callable[[Chart], str]) -> Iterator[s
                     style = ' class="missing"' if block.mark == "faint" else ""
                     yield f"<p{style}>{_sentence(block)}</p>"
                 case Table():
-                    yield _wide(block.title, _table(block))
+                    yield _wide(block.title or "Table", _table(block))
                 case Verbatim(text):
                     yield _wide("Text", f"<pre>{escape(text)}</pre>")
                 case Chart():

@@ -4,76 +4,51 @@ from matplotlib.figure import Figure
 
 from exfit.errors import ExfitError
 from exfit.results.model import FitResult, FittedParameter
-from exfit.show.blocks import interval, number
+from exfit.show.blocks import Block, Cell, Note, Table, columns, interval, number, row
 from exfit.show.figures import overlay
+from exfit.show.html import html
 from exfit.util.text import near, percentage
 
 __all__ = ["Figure", "fit_figure", "fit_html"]
 
-TABLE = """\
-<div>
-<p><b>{{ result.model }}</b> fitted to {{ records }}:
-{{ verdict }},
-rmse {{ "%.3g" | format(result.rmse) }} pu, fit {{ fit_percent }} %</p>
-<table>
-<thead><tr>
-{% for heading in ("parameter", "start", "fitted", "standard error", "95 % interval", "unit") %}
-<th>{{ heading }}</th>
-{% endfor %}
-</tr></thead>
-<tbody>
-{% for meaning, cells in rows %}
-<tr title="{{ meaning }}">{% for cell in cells %}<td>{{ cell }}</td>{% endfor %}</tr>
-{% endfor %}
-</tbody>
-</table>
-{% if remarks %}
-<ul>
-{% for remark in remarks %}
-<li>{{ remark }}</li>
-{% endfor %}
-</ul>
-{% endif %}
-</div>
-"""
+HEADS = ("start", "fitted", "standard error", "95 % interval")
 
 
 def fit_html(result: FitResult) -> str:
-    """Return the parameters of a fit and what it leaves unresolved, as HTML."""
-    from jinja2 import Environment
-
-    template = Environment(autoescape=True, trim_blocks=True).from_string(TABLE)
-    causes = result.verdict.causes
-    no_interval = result.verdict.in_place_of_interval
+    """Write the parameters of a fit and what it leaves unresolved as HTML."""
     unresolved = () if result.knowledge is None else result.knowledge.sentences
-    return template.render(
-        result=result,
-        verdict=result.verdict.sentence,
-        records=", ".join(comparison.record for comparison in result.comparisons),
-        fit_percent=percentage(result.comparison.fit_percent),
-        rows=[
-            (parameter.meaning, _cells(name, parameter, no_interval))
-            for name, parameter in result.parameters.items()
-        ],
-        remarks=[
-            *(cause.sentence for cause in causes),
-            *(f"unresolved: {text}" for text in unresolved),
-            *result.notes,
-        ],
+    remarks = (
+        *(cause.sentence for cause in result.verdict.causes),
+        *(f"unresolved: {text}" for text in unresolved),
+        *result.notes,
     )
+    records = ", ".join(comparison.record for comparison in result.comparisons)
+    match = f"rmse {result.rmse:.3g} pu, fit {percentage(result.comparison.fit_percent)} %"
+    sentence = f"fitted to {records}: {result.verdict.sentence}, {match}"
+    blocks: tuple[Block, ...] = (
+        Note(sentence, label=result.model, mark="strong"),
+        Table(
+            columns("parameter", *HEADS, "unit", "meaning", numbers=HEADS),
+            tuple(_row(result, name, each) for name, each in result.parameters.items()),
+            "Fitted parameters",
+        ),
+        *(Note(text, "warning") for text in remarks),
+    )
+    return f"<div>\n{html(blocks)}\n</div>"
 
 
-def _cells(name: str, parameter: FittedParameter, no_interval: str) -> tuple[str, ...]:
-    """Return what the table says of a parameter; ``no_interval`` in place of its interval."""
+def _row(result: FitResult, name: str, parameter: FittedParameter) -> tuple[Cell, ...]:
     note = f" ({parameter.interval_note})" if parameter.interval_note else ""
     bound = f", on its {parameter.at_bound}" if parameter.at_bound else ""
-    return (
+    limits = f"{interval(parameter.interval, parameter.rounded)}{note}"
+    return row(
         name,
         number(parameter.start),
         f"{parameter.rounded(parameter.value)}{bound}",
         number(parameter.linear_error, 2),
-        no_interval or f"{interval(parameter.interval, parameter.rounded)}{note}",
+        result.verdict.in_place_of_interval or limits,
         parameter.unit,
+        parameter.meaning,
     )
 
 
