@@ -5,49 +5,41 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import RendererAgg
 from places import ROOT
 
 from exfit import workflows
 from exfit.case.load import load_case
 from exfit.show import figures as plots
-from exfit.show import run_figures
-from exfit.show.figures import page
+from exfit.show import run_folder
 
 ROUNDING = 1.5  # dots: letters begin at whole ones
 # the starts of a search in one, two signals and ten parameters in the other
 CASES = {"first_order": "global", "field_record": "local"}
 
 
-class Noting(page.PageRenderer):
-    """Notes what is written, and the least and greatest place of each text, in dots."""
-
-    def __init__(self, *size):
-        super().__init__(*size)
-        self.texts = []
-
-    def draw_text(self, gc, x, y, s, prop, angle, *others, **more):
-        width, height, descent = self.get_text_width_height_descent(s, prop, False)
-        corners = [(u, v) for u in (0.0, width) for v in (-descent, height - descent)]
-        cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        places = corners @ np.array([[cos, sin], [-sin, cos]]) + (x, self.height - y)
-        self.texts.append((s, places.min(axis=0), places.max(axis=0), angle % 90.0 == 0.0))
-        super().draw_text(gc, x, y, s, prop, angle, *others, **more)
-
-
 @pytest.fixture
 def noted(monkeypatch):
-    """Return a function that draws a figure and returns what is written on it, and its size."""
-    renderers = []
+    """Return a function that draws a figure and returns what is written on it, and its size.
 
-    def noting(*size):
-        renderers.append(Noting(*size))
-        return renderers[-1]
+    Of each text the least and greatest place, in dots, and whether it is level or upright.
+    """
+    texts, draw_text = [], RendererAgg.draw_text
 
-    monkeypatch.setattr(page, "PageRenderer", noting)
+    def noting(renderer, gc, x, y, s, prop, angle, *others, **more):
+        width, height, descent = renderer.get_text_width_height_descent(s, prop, False)
+        corners = [(u, v) for u in (0.0, width) for v in (-descent, height - descent)]
+        cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        places = corners @ np.array([[cos, sin], [-sin, cos]]) + (x, renderer.height - y)
+        texts.append((s, places.min(axis=0), places.max(axis=0), angle % 90.0 == 0.0))
+        draw_text(renderer, gc, x, y, s, prop, angle, *others, **more)
+
+    monkeypatch.setattr(RendererAgg, "draw_text", noting)
 
     def draw(figure):
-        assert plots.png(figure)
-        return renderers[-1].texts, np.array([renderers[-1].width, renderers[-1].height])
+        texts.clear()
+        height, width, _ = plots.drawn(figure).shape
+        return [*texts], np.array([width, height])
 
     return draw
 
@@ -84,8 +76,8 @@ def faults(texts, size):
 
 @pytest.mark.long
 def test_no_text_leaves_its_figure_or_lies_on_another(result, noted):
-    figures = run_figures.of_fit(result)
-    figures |= {"long.png": run_figures.of_fit(with_long_names(result))["trajectories.png"]}
+    figures = run_folder.figures_of_fit(result)
+    figures |= {"long.png": run_folder.figures_of_fit(with_long_names(result))["trajectories.png"]}
     for name, figure in figures.items():
         texts, size = noted(figure.draw())
         assert len(texts) > 5, name
@@ -133,5 +125,3 @@ def test_the_numbers_of_an_axis_follow_its_limits():
     numbers = [float(label.get_text()) for label in axes.get_yticklabels()]
     assert numbers[0] == 5.0
     assert numbers[-1] == 7.0
-    # no object is made for a tick: those of one figure would take as long as all else
-    assert "majorTicks" not in vars(axes.yaxis)

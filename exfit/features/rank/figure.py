@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from exfit.show.figures.axes import QuickAxes
 from exfit.show.figures.fit_series import responses_beside
 from exfit.show.figures.style import new_figure
 
@@ -32,8 +31,8 @@ def ranking(ranked: "Ranking") -> Figure:
     figure = new_figure(0.6 + RECORD_HEIGHT * len(drawn))
     grid = figure.add_gridspec(2 * len(drawn), 1, height_ratios=[2.6, 1.0] * len(drawn))
     for k, (kind, responses) in enumerate(drawn.items()):
-        overlay = figure.add_subplot(grid[2 * k, 0], axes_class=QuickAxes)
-        errors = figure.add_subplot(grid[2 * k + 1, 0], sharex=overlay, axes_class=QuickAxes)
+        overlay = figure.add_subplot(grid[2 * k, 0])
+        errors = figure.add_subplot(grid[2 * k + 1, 0], sharex=overlay)
         overlay.tick_params(labelbottom=False)
         record = next(iter(responses.values())).record
         overlay.set_title(f"{record}, {kind}", fontsize=10, loc="left")

@@ -9,8 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from exfit.dsp.decimation import envelope
 from exfit.results.comparisons import Comparison
-from exfit.show.figures.axes import QuickAxes, logarithmic
-from exfit.show.figures.style import COLORS, MEASURED, MILLI, STYLES, new_figure, tidy
+from exfit.show.figures.style import COLORS, MEASURED, MILLI, STYLES, logarithmic, new_figure, tidy
 from exfit.signals import label_of
 
 if TYPE_CHECKING:
@@ -35,9 +34,9 @@ def fit_series(series: "FitSeries") -> Figure:
         2 * len(drawn), 2, width_ratios=[2.2, 1.0], height_ratios=[2.6, 1.0] * len(drawn)
     )
     for k, (name, runs) in enumerate(drawn):
-        overlay = figure.add_subplot(grid[2 * k, 0], axes_class=QuickAxes)
-        errors = figure.add_subplot(grid[2 * k + 1, 0], sharex=overlay, axes_class=QuickAxes)
-        costs = figure.add_subplot(grid[2 * k : 2 * k + 2, 1], axes_class=QuickAxes)
+        overlay = figure.add_subplot(grid[2 * k, 0])
+        errors = figure.add_subplot(grid[2 * k + 1, 0], sharex=overlay)
+        costs = figure.add_subplot(grid[2 * k : 2 * k + 2, 1])
         overlay.tick_params(labelbottom=False)
         overlay.set_title(f"{name}: {runs[0].result.model}", fontsize=10, loc="left")
         of_strategies = {run.result.strategy: run.result.comparison for run in runs}

@@ -6,11 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult
-from exfit.show.figures.axes import QuickAxes, named
 from exfit.show.figures.style import MEASURED, MILLI, SIMULATED, START, new_figure, tidy
 from exfit.signals import label_of
 
@@ -40,8 +38,8 @@ def iterations(result: FitResult) -> Figure:
         2 * count, 2, width_ratios=[1.0, BAR], height_ratios=[3.0, 1.2] * count
     )
     for k, (comparison, responses) in enumerate(recorded):
-        upper = figure.add_subplot(grid[2 * k, 0], axes_class=QuickAxes)
-        lower = figure.add_subplot(grid[2 * k + 1, 0], sharex=upper, axes_class=QuickAxes)
+        upper = figure.add_subplot(grid[2 * k, 0])
+        lower = figure.add_subplot(grid[2 * k + 1, 0], sharex=upper)
         upper.tick_params(labelbottom=False)
         _responses(upper, responses)
         _errors(lower, responses)
@@ -50,7 +48,7 @@ def iterations(result: FitResult) -> Figure:
     lower.set_xlabel("time (s)")
     numbers = sorted({number for _, responses in recorded for number in responses.numbers})
     if len(numbers) > 1:  # a single one needs no bar
-        _colour_bar(figure.add_subplot(grid[:, 1], axes_class=QuickAxes), numbers)
+        _colour_bar(figure.add_subplot(grid[:, 1]), numbers)
     return figure
 
 
@@ -97,7 +95,7 @@ def _colour_bar(axes: Axes, numbers: Sequence[int]) -> None:
     # the fit is always named: what would be right beside it gives way
     ticks = [k for k in range(0, count - 1, every) if 2 * (count - 1 - k) >= every]
     ticks.append(count - 1)
-    axes.xaxis.set_major_locator(NullLocator())
-    named(axes.yaxis, ticks, [str(numbers[k]) for k in ticks])
+    axes.set_xticks([])
+    axes.set_yticks(ticks, [str(numbers[k]) for k in ticks])
     axes.tick_params(length=0)
     axes.set_ylabel("iteration")

@@ -4,7 +4,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.show.figures.axes import QuickAxes
 from exfit.show.figures.style import MEASURED, SIMULATED, START, new_figure, panels, tidy
 from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.simulator import Response
@@ -21,11 +20,11 @@ def response(simulated: Response, title: str) -> Figure:
     rows = -(-len(changing) // columns)
     figure = new_figure(2.6 + 1.6 * rows)
     grid = figure.add_gridspec(1 + rows, columns, height_ratios=[1.6, *[1.0] * rows])
-    first = figure.add_subplot(grid[0, :], axes_class=QuickAxes)
+    first = figure.add_subplot(grid[0, :])
     _voltages(first, simulated)
     for k, name in enumerate(changing):
         place = grid[1 + k // columns, k % columns]
-        axes = figure.add_subplot(place, sharex=first, axes_class=QuickAxes)
+        axes = figure.add_subplot(place, sharex=first)
         axes.plot(simulated.time, simulated.signals[name], color=START, linewidth=1.1)
         axes.set_ylabel(f"{name} ({unit_of_signal(name)})")
         axes.tick_params(labelbottom=k + columns >= len(changing))

@@ -10,13 +10,13 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from exfit.results.model import FitResult, Minima
-from exfit.show.figures.axes import QuickAxes, logarithmic
 from exfit.show.figures.style import (
     GREEN,
     LIMIT,
     MEASURED,
     SIMULATED,
     START,
+    logarithmic,
     new_figure,
     panels,
     short,
@@ -87,7 +87,7 @@ def trajectories(result: FitResult) -> Figure:
     grid = figure.add_gridspec(rows, columns)
     ax = None
     for k, name in enumerate(names):
-        ax = figure.add_subplot(grid[divmod(k, columns)], sharex=ax, axes_class=QuickAxes)
+        ax = figure.add_subplot(grid[divmod(k, columns)], sharex=ax)
         parameter = result.parameters[name]
         values = [line.values[name] for line in result.history]
         _by_phase(ax, result, values, "o")
@@ -106,7 +106,7 @@ def trajectories(result: FitResult) -> Figure:
     phases = dict.fromkeys(line.phase for line in result.history)
     if len(phases) > 1:
         handles = figure.axes[0].get_legend_handles_labels()
-        figure.legend(*handles, ncols=len(phases), frameon=False)
+        figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
     figure.suptitle(f"{result.name}: the parameters after each iteration", fontsize=11)
     return figure
 
@@ -132,7 +132,7 @@ def waterfall(search: Minima, title: str) -> Figure:
     axes.set_xlabel("descent, by the cost that it led to")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(ncols=4, frameon=False, fontsize=8)
+    figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=8)
     best = search.minima[0].starts
     axes.set_title(
         f"{best} of {search.starts} descents led to the lowest minimum", fontsize=9, loc="right"

@@ -1,37 +1,40 @@
 """How all figures look, and how one becomes a file."""
 
 import warnings
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
+from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
-
-from exfit.show.figures.axes import QuickAxes
-from exfit.show.figures.layout import Layout
-from exfit.show.figures.page import as_png, pixels
 
 MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
 GREEN = "#2f855a"
 WIDTH = 9.0  # inches
 DPI = 120
 MILLI = 1e3
+PAD = 5.0 / 72.0  # inches around the axes with their labels
+SMALLEST = 6.0  # points: letters of a title that is made to fit
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LONGEST_NAME = 20  # letters
 COLORS = ("#1f4e9c", "#c1272d", GREEN, "#b7791f", "#6b46c1", "#0e7490", "#4a5568")
 STYLES = ("-", "--", ":")
 
 
-def new_figure(height: float, width: float = WIDTH, legend: str = "below") -> Figure:
-    """Return an empty figure of a size in inches; a legend of the whole is right or below."""
-    return Figure(figsize=(width, height), layout=Layout(legend))
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Make an empty figure of a size in inches, which gives its axes the room that labels leave."""
+    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD))
 
 
 def panels(figure: Figure, rows: int, columns: int = 1, **grid: Any) -> NDArray[np.object_]:
-    """Return axes of a figure in rows and columns; see Figure.subplots."""
-    own = {"axes_class": QuickAxes}
-    return np.asarray(figure.subplots(rows, columns, squeeze=False, subplot_kw=own, **grid))
+    """Make axes of a figure in rows and columns; see Figure.subplots."""
+    return np.asarray(figure.subplots(rows, columns, squeeze=False, **grid))
 
 
 def short(name: str, most: int = LONGEST_NAME) -> str:
@@ -40,25 +43,77 @@ def short(name: str, most: int = LONGEST_NAME) -> str:
 
 
 def png(figure: Figure) -> bytes:
-    """Return a figure as the bytes of a PNG file."""
+    """Draw a figure as the bytes of a PNG file."""
     return encoded(drawn(figure))
 
 
 def drawn(figure: Figure) -> NDArray[np.uint8]:
-    """Return the pixels of a figure: rows of red, green, blue and opacity.
+    """Draw a figure in pixels: rows of red, green, blue and opacity.
 
     Dollar signs in names make no formulas; letters that the font lacks are boxes.
     """
     for text in figure.findobj(Text):
         text.set_parse_math("$" not in text.get_text())
+    former = figure.dpi
+    figure.dpi = DPI
+    canvas = FigureCanvasAgg(figure)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
-        return pixels(figure, DPI)
+        figure.align_ylabels([axes for axes in figure.axes if axes.get_ylabel()])
+        layout = figure.get_layout_engine()
+        if layout is not None:
+            layout.execute(figure)
+            if _fitted(figure):
+                layout.execute(figure)
+            figure.set_layout_engine("none")  # all has its place
+        canvas.draw()
+    figure.dpi = former
+    return np.asarray(canvas.buffer_rgba())
+
+
+def _fitted(figure: Figure) -> bool:
+    """Make the letters of titles as small as their room asks for; tell whether any were."""
+    pad = 2.0 * PAD * figure.dpi
+    width, height = figure.bbox.width - pad, figure.bbox.height - pad
+    rooms = {text: height if text.get_rotation() else width for text in figure.texts}
+    for axes in figure.axes:
+        titles = {axes.get_title(loc=place) for place in ("left", "center", "right")} - {""}
+        written = (child for child in axes.get_children() if isinstance(child, Text))
+        rooms |= {text: axes.bbox.width for text in written if text.get_text() in titles}
+    changed = False
+    for text, room in rooms.items():
+        box = text.get_window_extent()
+        length = box.height if text.get_rotation() else box.width
+        if length > room:
+            text.set_fontsize(max(float(text.get_fontsize()) * room / length, SMALLEST))
+            changed = True
+    return changed
 
 
 def encoded(picture: NDArray[np.uint8]) -> bytes:
-    """Return pixels as the bytes of a PNG file; most of it without the interpreter's lock."""
-    return as_png(picture, DPI)
+    """Write pixels as the bytes of a PNG file; most of it without the interpreter's lock."""
+    file = BytesIO()
+    imsave(file, picture, format="png", dpi=DPI, pil_kwargs={"compress_level": 1})
+    return file.getvalue()
+
+
+class PowersOfTen(LogFormatter):
+    """Labels of a logarithmic axis in plain letters: to typeset mathematics takes longer."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Write the label of a tick, empty where there would be too many."""
+        if not super().__call__(x, pos):
+            return ""
+        factor, exponent = f"{x:.3e}".split("e")
+        power = f"10{str(int(exponent)).translate(RAISED)}"
+        return power if float(factor) == 1.0 else f"{float(factor):g}×{power}"
+
+
+def logarithmic(axes: Axes) -> None:
+    """Make the vertical axis a logarithmic one."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(PowersOfTen())
+    axes.yaxis.set_minor_formatter(PowersOfTen())
 
 
 def tidy(axes: Axes) -> None:

@@ -2,12 +2,11 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import envelope
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.show.figures.axes import QuickAxes, named
 from exfit.show.figures.style import (
     COLORS,
     LIMIT,
@@ -36,7 +35,7 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     """
     responses = analysis.sensitivity
     labels = {effect.parameter: effect.label for effect in analysis.effects}
-    figure = new_figure(1.2 + 3.0 * len(responses), legend="right")
+    figure = new_figure(1.2 + 3.0 * len(responses))
     column = panels(figure, len(responses))[:, 0]
     for axes, response in zip(column, responses, strict=True):
         for place, (name, change) in enumerate(response.moved.items()):
@@ -51,7 +50,8 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
         axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
         tidy(axes)
     column[-1].set_xlabel("time (s)")
-    figure.legend(*column[0].get_legend_handles_labels(), frameon=False)
+    handles, texts = column[0].get_legend_handles_labels()
+    figure.legend(handles, texts, loc="outside right upper", frameon=False)
     figure.suptitle(f"{title}: what each parameter does to the response", fontsize=11)
     return figure
 
@@ -63,8 +63,9 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     figure = new_figure(side, side + 0.8)
     axes, bar = panels(figure, 1, 2, width_ratios=[1.0, BAR])[0]
     axes.imshow(values, cmap=COLOUR_MAP, vmin=-1.0, vmax=1.0, aspect="auto")
-    axes.xaxis.set_major_locator(NullLocator())
-    named(axes.yaxis, range(len(names)), names)
+    places = range(len(names))
+    axes.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
+    axes.set_yticks(places, names)
     for row, line in enumerate(values):
         for column, value in enumerate(line):
             if np.isfinite(value):
@@ -72,23 +73,11 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
                 axes.text(
                     column, row, f"{value:.2f}", ha="center", va="center", color=color, fontsize=8
                 ).set_in_layout(False)
-    below = axes.get_xaxis_transform()
-    for column, name in enumerate(names):
-        axes.text(
-            column,
-            -0.01,
-            name,
-            rotation=45,
-            ha="right",
-            va="top",
-            rotation_mode="anchor",
-            transform=below,
-        )
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
     shades = np.linspace(-1.0, 1.0, SHADES)[:, np.newaxis]
     bar.imshow(shades, cmap=COLOUR_MAP, aspect="auto", extent=(0.0, 1.0, -1.0, 1.0), origin="lower")
-    bar.xaxis.set_major_locator(NullLocator())
+    bar.set_xticks([])
     bar.set_ylabel("correlation of the estimates")
     figure.suptitle(f"{title}: which parameters move together", fontsize=11)
     return figure
@@ -110,7 +99,7 @@ def profiles(profiled: Profiles) -> Figure:
     grid = figure.add_gridspec(rows, columns)
     axes = None
     for k, profile in enumerate(profiled.profiles):
-        axes = figure.add_subplot(grid[divmod(k, columns)], sharey=axes, axes_class=QuickAxes)
+        axes = figure.add_subplot(grid[divmod(k, columns)], sharey=axes)
         axes.tick_params(labelleft=k % columns == 0)
         branches = [(profile.at, profile.costs, SIMULATED)]
         branches += [(*branch, OTHER_MINIMA) for branch in profile.others]
