@@ -136,7 +136,7 @@ class LinearModel:
         return 0.5 * float(amounts @ amounts)
 
     def surely_longer(self, share: float) -> bool:
-        """Return whether the full step is longer than a share of its unit in some variable.
+        """Tell whether the full step is longer than a share of its unit in some variable.
 
         That is so where the gradient of a variable that is no such share from a bound exceeds what
         such steps of all together change in it. It takes a tenth of the time of the step itself.
@@ -155,7 +155,7 @@ class LinearModel:
         return norm(self.projected)
 
     def scaled_length(self, x: Array) -> float:
-        """Return how far x is from here in scaled variables."""
+        """Distance of x from here, in scaled variables."""
         return norm(self.scale * (x - self.point.x))
 
 

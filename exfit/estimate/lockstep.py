@@ -36,7 +36,7 @@ LISTENING = 0.1  # s: on Windows an interruption reaches only what returns from 
 
 
 def finish(search: Steps[Done]) -> Done:
-    """Return what one search comes to.
+    """Run one search to its end.
 
     Raises KeyboardInterrupt where it was interrupted before it had anything to show.
     """

@@ -275,7 +275,7 @@ class Problem:
         return J
 
     def offsets(self, x: float, j: int) -> tuple[float, ...]:
-        """Return how far to go: both ways, or towards the farther bound; none if it is fixed."""
+        """Steps of a quotient: both ways, or towards the farther bound; none if it is fixed."""
         below, above = x - self.box.low[j], self.box.high[j] - x
         if below == above == 0.0:
             return ()

@@ -174,7 +174,7 @@ class Side:
         return abs(self.bound - self.spots[-1].place)
 
     def step(self) -> float:
-        """Return how far to go for the next height, by the slope of the profile and its bend."""
+        """Length of the step to the next height, by the slope of the profile and its bend."""
         last, share = self.spots[-1], 1.0 / self.valley.points
         higher = last.height + share
         gain = (LAST if higher > 1.0 - 0.5 * share else higher) - last.height
@@ -195,7 +195,7 @@ class Side:
         return min(max(bent, 0.5 * straight), longest)
 
     def way_to_corner(self) -> float:
-        """Return how far the parameter goes until another, which follows it, meets its bound."""
+        """Length of the way until another variable, which follows, meets its bound."""
         last, box = self.spots[-1], self.valley.box
         moves = self.sign * last.tangent
         room = np.where(moves > 0.0, box.high - last.best, last.best - box.low)
@@ -204,7 +204,7 @@ class Side:
         return float(np.min(room[meeting] / np.abs(moves[meeting]), initial=inf))
 
     def first_step(self, height: float) -> float:
-        """Return how far a height is from the minimum, where the cost is a parabola."""
+        """Distance of a height from the minimum, where the cost is a parabola."""
         if self.curvature > 0.0:
             way = sqrt(height**2 - self.spots[0].height ** 2) / self.curvature
             if isfinite(way):
@@ -293,7 +293,7 @@ class Side:
         return direction
 
     def tangent(self, linear: LinearModel, x: Array) -> tuple[Array, float]:
-        """Return how fast all move with the parameter (N,), and the residuals with them.
+        """Rates of all variables along the parameter (N,), and of the residuals with them.
 
         Others on a bound stay there.
         """
@@ -309,7 +309,7 @@ class Side:
         return direction, 0.0 if flat else effect
 
     def crossed(self) -> Steps[float]:
-        """Return where the cost has risen as far as asked, by refits between the last points."""
+        """Find the point where the cost has risen as asked, by refits between the last points."""
         inside, outside = self.spots[-2:]
         for count in range(MOST_REFITS):
             place, doubt = interpolated(inside, outside)
@@ -329,7 +329,7 @@ class Side:
 
 
 def effect_of(linear: LinearModel, direction: Array) -> Array:
-    """Return by how much a move changes the residuals, in the directions that these have (K,)."""
+    """Change of the residuals by a move, in the directions that these have (K,)."""
     along: Array = linear.directions @ (linear.scale * direction)
     return linear.singular * along
 
@@ -352,7 +352,7 @@ def best_of_shorter(
 
 
 def along_kink(linear: LinearModel, before: LinearModel, share: float) -> Array:
-    """Return where the weighted mean of two linear models has its minimum within the bounds."""
+    """Minimise the weighted mean of two linear models within the bounds."""
     x, box = linear.point.x, linear.box
     rows = np.vstack(
         [
@@ -371,7 +371,7 @@ def along_kink(linear: LinearModel, before: LinearModel, share: float) -> Array:
 
 
 def interpolated(inside: Spot, outside: Spot) -> tuple[float, float]:
-    """Return where the height is one between two points, and how uncertain that is.
+    """Find the point of height one between two points, and its uncertainty.
 
     The place is a cubic of the height, which both places and slopes give; without slopes a line.
     """

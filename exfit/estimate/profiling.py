@@ -135,7 +135,7 @@ def profiles(
 def valley_about(
     functions: Functions, box: Box, scaled: bool, points: int, x: Array, lowest: float
 ) -> Steps[Valley]:
-    """Return what profiles about a minimum share."""
+    """Describe a minimum to the profiles about it."""
     problem = Problem(functions, None, box, scaled)
     point = yield from problem.evaluate(x)
     if point.cost == inf:

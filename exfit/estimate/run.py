@@ -51,13 +51,13 @@ class Rules:
         return replace(rules, first_cost=0.0, seen=seen(start))
 
     def most_iterations(self, phase: str) -> int:
-        """Return how many iterations a phase may have."""
+        """Limit of the iterations of a phase."""
         if isinstance(self.max_iterations, int):
             return self.max_iterations
         return self.max_iterations.get(phase, MOST_ITERATIONS)
 
     def at_rest(self, linear: LinearModel) -> Stop | None:
-        """Return why there is nothing to gain from a point, if so."""
+        """Find a reason to stop at a point: there is nothing to gain."""
         if not linear.finite:
             return Stop.JACOBIAN
         cost = linear.point.cost
@@ -72,7 +72,7 @@ class Rules:
         return self.good_enough(linear)
 
     def good_enough(self, linear: LinearModel) -> Stop | None:
-        """Return which tolerance of the user's own a point is within, if any."""
+        """Find the tolerance of the user's own that a point is within, if any."""
         if self.matches is not None and self.matches(linear.point.residuals):
             return Stop.MATCH
         if self.gtol_absolute is None:
@@ -81,7 +81,7 @@ class Rules:
         return Stop.FLAT if flat else None
 
     def after(self, before: LinearModel, linear: LinearModel, move: Move) -> Stop | None:
-        """Return why to stop after an iteration, if so."""
+        """Find a reason to stop after an iteration."""
         cost = before.point.cost
         if not linear.finite:
             return Stop.JACOBIAN
@@ -95,7 +95,7 @@ class Rules:
         return move.stop
 
     def creeping(self, log: Sequence[SolverIteration], linear: LinearModel) -> Stop | None:
-        """Return why to stop after these iterations of a phase: a valley of kinks has no end.
+        """Find a reason to stop after these iterations of a phase: a valley of kinks has no end.
 
         It is no minimum where the linear model still promises much: then the search has stalled.
         """
@@ -109,7 +109,7 @@ class Rules:
         return Stop.CREEPING if resting else Stop.STALLED
 
     def stuck(self, linear: LinearModel, stop: Stop | None) -> Stop | None:
-        """Return why to stop at a point from where no step led lower."""
+        """Name the reason to stop at a point from which no step led lower."""
         promise = linear.full.promise / linear.point.cost
         if stop is Stop.ILL_CONDITIONED:
             return stop
@@ -120,7 +120,7 @@ class Rules:
         return Stop.KINK if stop is Stop.STALLED and promise <= KINK else stop
 
     def orthogonal(self, linear: LinearModel) -> bool:
-        """Return whether the residuals are at right angles to what each free variable changes.
+        """Tell whether the residuals are at right angles to the effect of each free variable.
 
         Without units that makes a minimum, whatever the linear model promises for a direction that
         it hardly sees: J may be singular at the minimum.
@@ -131,11 +131,11 @@ class Rules:
         return not self.scaled and bool(flat)
 
     def lost(self, linear: LinearModel) -> bool:
-        """Return whether the residuals depend no longer on a variable that they depended on."""
+        """Tell whether the residuals depend no longer on a variable that they depended on."""
         return bool(np.any(self.seen & ~seen(linear)))
 
     def tiny(self, there: Array, here: Array, box: Box) -> bool:
-        """Return whether a step is below the tolerance in every variable."""
+        """Tell whether a step is below the tolerance in every variable."""
         size = np.maximum(abs(here), box.unit)
         return bool(np.all(abs(there - here) <= self.xtol * size))
 
@@ -147,7 +147,7 @@ def seen(linear: LinearModel) -> Mask:
 
 
 def rounding(linear: LinearModel) -> bool:
-    """Return whether the residuals are no more than what rounding leaves of their parts."""
+    """Tell whether the residuals are no more than the rounding of their parts."""
     parts = abs(linear.jacobian) @ abs(linear.point.x)
     return linear.point.cost <= 0.5 * ROUNDING**2 * float(parts @ parts)
 
@@ -226,7 +226,7 @@ class SearchRun:
         return self.end(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)
 
     def end(self, linear: LinearModel, stop: Stop) -> Outcome:
-        """Return where a phase ended, which is no minimum where a variable got lost."""
+        """End a phase, at no minimum where a variable got lost."""
         outcome = Outcome(linear, stop)
         lost = outcome.converged and self.rules.lost(linear)
         return Outcome(linear, Stop.LOST) if lost else outcome
@@ -292,7 +292,7 @@ class SearchRun:
         return Outcome(blind(self.problem, point, unknown), Stop.INTERRUPTED)
 
     def result(self, outcome: Outcome) -> Result:
-        """Return what the user gets."""
+        """Make the result for the user."""
         linear, stop = outcome.linear, outcome.stop
         return Result(
             x=linear.point.x,
@@ -359,7 +359,7 @@ def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Steps
 
 
 def matches(outcome: Outcome, good_enough: float | None) -> bool:
-    """Return whether the residuals are small enough; without a limit, whether it converged."""
+    """Tell whether the residuals are small enough; without a limit, whether it converged."""
     if good_enough is None:
         return outcome.converged
     point = outcome.linear.point

@@ -55,7 +55,7 @@ def gain_ratio(decrease: float, promise: float) -> float:
 
 
 def worth_trying(linear: LinearModel, promise: float, rejections: int) -> bool:
-    """Return whether a trial may show what it promises, or one more after some rejections."""
+    """Tell whether a trial may show its promise, or one more after some rejections."""
     cost = linear.point.cost
     if rejections and linear.full.promise <= LEAST_AGAIN * cost:
         return False
@@ -63,7 +63,7 @@ def worth_trying(linear: LinearModel, promise: float, rejections: int) -> bool:
 
 
 def held_back(linear: LinearModel, step: DampedStep, reach: float) -> bool:
-    """Return whether a step, the best within reach, is another than the full Gauss-Newton step."""
+    """Tell whether a step, the best within reach, is another than the full Gauss-Newton step."""
     farthest = np.max(abs(step.target - linear.point.x) / linear.box.unit)
     if linear.rank == len(linear.scale) and farthest < reach * (1.0 - SAME):
         return False
@@ -72,7 +72,7 @@ def held_back(linear: LinearModel, step: DampedStep, reach: float) -> bool:
 
 
 def to_parabola(rise: float, slope: float) -> float:
-    """Return by how much to shorten a trial: to the minimum of the parabola, 0.2 ... 0.5.
+    """Shorten a trial to the minimum of the parabola, by 0.2 ... 0.5.
 
     Source: Dennis & Schnabel 1983, section 6.3.2. slope: of the whole trial step.
     """
@@ -277,7 +277,7 @@ class TrustRegion:
 
 
 def bent(problem: Problem, linear: LinearModel, step: DampedStep, nu: float) -> Steps[Array]:
-    """Return where a step ends that follows the curvature of the residuals, if that is small.
+    """End a step along the curvature of the residuals, if that is small.
 
     Source: Transtrum & Sethna 2012, Improvements to the Levenberg-Marquardt algorithm, section 4.
     """

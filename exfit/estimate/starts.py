@@ -49,7 +49,6 @@ def _primitive() -> Iterator[int]:
 
 
 def _is_primitive(polynomial: int) -> bool:
-    """Return whether the powers of x, modulo the polynomial, go through all its residues."""
     degree = polynomial.bit_length() - 1
     power, order = 1, 0
     while True:
@@ -186,7 +185,7 @@ def refuse_interrupted(end: "RefinedStart") -> None:
 
 
 def together(ends: Mapping[int, "RefinedStart"], errors: float) -> list[list[int]]:
-    """Return which starts go on as one: those whose ends lie within so many standard errors."""
+    """Group starts whose ends lie within so many standard errors: they go on as one."""
     begun = [(k, start.end) for k, start in sorted(ends.items()) if start.end is not None]
     groups = distinct([end for _, end in begun], errors)
     alone = [[k] for k, start in sorted(ends.items()) if start.end is None]
@@ -237,7 +236,7 @@ def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
 
 
 def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> MultistartResult:
-    """Return what some starts came to."""
+    """Summarise the ends of some starts."""
     ends = [(start.end, start.first_cost) for start in starts if start.end is not None]
     nothing = leg.gtol**2 * float(median([first_cost for _, first_cost in ends] or [0.0]))
     minima = minima_of([end for end, _ in ends], nothing, leg.functions)
@@ -289,7 +288,7 @@ class StartOutcome:
 
 
 def outcome_of(result: Result) -> StartOutcome:
-    """Return where a refinement ended."""
+    """Locate the end of a refinement, with its linear model."""
     freedom = max(1, len(result.fun) - len(result.x))
     triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
     small = replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x))))
@@ -299,7 +298,7 @@ def outcome_of(result: Result) -> StartOutcome:
 def distinct(
     ends: Sequence[StartOutcome], errors: float = INDISTINGUISHABLE, nothing: float = 0.0
 ) -> list[list[int]]:
-    """Return which ends belong to each minimum, the best first."""
+    """Group ends by their minimum, the best first."""
     groups: list[list[int]] = []
     for k in sorted(range(len(ends)), key=lambda k: ends[k].result.cost):
         for group in groups:
@@ -317,7 +316,7 @@ def same(
     errors: float = INDISTINGUISHABLE,
     nothing: float = 0.0,
 ) -> bool:
-    """Return whether two ends are within so many standard errors, as `multistart` measures them.
+    """Tell whether two ends are within so many standard errors, as `multistart` measures them.
 
     ``nothing`` is what a perfect match may cost.
     """

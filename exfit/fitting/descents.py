@@ -63,7 +63,7 @@ class SearchMethods(Protocol):
         """Return the end of a descent from the start of the case."""
 
     def margin(self, lowest: Result) -> float:
-        """Return by how much a cost may exceed the lowest and the records not tell them apart."""
+        """Excess of a cost over the lowest up to which the records do not tell the two apart."""
 
 
 def no_doubt(_: Result) -> str:
@@ -109,7 +109,7 @@ def chosen(searches: SearchMethods, judge: Judge, ends: Sequence[Result]) -> Res
 
 
 def count_like(lowest: Result, costs: ArrayLike, searches: SearchMethods) -> int:
-    """Return how many costs the records do not tell from the lowest of them."""
+    """Count the costs that the records do not tell from the lowest of them."""
     return int(np.count_nonzero(np.asarray(costs) <= lowest.cost + searches.margin(lowest)))
 
 
@@ -154,7 +154,7 @@ def following(last: SolverIteration, line: SolverIteration) -> SolverIteration:
 
 
 def taken_for_validation(times: float) -> str:
-    """Return that a minimum so many times as high as the lowest one was taken, and why."""
+    """Explain a minimum so many times as high as the lowest one, taken for its validation."""
     return (
         f"the cost is {times:.4g} times the lowest one found: the records do not tell the two "
         "minima apart, and this one was taken because the validation holds on it; it is no "
@@ -163,7 +163,7 @@ def taken_for_validation(times: float) -> str:
 
 
 def notes_of(doubts: Sequence[str], best: Result, like: int, costs: ArrayLike) -> Iterator[str]:
-    """Yield why auto went beyond its first stage, and what it left in doubt.
+    """Explain the stages of auto after its first one, and the doubts that it left.
 
     ``doubts`` are those after each stage and of the result; ``like`` of the descents, which ended
     at ``costs``, led to the lowest minimum or to one like it.

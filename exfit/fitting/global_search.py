@@ -119,7 +119,7 @@ def global_search(
 
 
 def why_local(searches: GlobalSearchMethods, own: Result) -> str:
-    """Return why there can be no search from further starts, "" where there can."""
+    """Reason against a search from further starts, "" where there is none."""
     if own.stop in AT_TOLERANCE:
         return "a tolerance that the case gives ended the descent from its start"
     if searches.unbounded:
@@ -222,7 +222,7 @@ def own_end(descents: Descents, best: Result) -> Result | None:
 
 
 def is_same(best: Result, other: Result) -> bool:
-    """Return whether an end of a descent is in the minimum that has this best one."""
+    """Tell whether an end of a descent is in the minimum that has this best one."""
     from exfit.estimate.starts import outcome_of, same
 
     nothing = PERFECT * other.history[0].cost
@@ -259,7 +259,7 @@ def after_search(
 
 
 def ways_of(further: FurtherDescents, descents: Descents) -> "tuple[Way, ...]":
-    """Return what each descent began with, those from the start of the case first."""
+    """List the beginnings of all descents, those from the start of the case first."""
     own: tuple[Way, ...] = ("strategy",)
     return own * len(descents.ends) + further.ways
 

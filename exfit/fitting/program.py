@@ -80,13 +80,13 @@ class Program(Protocol):
         """Find the largest difference from the twin where tests were settled."""
 
     def own_value_notes(self) -> Iterator[str]:
-        """Yield which parameters it has values of its own of."""
+        """Name the parameters that it has values of its own of."""
 
     def response_notes(self, simulator: Simulator, shown: Iterable[str]) -> Iterator[str]:
-        """Yield which of the shown signals its twin gives, without a correction."""
+        """Name the shown signals that its twin gives, without a correction."""
 
     def notes(self, setups: Setups, followed: str = "intervals and diagnoses") -> Iterator[str]:
-        """Yield what it was asked for; ``followed`` is what followed the search, by the twin."""
+        """Report its runs; ``followed`` is what followed the search, by the twin."""
 
 
 def program_of(case: Case) -> AbstractContextManager[Program | None]:

@@ -88,7 +88,7 @@ def checked_strategy(strategy: str) -> str:
 
 
 def checked_search(search: str) -> str:
-    """Return how far to search, or raise CaseError where there is no search of this name."""
+    """Check the name of a search, or raise CaseError where there is none of this name."""
     if search not in SEARCHES:
         raise CaseError([f"search: {search!r} is unknown; {near(search, SEARCHES)}"])
     return search
@@ -248,7 +248,7 @@ class CaseSearches:
         return FurtherDescents(minima, starts.ways, starts.why_direct)
 
     def margin(self, lowest: estimate.Result) -> float:
-        """Return by how much a cost may exceed the lowest and the records not tell them apart.
+        """Excess of a cost over the lowest up to which the records do not tell the two apart.
 
         That is the limit of the likelihood ratio, wider where residuals are not white, or what no
         recorder shows where that is more.

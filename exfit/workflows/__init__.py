@@ -248,7 +248,7 @@ def profile(
 
 
 def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Design":
-    """Return how well tests would determine the free parameters of a case, at its start values.
+    """Foretell the standard errors of free parameters by the tests of a case, at its start values.
 
     Args:
         case: a case, or the path of its file; it needs no record.

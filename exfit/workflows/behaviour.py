@@ -24,7 +24,7 @@ FLAT_DRIFT = 1e-9  # pu
 def behaviour_of(
     tests: Sequence[TestWithValues], others: Iterable[TestWithValues] = ()
 ) -> Behaviour:
-    """Return what values do in tests, and which limits were met in these and in others.
+    """Describe a run without a step, the state near rest and the limits met, by values in tests.
 
     The tests have sub-steps enough; each has its own values, with what was found about its record.
     """
@@ -36,7 +36,7 @@ def behaviour_of(
 
 
 def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
-    """Find how far signals stray from their start (pu) in FLAT_SECONDS without any change.
+    """Measure the stray of signals from their start (pu) in FLAT_SECONDS without any change.
 
     ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
     is no rest.

@@ -52,7 +52,7 @@ SWING = {
 
 
 def played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Iterator[str]:
-    """Yield how a record was played in; nothing where it was not.
+    """Describe the playing in of a record; nothing where there was none.
 
     ``view`` is the case with the plant of the record.
     """
@@ -167,7 +167,7 @@ def values_by_part(case: Case, values: Mapping[str, float]) -> dict[str, dict[st
 
 
 def of_limiters(case: Case, by_kind: Mapping[str, Value]) -> dict[str, Value]:
-    """Return what belongs to the limiters of a case, by their kinds."""
+    """Select the entries of the limiters of a case, by their kinds."""
     return {limiter.kind: by_kind[limiter.kind] for limiter in case.parts.limiters}
 
 
@@ -246,13 +246,13 @@ def _network(view: Case) -> dict[str, NetworkParameter]:
 def _done(
     view: Case, recording: Recording, setup: ExperimentSetup, identified: Identified
 ) -> Iterator[str]:
-    """Yield what was done to the unit, or what the grid did, in words."""
+    """Describe the test of a unit, or the event of the grid, in words."""
     yield from played_in(view, recording, setup)
     yield from _events(view, recording, identified)
 
 
 def _events(case: Case, recording: Recording, identified: Identified) -> Iterator[str]:
-    """Yield what was done to the unit, in words."""
+    """Describe the steps and switchings of a test."""
     test, prefix = recording.test, prefix_of(recording)
     if test.vt0 is not None:
         yield f"vt0 {_given(test.vt0, 'g', 'pu', identified.get(f'{prefix}vt0'))}"
@@ -273,7 +273,7 @@ def _events(case: Case, recording: Recording, identified: Identified) -> Iterato
 
 
 def _source_angle(test: BumpTest) -> Iterator[str]:
-    """Yield what the angle of the source did."""
+    """Describe the angle of the source."""
     if isinstance(test.angle, AngleTable):
         (start, first), (end, last) = test.angle.table[0], test.angle.table[-1]
         rows = f"{len(test.angle.table)} rows, {start:g} ... {end:g} s"
@@ -286,7 +286,7 @@ def _source_angle(test: BumpTest) -> Iterator[str]:
 
 
 def _reference(signal: str, given: Reference, prefix: str, identified: Identified) -> Iterator[str]:
-    """Yield what a reference, or the stabiliser's signal, did."""
+    """Describe the course of a reference, or of the stabiliser's signal."""
     if isinstance(given, ReferenceTable):
         (start, first), (end, last) = given.table[0], given.table[-1]
         rows = f"{len(given.table)} rows, {start:g} ... {end:g} s"
@@ -333,7 +333,7 @@ def _given(
 def identified_values(
     parameters: Mapping[str, FittedParameter], validations: Iterable[Comparison]
 ) -> dict[str, Estimated]:
-    """Return what a fit identified about its records, each with half of its 95 % interval."""
+    """Collect the values that a fit found about its records, each with half of its interval."""
     of_validations = {
         name: (value, None) for match in validations for name, value in match.of_record.items()
     }

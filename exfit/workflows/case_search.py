@@ -222,7 +222,7 @@ def settled(state: SearchState) -> SearchState:
 
 
 def profiles(state: SearchState) -> SearchState:
-    """Find how well the records determine the parameters, by profiles where linear theory fails.
+    """Determine the parameters, by profiles where linear theory does not serve.
 
     Where these lead to a lower minimum the search goes on from there.
     """
@@ -241,7 +241,7 @@ def profiles(state: SearchState) -> SearchState:
 
 
 def _profiles_by_twin(state: SearchState, program: Program) -> SearchState:
-    """Find how well the records determine the parameters of a program, by its corrected twin.
+    """Determine the parameters of a program, by its corrected twin.
 
     Profiles take no run. Where they lead to a lower cost, which the program need not have, the
     result is not at the minimum of the corrected twin. The intervals are those of linear theory

@@ -28,7 +28,7 @@ def judge_of(
     setups: Sequence[ExperimentSetup],
     unseen: Sequence[ExperimentSetup],
 ) -> Judge:
-    """Return what judges the ends of a search.
+    """Make the judge of the ends of a search.
 
     ``setups`` are the tests of the fit, ``unseen`` those of the validations. An end is refused
     where one of these is not accepted. It is in doubt there, where the search did not converge, and
@@ -67,7 +67,6 @@ def _fitted(
 def _refusals(
     case: Case, unseen: Sequence[ExperimentSetup], values: Values, fitted: Sequence[Comparison]
 ) -> Iterator[str]:
-    """Yield why validations are not accepted."""
     for setup in unseen:
         yield from filter(None, [validation_of(case, fitted, *aligned(case, setup, values)).reason])
 
@@ -79,7 +78,6 @@ def _doubts(
     unseen: Sequence[ExperimentSetup],
     end: Result,
 ) -> Iterator[str]:
-    """Yield what casts doubt on an end."""
     if not end.success:
         yield f"the search had not converged: {end.message}"
     residuals = problem.residuals

@@ -96,7 +96,7 @@ def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iter
 
 
 def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield what does not fit together in the values of a system."""
+    """Yield contradictions among the values of a system."""
     for part in case.parts.all:
         own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
         yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
@@ -120,7 +120,7 @@ def fitted_code(path: Path) -> CodeHashes:
 
 
 def _content(path: Path) -> tuple[dict[str, Any], list[str]]:
-    """Return what a file of parameters contains, and the faults of its text."""
+    """Read the content of a file of parameters, and the faults of its text."""
     if path.is_dir() or path.name == WHOLE_FIT:  # a large one is more than YAML is read of
         raise CaseError([f"{path}: {OF_A_RESULT}"])
     top, faults = read_yaml(read_text(path), path)
@@ -154,7 +154,7 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
 
 
 def sources_in(path: Path) -> dict[str, str]:
-    """Return where the values of a file that `read_parameters` has read come from, by name."""
+    """Read the sources of the values of a file that `read_parameters` has read, by name."""
     return {str(name): str(word) for name, word in _content(path)[0].get("sources", {}).items()}
 
 
@@ -245,7 +245,7 @@ def given_values(case: Case) -> "dict[str, GivenInPlace]":
 
 
 def given_value_notes(case: Case) -> Iterator[str]:
-    """Yield which values were given in place of those of the case, and by what."""
+    """Name the values that were given in place of those of the case, and their source."""
     fixed = case.values().keys() - case.free().keys()
     changes: dict[tuple[str, str], list[str]] = {}
     for name, given in case.given_values.items():

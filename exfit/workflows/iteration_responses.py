@@ -56,7 +56,7 @@ def live_response(
 
 
 def chosen(count: int) -> list[int]:
-    """Return which of so many iterations are kept: evenly some, the first and last among them."""
+    """Choose evenly some of so many iterations, the first and last among them."""
     kept = np.linspace(0, count - 1, min(count, MOST_RESPONSES))
     return [int(k) for k in np.rint(kept)]
 

@@ -35,7 +35,7 @@ def phase_ends(
     residuals: Residuals,
     history: Sequence[Iteration],
 ) -> Iterator[PhaseEnd]:
-    """Yield where the phases ended of the descent from the start of the case, but for the last one.
+    """Yield the ends of the phases of the descent from the start of the case, but for the last one.
 
     Where a descent before that one was given up, its phases are not among them, and an end without
     a finite response is left out.

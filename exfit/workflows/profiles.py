@@ -246,7 +246,7 @@ def _found(
 
 
 def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:
-    """Yield what must be known of the minimum that the profiles are about, and of others."""
+    """Yield notes on the minimum that the profiles are about, and on others."""
     if not best.success:
         yield f"the fit did not end at a minimum: {best.message}"
     if by_twin and profiles.lower is not None:

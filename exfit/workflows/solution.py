@@ -96,7 +96,7 @@ def analysed(
     program: Program | None = None,
     history: Sequence[Iteration] = (),
 ) -> Analysis:
-    """Return how well the best point is determined, how it does on ``unseen`` records, and more.
+    """Analyse the best point: its uncertainty, its response to ``unseen`` records, and more.
 
     ``setups`` have sub-steps enough, ``fitted`` are the comparisons with their records. An
     interruption ends it with what was done by then.
@@ -144,7 +144,7 @@ def analysed(
 
 
 def without_intervals(analysis: Analysis, why: str) -> Analysis:
-    """Return what follows from a solution without intervals, for a reason; as it is without one."""
+    """Take the intervals out of an analysis, for a reason; it stays without one."""
     if not why:
         return analysis
     known = analysis.uncertainty
@@ -234,7 +234,7 @@ def fit_notes(
     comparisons: Sequence[Comparison],
     analysis: Analysis,
 ) -> Iterator[str]:
-    """Yield what must be known beside the numbers of a fit."""
+    """Yield notes beside the numbers of a fit."""
     if case.accept is not None and not case.validations:
         yield NOTHING_TO_ACCEPT
     if not best.success:
@@ -306,7 +306,7 @@ def fitted_to_record(
 def validation_of(
     case: Case, fitted: Sequence[Comparison], setup: ExperimentSetup, values: Values
 ) -> Comparison:
-    """Return how `aligned` values do on a record that was not fitted, judged by ``fitted`` ones."""
+    """Judge `aligned` values on a record that was not fitted, by the ``fitted`` ones."""
     of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
     comparison = compare_with_record(setup, setup.name, values, of_record=of_record)
     accept = None if case.accept is None else case.accept.rmse
@@ -323,7 +323,7 @@ def evidence_of(
     interrupted: bool,
     pace: Pace,
 ) -> Evidence:
-    """Return what the verdict on a fit and the causes of a poor one are worked out from."""
+    """Collect the evidence for the verdict on a fit and for the causes of a poor one."""
     return Evidence(
         case=case,
         residuals=residuals,

@@ -198,7 +198,7 @@ def _validated(
 def _run_notes(
     case: Case, setup: ExperimentSetup, comparison: Comparison, values: Values
 ) -> Iterator[str]:
-    """Yield what speaks against the simulated response of a record."""
+    """Yield doubts about the simulated response of a record."""
     simulator = setup.experiment.with_inputs(values)
     at = setup.experiment.parameters(values)
     simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
@@ -216,7 +216,7 @@ def _validated_by_hand(
     given: GivenSteps,
     program: Program | None,
 ) -> tuple[Case, ComparedTest]:
-    """Return how values do on a record that the case does not name, judged by ``fitted`` ones.
+    """Compare values with a record that the case does not name, judged by ``fitted`` ones.
 
     The case has that record where it was given as samples. Its columns are those of the first
     record under validate, or else of the first fitted one.
@@ -286,7 +286,7 @@ def _notes(
     fitted: Sequence[Comparison],
     best: Values,
 ) -> Iterator[str]:
-    """Yield what must be known of a record that was given by hand.
+    """Yield notes on a record that was given by hand.
 
     ``setup`` has the bounds within which the record allows its instants, ``best`` those at which it
     is matched best.
@@ -367,7 +367,7 @@ def validation_result(
 
 
 def _sources(validation: Validation, sources: Mapping[str, str]) -> dict[str, str]:
-    """Return where every value comes from: what differs from the case is by who gave it."""
+    """Name the source of every value: of those that differ from the case, the one who gave it."""
     case, values = validation.case, validation.values
     of_case, free = case.values(), case.free() if validation.fitted else ()
     changed = [name for name in of_case if name not in free and values[name] != of_case[name]]

@@ -183,11 +183,11 @@ class CaseProgram:
         }
 
     def own_value_notes(self) -> Iterator[str]:
-        """Yield which parameters of the case an FMU does not take, and has its own values of."""
+        """Name the parameters of the case that an FMU does not take, and has its own values of."""
         return own_value_notes(self.case, self.program)
 
     def response_notes(self, simulator: Simulator, shown: Iterable[str]) -> Iterator[str]:
-        """Yield which of the shown signals the twin gives, without a correction."""
+        """Name the shown signals that the twin gives, without a correction."""
         given = _given(simulator)
         if self.has_twin and given is not None and {*shown} - {*given.signals}:
             yield (
@@ -196,7 +196,7 @@ class CaseProgram:
             )
 
     def notes(self, setups: Setups, followed: str = "intervals and diagnoses") -> Iterator[str]:
-        """Yield what it was asked for, and by how much its twin differs at the result.
+        """Report the runs it was asked for, and the difference of its twin at the result.
 
         ``followed`` is what followed the search, by the twin.
         """

@@ -30,7 +30,7 @@ def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
 
 
 def _twin_faults(plant: ContentNode) -> Iterator[Fault]:
-    """Yield what a twin lacks, and what it does not have."""
+    """Yield the missing and the superfluous keys of a twin."""
     if "machine" not in plant:
         yield plant.at("machine").fault("is missing")
     twin = KINDS.get(str(plant.at("twin").value))
@@ -41,7 +41,7 @@ def _twin_faults(plant: ContentNode) -> Iterator[Fault]:
 
 
 def _named_faults(content: ContentNode, plant: ContentNode, parts: Parts) -> Iterator[Fault]:
-    """Yield what only a twin has, and parameters that cannot be named as they are."""
+    """Yield the keys of a twin that is missing, and parameters that cannot be named as they are."""
     for key in OF_TWIN:
         if key in plant:
             yield plant.at(key).fault("only with plant.twin")

@@ -168,7 +168,7 @@ def corners(
 def share(
     step: Mapping[str, Any], grid: Grid, ahead: float, instants: Array, after: NDArray[np.bool_]
 ) -> Array:
-    """Return what share of a step, or ramp, is complete at the instants of a table."""
+    """Share of a step, or ramp, that is complete at the instants of a table."""
     begin = step["at"] - grid.start
     if step["ramp"]:
         complete: Array = (instants - begin + ahead) / step["ramp"]

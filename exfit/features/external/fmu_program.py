@@ -75,7 +75,7 @@ def refuse_unknown_variables(case: Case, program: ExternalProgram, tests: Sequen
 
 
 def own_value_notes(case: Case, program: ExternalProgram) -> Iterator[str]:
-    """Yield which parameters of a case an FMU does not take, and has its own values of."""
+    """Name the parameters of a case that an FMU does not take, and has its own values of."""
     section = case.external
     if not isinstance(section, FmuPlant) or not isinstance(program, FmuProgram):
         return
@@ -91,7 +91,7 @@ def own_value_notes(case: Case, program: ExternalProgram) -> Iterator[str]:
 def _variable_faults(
     case: Case, section: FmuPlant, description: FmuDescription, tests: Sequence[Test]
 ) -> Iterator[str]:
-    """Yield what the FMU has no variable for, or one that cannot be used so."""
+    """Yield the variables that the FMU does not have, or that cannot be used so."""
     variables = description.variables
     changed = {step.signal: "" for twin, _ in tests for step in twin.inputs.steps}
     compared = {signal: "" for _, signals in tests for signal in signals}

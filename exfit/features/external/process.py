@@ -98,7 +98,7 @@ class _Running:
         return line
 
     def _reason(self) -> str:
-        """Return how a process whose answers have ended ended itself."""
+        """Describe the end of a process whose answers have ended."""
         try:
             code = self._process.wait(TO_END)
         except subprocess.TimeoutExpired:
@@ -144,7 +144,7 @@ def _listen(answers: IO[bytes], lines: "SimpleQueue[bytes]") -> None:
 
 
 def _checked(line: bytes, number: int) -> dict[str, Any]:
-    """Return what a line of an answer holds; raises ProgramError where it is none."""
+    """Read the line of an answer; raises ProgramError where it is none."""
     text = line.decode(errors="replace").strip()
     try:
         answer = json.loads(text)

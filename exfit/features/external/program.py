@@ -127,12 +127,11 @@ class ExternalProgram:
 
 
 def _key(request: Mapping[str, Any]) -> str:
-    """Return what distinguishes a request from others."""
     return json.dumps({**request, "values": _key_of(request["values"])}, sort_keys=True)
 
 
 def _key_of(values: Mapping[str, float]) -> str:
-    """Return what distinguishes values from others: more than rounding."""
+    """Key of values, alike for those that differ by rounding."""
     return json.dumps({name: f"{value:.12g}" for name, value in values.items()}, sort_keys=True)
 
 

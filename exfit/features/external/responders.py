@@ -289,7 +289,7 @@ class Coordinates:
         return np.array([*(values[name] for name in self._names), *steps, simulator.delay])
 
     def along(self, way: Array) -> Array:
-        """Find how far (N,) a way between two places goes along each direction."""
+        """Split a way between two places into its lengths (N,) along the directions."""
         return np.asarray(self._inverse @ (way / self._sizes))
 
     def _rates(self, direction: Direction) -> list[float]:

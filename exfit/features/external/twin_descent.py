@@ -45,7 +45,7 @@ class LinearisedAt(NamedTuple):
     jacobian: Array
 
     def promise(self, theta: Array) -> float:
-        """Return by how much of the cost a step to another point lowers the linear model's."""
+        """Share of the cost by which a step to another point lowers the linear model's."""
         cost = half_square(self.residuals)
         step = self.residuals + self.jacobian @ (theta - self.theta)
         return (cost - half_square(step)) / cost if cost > 0.0 else 0.0
@@ -106,13 +106,13 @@ class ProgramFunctions:
         self.quotients += 1
 
     def is_final(self, end: estimate.Result) -> bool:
-        """Return whether an end needs no correction: it has one, or program and twin agree."""
+        """Tell whether an end needs no correction: it has one, or program and twin agree."""
         if end.stop is estimate.Stop.INTERRUPTED or self.quotients >= MOST_CORRECTIONS:
             return True
         return self.is_corrected or not self.is_distinct()
 
     def is_distinct(self) -> bool:
-        """Return whether program and twin differ visibly at the best point.
+        """Tell whether program and twin differ visibly at the best point.
 
         Only then the derivatives of the twin can lead to another end than those of the program.
         """

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 def finds_instant(experiment: Experiment) -> bool:
-    """Return whether a fit finds an instant of a test, which makes up for a delay."""
+    """Tell whether a fit finds an instant of a test, which makes up for a delay."""
     return any(nuisance.kind in ("at", "shift", "delay") for nuisance in experiment.nuisances)
 
 

@@ -46,11 +46,11 @@ class CompressedChannel(Channel):
     form: Form = field(kw_only=True)
 
     def compared(self, simulated: Array) -> Array:
-        """Return what is compared of simulated signals (K, G), a row of each."""
+        """Compare simulated signals (K, G), a row of each."""
         return np.stack([self.filtered(samples) for samples in simulated])
 
     def filtered(self, samples: Array) -> Array:
-        """Return what is compared of samples (G,): (6 K + 1,)."""
+        """Filter samples (G,) for the comparison: (6 K + 1,)."""
         mapped = np.einsum("kij,kj->ki", self.form.maps, samples[self.form.rows])
         return np.append(mapped, 0.0)
 

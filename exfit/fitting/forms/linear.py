@@ -38,7 +38,7 @@ def linear_form(residuals: Residuals) -> Residuals | str:
 
 
 def _no_meaning(experiment: Experiment, values: Values) -> str | None:
-    """Return why a test has no small-signal response, None where it has one."""
+    """Reason against a small-signal response of a test, None where it has one."""
     inputs = experiment.simulator.inputs
     switched = [SWITCHED[step.signal] for step in inputs.steps if step.signal in SWITCHED]
     if switched:
