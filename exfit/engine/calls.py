@@ -21,7 +21,7 @@ ALONG = ("p", "r", "x", "u", "slopes", "jacobian", "dp", "dr", "units")
 
 
 def address(array: Array) -> int:
-    """Return where an array begins; raises TypeError where machine code could not read it."""
+    """Take the address of an array; raises TypeError where machine code could not read it."""
     if array.dtype != np.float64 or not array.flags.c_contiguous:
         raise TypeError("the kernel takes C-contiguous arrays of float64")
     place: int = array.__array_interface__["data"][0]  # a third of the time of array.ctypes
@@ -29,7 +29,7 @@ def address(array: Array) -> int:
 
 
 def place_of(table: NDArray[np.int64]) -> int:
-    """Return where a table of whole numbers begins."""
+    """Take the address of a table of whole numbers."""
     if table.dtype != np.int64 or not table.flags.c_contiguous:
         raise TypeError("the kernel takes C-contiguous tables of int64")
     place: int = table.__array_interface__["data"][0]

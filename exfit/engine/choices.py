@@ -129,7 +129,7 @@ def _followers(
 
 
 def _order(followers: Mapping[int, set[int]]) -> list[int]:
-    """Return what is followed in an order that respects it, else the order of the indices."""
+    """Order nodes by what they follow, else by their indices."""
     waits = Counter(unit for after in followers.values() for unit in after)
     ready = sorted(followers.keys() - waits.keys())
     order = []

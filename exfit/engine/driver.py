@@ -212,7 +212,7 @@ def _row(w: Writer, table: str, number: str, fields: Sequence[str]) -> dict[str,
 
 
 def _of_number(w: Writer, number: str, array: str, size: int) -> str:
-    """Write where the part of so many numbers begins that belongs to a set, a point or a block."""
+    """Write the address of the part, so many numbers, of a set, a point or a block."""
     return w.address(array, w.let(f"mul i64 {number}, {size}"))
 
 

@@ -186,7 +186,7 @@ def _run(parts: Sequence[TracePart]) -> Writer:
 
 
 def _fixed_values(w: Writer, parts: Sequence[TracePart]) -> Values:
-    """Write what stays during a run: parameters, setpoints, and what follows from them alone."""
+    """Write the values of a whole run: parameters, setpoints, and what follows from them alone."""
     fixed: Values = {}
     for part in parts:
         fixed.update(_read(w, part, "p", part.p))

@@ -89,7 +89,7 @@ def _inlined(name: str, shape: Shape, w: Writer, result: str) -> str:
 
 
 def functions(shape: Shape) -> dict[str, str]:
-    """Return what is not an instruction of LLVM, by name."""
+    """Collect by name the functions that LLVM has no instruction for."""
     return {
         f"@exp_{shape.suffix}": exponential(shape),
         **{f"@{name}_{shape.suffix}": sine(shape, name) for name in ("sin", "cos")},

@@ -52,7 +52,7 @@ class Span(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What machine code is made for: a processor by LLVM's name, and its features."""
+    """The target of machine code: a processor by LLVM's name, and its features."""
 
     cpu: str
     features: str

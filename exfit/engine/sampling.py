@@ -31,7 +31,7 @@ class Segment(NamedTuple):
 
 
 class SampleRows(NamedTuple):
-    """Where M samples are read: sums of ``rows`` (M, points) of a run times ``weights``, as large.
+    """The places of M samples: sums of ``rows`` (M, points) of a run times ``weights``, as large.
 
     ``slopes`` (M, points) are the weights that give their time derivatives, where these are wanted.
     """
@@ -41,7 +41,7 @@ class SampleRows(NamedTuple):
     slopes: Array | None = None
 
     def enlarged(self, factor: float) -> "SampleRows":
-        """Return what reads the deviations from the first row so many times as large."""
+        """Enlarge the deviations from the first row so many times."""
         if factor == 1.0:
             return self
         count = len(self.rows)
@@ -63,14 +63,14 @@ class SampleRows(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What a parameter set runs through from rest, and where it is sampled."""
+    """The segments that a parameter set runs through from rest, and their samples."""
 
     segments: Sequence[Segment]
     reading: SampleRows
 
 
 class Sizes(NamedTuple):
-    """How large is what one job of the machine code works on; ``directions`` may be 0."""
+    """Sizes of the tables of one job of the machine code; ``directions`` may be 0."""
 
     setpoints: int
     states: int
@@ -197,7 +197,7 @@ class Sampler:
         return Samples(outputs, slopes, changes)
 
     def _work(self, courses: Courses) -> tuple[Table, Array]:
-        """Return where a job works, and the buffer that holds it."""
+        """Lay out the work space of a job: its addresses, and the buffer that holds it."""
         setpoints, states, outputs, sets, directions, moving = self.sizes
         wide = sets * directions
         lengths = (
@@ -215,7 +215,7 @@ class Sampler:
 
 
 def _places_in(array: NDArray[Any], count: int) -> Table:
-    """Return where each of ``count`` equal parts of an array begins."""
+    """Take the addresses of ``count`` equal parts of an array."""
     begin = place_of(array) if array.dtype == np.int64 else address(array)
     return begin + np.arange(count) * (array.nbytes // max(count, 1))
 

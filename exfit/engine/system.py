@@ -10,14 +10,14 @@ Signals = Mapping[str, Signal]
 
 
 class Rest(NamedTuple):
-    """Where a run starts: the states at rest, and the setpoints that keep them there."""
+    """The start of a run: the states at rest, and the setpoints that keep them there."""
 
     states: Signals
     setpoints: Signals
 
 
 class Motion(NamedTuple):
-    """What the equations say at one instant; ``limits`` holds (low, high) of non-windup states."""
+    """The slopes and signals of one instant; ``limits`` holds (low, high) of non-windup states."""
 
     slopes: Signals
     limits: Mapping[str, tuple[Signal, Signal]]

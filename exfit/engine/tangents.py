@@ -163,7 +163,7 @@ def _needed(value: Node, factor: Node) -> Node:
 
 
 def _switched_off(node: Node, condition: Node, position: int) -> bool:
-    """Return whether a value is a product with zero where a condition chooses one branch."""
+    """Test for a product with zero where a condition chooses one branch."""
     if node.op == "*":
         return any(_switched_off(factor, condition, position) for factor in node.operands)
     return (
@@ -174,7 +174,7 @@ def _switched_off(node: Node, condition: Node, position: int) -> bool:
 
 
 def _finite(node: Node) -> bool:
-    """Return whether a value is a number whenever the states are."""
+    """Test for a value that is a number whenever the states are."""
     return not any(part.op in PARTIAL and part.varies for part in in_order([node]))
 
 

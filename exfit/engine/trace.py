@@ -218,7 +218,7 @@ def graph_of(*values: Signal) -> Graph | None:
 
 
 def is_zero(value: Signal) -> bool:
-    """Return whether a value is the number zero as it stands, whatever the run brings."""
+    """Test for the number zero as it stands, whatever the run brings."""
     if isinstance(value, Node):
         return value.constant == 0.0
     return isinstance(value, float) and value == 0.0

@@ -21,14 +21,14 @@ UNLIKELY, WEIGHTS = ", !prof !0", '!0 = !{!"branch_weights", i32 1, i32 100}\n'
 
 
 def _goes_into(product: Node, total: Node) -> bool:
-    """Return whether a node is a product that is computed in one operation with a sum of it."""
+    """Test for a product that is computed in one operation with a sum of it."""
     alike = product.varies == total.varies and product.wide == total.wide
     return product.op == "*" and alike
 
 
 @dataclass(frozen=True)
 class Shape:
-    """How many numbers one value holds, and how LLVM writes that."""
+    """The numbers that one value holds, and LLVM's type for them."""
 
     lanes: int
 
@@ -52,7 +52,7 @@ class Shape:
 
     @property
     def suffix(self) -> str:
-        """How an intrinsic of this type is named."""
+        """The ending of an intrinsic's name for this type."""
         return "f64" if self.lanes == 1 else f"v{self.lanes}f64"
 
 
@@ -119,7 +119,7 @@ class Writer:
         self.put(f"store {shape.type} {value}, ptr {where}, align 8")
 
     def prepare(self, targets: Sequence[Node], values: Values) -> None:
-        """Write what the targets need beyond ``values``, which grows."""
+        """Write the values of the targets into ``values``, with all that they need."""
         self.follow(self.plan(targets, values), values)
 
     def results(self, targets: Sequence[Node], values: Values, shape: Shape) -> list[str]:
@@ -131,7 +131,7 @@ class Writer:
         return plan(targets, known, self._branches)
 
     def _branches(self, node: Node) -> bool:
-        """Return whether what one side of a choice alone needs is computed apart."""
+        """Decide on computing apart the values that one side of a choice alone needs."""
         return node.op == "select" and node.varies
 
     def follow(self, steps: Plan, values: Values) -> None:
@@ -177,7 +177,7 @@ class Writer:
             )
 
     def _where_any(self, choice: Choice, position: int, values: Values) -> list[str]:
-        """Write what one branch needs, computed only where any of the sets takes it."""
+        """Write the values of one branch, computed only where any of the sets takes it."""
         shape, mark, before = self.narrow, len(self.lines), self.block
         bits = f"i{shape.lanes}"
         taken = self.let(f"bitcast {shape.of('i1')} {values[choice.condition]} to {bits}")
@@ -288,7 +288,7 @@ class Writer:
 
 
 def _costly(steps: Plan) -> bool:
-    """Return whether any of the steps takes long."""
+    """Look for a step that takes long."""
     return any(
         any(map(_costly, step.branches)) if isinstance(step, Choice) else step.op in COSTLY
         for step in steps

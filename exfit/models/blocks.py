@@ -111,7 +111,7 @@ def washout_or_lag(
 
 
 def is_curved(A1: Signal, A2: Signal) -> Signal:
-    """Return whether neither pole of 1 / (1 + s A1 + s^2 A2) is faster than ``SHORTEST``."""
+    """Test that neither pole of 1 / (1 + s A1 + s^2 A2) is faster than ``SHORTEST``."""
     return SHORTEST * larger(A1, SHORTEST) < A2
 
 
@@ -232,7 +232,7 @@ def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Sign
 
 
 def closed(error: Signal, gain: Signal, held: Signal, back: Signal) -> Signal:
-    """Return what is left of an error that a loop without a lag takes ``back`` y from.
+    """Close a loop without a lag: the error less ``back`` y.
 
     ``gain`` times what is left, plus ``held``, is y. A limit of either may be put on the result,
     since the loop is monotonous.
@@ -337,12 +337,12 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
 
 
 def zero(x: Signal) -> Signal:
-    """Return whether a value is 0, which in some data means: to be computed."""
+    """Test for a value of 0, which in some data means: to be computed."""
     return (x <= 0.0) & (x >= 0.0)
 
 
 class CommutatorStart(NamedTuple):
-    """What a commutator exciter finds at its start, and the VR that holds EFD there."""
+    """The start of a commutator exciter: the values computed there, and the VR that holds EFD."""
 
     KE: Signal
     VRMAX: Signal

@@ -83,7 +83,7 @@ class Counterpart(NamedTuple):
 
 
 def quantity(row: Parameter) -> str:
-    """Return what a parameter is, in words that are the same in all data sheets."""
+    """Name the quantity of a parameter in the same words for all data sheets."""
     meaning = row.meaning
     if meaning == LOADING and not row.free:
         return CEILING_LOADING
@@ -111,12 +111,12 @@ def counterparts(sheet: Sheet, source: Sheet) -> tuple[Counterpart, ...]:
 
 
 def computed_if_zero(row: Parameter) -> bool:
-    """Return whether a model computes a parameter at the start where it is given as 0."""
+    """Test for a parameter that the model computes at the start where it is given as 0."""
     return row.meaning.endswith(", or 0")
 
 
 def has_effect(row: Parameter, value: float) -> bool:
-    """Return whether a parameter acts at all at a value."""
+    """Test for any effect of a parameter at a value."""
     if row.symbol.endswith(("MAX", "MIN")):
         return abs(value) < OUT_OF_REACH
     return WITHOUT_EFFECT.get(quantity(row)) != value

@@ -48,26 +48,26 @@ def latch(sets: Signal, resets: Signal) -> Limited:
 
 
 def waiting_integral(u: Signal, KI: Signal, low: Signal, high: Signal) -> Signal:
-    """Return where the integral of a PI or PID waits whose input is not zero: at a limit."""
+    """Rest the integral of a PI or PID whose input is not zero at a limit."""
     return where(zero(KI), 0.0, where(KI * u > 0.0, high, low))
 
 
 def leaky_rest(u: Signal, leak: Signal, low: Signal, high: Signal) -> Signal:
-    """Return where an integral of ``u - leak x`` waits between its limits; at the floor for 0."""
+    """Rest an integral of ``u - leak x`` between its limits; at the floor for 0."""
     none = zero(leak)
     still = clip(u / where(none, 1.0, leak), low, high)
     return where(none, where(u > 0.0, high, low), still)
 
 
 def counting(current: Signal, p: Signal) -> Signal:
-    """Return how fast a timer of inverse time counts, without its feedback."""
+    """Compute the rate of a timer of inverse time, without its feedback."""
     ratio = current / p.ITFPU
     inverse = clip(p.K2 * (power(ratio, p.C2) - 1.0), p.VINVMIN, p.VINVMAX)
     return inverse + where(ratio > 1.0, p.FIXEDRU, p.FIXEDRD)
 
 
 def rate_of_reference(current: Signal, up_when: Signal, down_when: Signal, p: Signal) -> Signal:
-    """Return how fast the reference moves: down when the time is over, up when it is released."""
+    """Compute the rate of the reference: down when the time is over, up when it is released."""
     by_current = p.K1 * (power(current / p.ITFPU, p.C1) - 1.0)
     up, down = (where(p.SW1 > 0.5, by_current, fixed) for fixed in (p.KRU, p.KRD))
     return where(up_when, up, where(down_when, down, 0.0))

@@ -14,7 +14,7 @@ MOST_LAGS = 8  # of a ramp tracking filter of a stabiliser, M N
 
 
 class SearchRange(NamedTuple):
-    """How a fit of a bump test looks for a parameter: from ``low`` to ``high``, where units lie.
+    """The search of a bump test's fit for a parameter: from ``low`` to ``high``, where units lie.
 
     It is left out where the parameter that it ``needs`` is zero, as the lag of a term without its
     gain; where it equals the time that it must be ``unlike``, as a lead that its lag cancels; and
@@ -82,11 +82,11 @@ class Parameter(NamedTuple):
         return self.low, self.high
 
     def is_physical(self, value: float) -> bool:
-        """Return whether a value lies in the range of the sheet."""
+        """Test for a value in the range of the sheet."""
         return self.low <= value <= self.high
 
     def range_fault(self, value: float) -> str | None:
-        """Return why the equations exclude a value, None where they do not."""
+        """Explain a value that the equations exclude; None where they do not."""
         fault = magnitude_fault(value) if isfinite(value) else None
         if fault is not None:
             return fault
@@ -139,7 +139,7 @@ def not_searched(rows: Sheet, *symbols: str) -> Sheet:
 
 @dataclass(frozen=True)
 class DynamicsRecord:
-    """How a planner's file lists a model: the symbols of its constants (CONs) in their order.
+    """The entry of a model in a planner's file: the symbols of its constants (CONs) in their order.
 
     ``icons`` are the integers before or, where they are listed, among them, each a symbol and the
     only value that the model stands for, unless its sheet has the symbol; ``absent`` are symbols

@@ -54,7 +54,7 @@ def limited_inputs(u: Signal, p: Signal) -> tuple[Signal, Signal]:
 
 
 def accelerating(s: Signal, u: Signal, p: Signal, d: Signal, lags: int, N: Signal) -> Signal:
-    """Return what speed and power say of the integral of the accelerating power.
+    """Compute the integral of the accelerating power from speed and power.
 
     Its ramp tracking filter has room for so many ``lags``, N blocks (1 + sT8) / (1 + sT9)^M.
     """

@@ -17,13 +17,11 @@ from exfit.models.blocks import (
     clip,
     field_demand,
     lag,
-    larger,
     lead_lag,
     limited_integrator,
     limited_lag,
     rectifier,
     rectifier_supply,
-    smaller,
     washout,
 )
 from exfit.models.rows import shared
@@ -66,7 +64,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    vr = clip(smaller(larger(va, u.vuel), u.voel), p.VRMIN, p.VRMAX)
+    vr = clip(clip(va, u.vuel, u.voel), p.VRMIN, p.VRMAX)
     ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
     return rectifier(ve, p.KC * u.ifd)
 

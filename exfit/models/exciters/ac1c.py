@@ -19,16 +19,7 @@ InterPSS draw the same.
 
 from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
-from exfit.models.blocks import (
-    clip,
-    field_demand,
-    lag,
-    larger,
-    lead_lag,
-    limited_lag,
-    smaller,
-    washout,
-)
+from exfit.models.blocks import clip, field_demand, lag, lead_lag, limited_lag, washout
 from exfit.models.exciters import ac1a
 from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 
@@ -57,6 +48,6 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
     vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc - vf, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    efe = clip(smaller(larger(va, u.vuel), u.voel), p.EFEMIN, p.EFEMAX)
+    efe = clip(clip(va, u.vuel, u.voel), p.EFEMIN, p.EFEMAX)
     efd, d.VE = alternator(efe, vfe, s, u, p)
     return efd

@@ -27,13 +27,11 @@ from exfit.models.blocks import (
     field_ceiling,
     field_demand,
     lag,
-    larger,
     lead_lag,
     limited_integrator,
     limited_lag,
     rectifier,
     rectifier_supply,
-    smaller,
     washout,
 )
 from exfit.models.rows import shared
@@ -81,7 +79,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    gated = smaller(larger(p.KB * (va - p.KH * vfe), u.vuel), u.voel)
+    gated = clip(p.KB * (va - p.KH * vfe), u.vuel, u.voel)
     vr = clip(gated, p.VRMIN, p.VRMAX)
     ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, 0.0, vemax)
     return rectifier(ve, p.KC * u.ifd)

@@ -27,16 +27,7 @@ parameters that PowerWorld lists.
 
 from exfit.engine.trace import Signal
 from exfit.models.alternators import FLOOR, alternator
-from exfit.models.blocks import (
-    clip,
-    field_demand,
-    lag,
-    larger,
-    lead_lag,
-    limited_lag,
-    smaller,
-    washout,
-)
+from exfit.models.blocks import clip, field_demand, lag, lead_lag, limited_lag, washout
 from exfit.models.exciters import ac2a
 from exfit.models.sheet import OF_TWO_PROGRAMS, record, renamed
 
@@ -65,6 +56,6 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
     vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc - vf, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    gated = smaller(larger(p.KB * (va - p.KH * vfe), u.vuel), u.voel)
+    gated = clip(p.KB * (va - p.KH * vfe), u.vuel, u.voel)
     efd, d.VE = alternator(clip(gated, p.EFEMIN, p.EFEMAX), vfe, s, u, p)
     return efd

@@ -35,7 +35,6 @@ from exfit.models.blocks import (
     field_ceiling,
     field_demand,
     lag,
-    larger,
     lead_lag,
     limited_integrator,
     limited_lag,
@@ -43,7 +42,6 @@ from exfit.models.blocks import (
     pid,
     rectifier,
     rectifier_supply,
-    smaller,
     washout,
 )
 from exfit.models.exciters import ac3a
@@ -90,7 +88,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     error = u.vref + u.vs + u.vsum - vc
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
     vl, d.VL = lead_lag(vpid, s.VL, p.TC, p.TB)
-    gated = smaller(larger(vl, u.vuel), u.voel)
+    gated = clip(vl, u.vuel, u.voel)
     va, d.VA = limited_lag(gated - vf, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
     _, d.VE = limited_integrator(p.KR * efd * va - vfe, s.VE, p.TE, p.VEMIN, vemax)
     return efd

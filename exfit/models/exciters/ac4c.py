@@ -18,7 +18,7 @@ where the limit of the lag winds up.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller
+from exfit.models.blocks import clip, lag, lead_lag, limited_lag
 from exfit.models.exciters import ac4a
 from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record
 
@@ -45,7 +45,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vi = clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX)
     vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
-    gated = smaller(larger(vl, u.vuel), u.voel)
+    gated = clip(vl, u.vuel, u.voel)
     ceiling = p.VRMAX - p.KC * u.ifd
     efd, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, ceiling)
     return efd

@@ -26,13 +26,12 @@ the parameters that PowerWorld lists. The rectifier is that of PowerWorld 24 (vt
 from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import (
+    clip,
     field_demand,
     lag,
-    larger,
     lead_lag,
     limited_lag,
     rectifier_supply,
-    smaller,
     washout,
 )
 from exfit.models.exciters import ac1a, ac5a
@@ -68,7 +67,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vl, s.VF, p.KF, p.TF1)
     error = u.vref + u.vs + u.vsum - vc - vf
     va, d.VA = limited_lag(error, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    efd, d.VE = alternator(smaller(larger(va, u.vuel), u.voel), vfe, s, u, p)
+    efd, d.VE = alternator(clip(va, u.vuel, u.voel), vfe, s, u, p)
     return efd
 
 

@@ -29,7 +29,7 @@ state runs on.
 
 from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
-from exfit.models.blocks import clip, field_demand, lag, larger, lead_lag, limited_lead_lag, smaller
+from exfit.models.blocks import clip, field_demand, lag, lead_lag, limited_lead_lag
 from exfit.models.exciters import ac6a
 from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 
@@ -59,7 +59,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vk, d.VK = lead_lag(p.KA * (u.vref + u.vs + u.vsum - vc), s.VK, p.TK, p.TA)
     va, d.VA = limited_lead_lag(vk, s.VA, p.TC, p.TB, p.VAMIN, p.VAMAX)
     vf, d.VH = lead_lag(ac6a.limiter(vfe, p), s.VH, p.TJ, p.TH)
-    gated = smaller(larger(va, u.vuel), u.voel)
+    gated = clip(va, u.vuel, u.voel)
     efe = clip(gated - vf, u.vt * p.EFEMIN, u.vt * p.EFEMAX)
     efd, d.VE = alternator(efe, vfe, s, u, p)
     return efd

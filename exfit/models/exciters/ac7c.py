@@ -33,6 +33,7 @@ sample.
 from exfit.engine.trace import Signal
 from exfit.models.alternators import SUPPLY, alternator, supply
 from exfit.models.blocks import (
+    clip,
     field_demand,
     lag,
     larger,
@@ -41,7 +42,6 @@ from exfit.models.blocks import (
     pid,
     rectifier,
     rectifier_supply,
-    smaller,
     washout,
     where,
 )
@@ -88,9 +88,9 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     fed_back = rectifier(s.VE, p.KC * u.ifd)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
-    error = smaller(larger(u.vref + u.vs + u.vsum - vc - vf, u.vuel), u.voel)
+    error = clip(u.vref + u.vs + u.vsum - vc - vf, u.vuel, u.voel)
     vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
-    inner = smaller(larger(vr, u.vuel_out), u.voel_out) - p.KF1 * fed_back - p.KF2 * vfe
+    inner = clip(vr, u.vuel_out, u.voel_out) - p.KF1 * fed_back - p.KF2 * vfe
     va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
     vfd = larger(amplifier_supply(fed_back, u, vfe, p) * va, -p.KL * vfe)
     efd, d.VE = alternator(vfd, vfe, s, u, p)

@@ -27,16 +27,7 @@ and the same where no limiter acts. The supply's data are not those of a sample.
 
 from exfit.engine.trace import Signal
 from exfit.models.alternators import SUPPLY, alternator, supply
-from exfit.models.blocks import (
-    field_demand,
-    lag,
-    larger,
-    limited_lag,
-    pi_rest,
-    pid,
-    rectifier_supply,
-    smaller,
-)
+from exfit.models.blocks import clip, field_demand, lag, limited_lag, pi_rest, pid, rectifier_supply
 from exfit.models.exciters import ac8b
 from exfit.models.sheet import TWO_GATES, record
 
@@ -63,9 +54,9 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = smaller(larger(u.vref + u.vs + u.vsum - vc, u.vuel), u.voel)
+    error = clip(u.vref + u.vs + u.vsum - vc, u.vuel, u.voel)
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
-    gated = smaller(larger(vpid, u.vuel_out), u.voel_out)
+    gated = clip(vpid, u.vuel_out, u.voel_out)
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     efd, d.VE = alternator(vr * supply(u, vfe, p), vfe, s, u, p)
     return efd

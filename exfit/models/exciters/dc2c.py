@@ -20,7 +20,7 @@ them.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import larger, smaller
+from exfit.models.blocks import clip
 from exfit.models.commutators import (
     COMMUTATOR_SETPOINTS,
     COMMUTATOR_STATES,
@@ -60,5 +60,5 @@ rest = commutator_rest
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vl = regulator_input(s, u, p, d, u.vsum)
-    gated = smaller(larger(vl, u.vuel), u.voel)
+    gated = clip(vl, u.vuel, u.voel)
     return excited(gated, u.vt, s, p, d, p.VEMIN, p.VEMAX)

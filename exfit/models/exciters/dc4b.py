@@ -32,14 +32,13 @@ computes neither.) Not modelled: UEL or OEL at the summing point.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    clip,
     commutator_start,
     exciter,
     lag,
-    larger,
     limited_lag,
     pi_rest,
     pid,
-    smaller,
     washout,
 )
 from exfit.models.rows import shared
@@ -81,7 +80,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     error = u.vref + u.vs - vc - vf
     low, high = s.VRMIN0 / p.KA, s.VRMAX0 / p.KA
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD, low, high)
-    fed = u.vt * smaller(larger(vpid, u.vuel), u.voel)
+    fed = u.vt * clip(vpid, u.vuel, u.voel)
     vr, d.VR = limited_lag(fed, s.VR, p.KA, p.TA, u.vt * s.VRMIN0, u.vt * s.VRMAX0)
     efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, p.VEMIN)
     return efd

@@ -33,14 +33,13 @@ but for saturation (DC4B's; the SE of 1.54 at 4.8 lets no EFD pass 1.5) and KC1.
 from exfit.engine.trace import Signal
 from exfit.models.alternators import SUPPLY, supply
 from exfit.models.blocks import (
+    clip,
     exciter,
     exciter_demand,
     lag,
-    larger,
     limited_lag,
     pi_rest,
     pid,
-    smaller,
     washout,
 )
 from exfit.models.rows import shared
@@ -85,7 +84,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     error = u.vref + u.vs + u.vsum - vc - vf
     low, high = p.VRMIN / p.KA, p.VRMAX / p.KA
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, low, high)
-    gated = smaller(larger(vpid, u.vuel), u.voel)
+    gated = clip(vpid, u.vuel, u.voel)
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     vb = supply(u, exciter_demand(s.EFD, p.KE, p), p)
     efd, d.EFD = exciter(vr * vb, s.EFD, p.KE, p, p.VEMIN)

@@ -92,7 +92,7 @@ def both(T1: Signal, T2: Signal) -> tuple[Signal, Signal]:
 
 
 def filtered(va: Signal, x: Signal, v: Signal, p: Signal) -> tuple[Signal, Signal, Signal]:
-    """Return what both lags and the lead make of the PI, and the slopes of their states."""
+    """Filter the PI's output by both lags and the lead; return the slopes of their states too."""
     return second_order_lead(va, x, v, p.TA3, 0.0, *both(p.TA2, p.TA4))
 
 

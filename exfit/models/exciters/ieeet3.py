@@ -45,7 +45,7 @@ UNLOADED = 1e-12  # pu2: less is a source whose rectifier takes all of it
 
 
 def source(u: Signal, p: Signal) -> tuple[Signal, Signal]:
-    """Return whether the source supplies anything, and V4, what it supplies."""
+    """Compute V4 of the source, with whether it is above 0."""
     voltage, load = compound_source(u.vt, u.p, u.q, p.KP, p.KI), LOADING * u.ifd
     square = voltage * voltage - load * load
     return square > UNLOADED, sqrt(larger(square, UNLOADED))

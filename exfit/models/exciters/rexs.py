@@ -103,7 +103,7 @@ STATES = "VC VI VL1 VL2 VR VF VFL IFI VP VE"
 
 
 def led(vi: Signal, integral: Signal, first: Signal, second: Signal, p: Signal) -> Signal:
-    """Return what the PI and both lead-lags, whose states are given, make of the error."""
+    """Pass the error through the PI and both lead-lags, whose states are given."""
     vl1, _ = lead_lag(p.KVP * vi + integral, first, p.TC1, p.TB1)
     return lead_lag(vl1, second, p.TC2, p.TB2)[0]
 

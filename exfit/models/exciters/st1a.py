@@ -97,12 +97,12 @@ def leads(vi: Signal, first: Signal, second: Signal, p: Signal) -> Signal:
 
 
 def excess(u: Signal, p: Signal) -> Signal:
-    """Return what the field current limiter takes from the regulator's output."""
+    """Compute the part of the regulator's output that the field current limiter takes away."""
     return p.KLR * larger(u.ifd - p.ILR, 0.0)
 
 
 def gated(va: Signal, taken: Signal, gate: Gate, p: Signal) -> Signal:
-    """Return what is left of the regulator's output behind its limits, ``taken`` and a gate."""
+    """Limit the regulator's output, less ``taken``, and pass it through the gate."""
     return clip(clip(va, p.VAMIN, p.VAMAX) - taken, *gate)
 
 

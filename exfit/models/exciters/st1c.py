@@ -51,7 +51,7 @@ STATES = st1a.STATES
 
 
 def stabiliser_at_error(u: Signal, p: Signal) -> Signal:
-    """Return what the stabiliser adds to the voltage error; the rest it adds to VA."""
+    """Compute the stabiliser's part in the voltage error; the rest it adds to VA."""
     return where(p.VOS < 1.5, u.vs, 0.0)
 
 

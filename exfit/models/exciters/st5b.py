@@ -22,7 +22,7 @@ has the gate; while none acts they have no effect.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import Limited, clip, lag, larger, limited_lag, limited_lead_lag, smaller
+from exfit.models.blocks import Limited, clip, lag, limited_lag, limited_lead_lag
 from exfit.models.rows import shared
 from exfit.models.sheet import FREE, SearchRange, record, sheet
 
@@ -72,7 +72,7 @@ def fired(vl: Signal, s: Signal, u: Signal, p: Signal) -> tuple[Signal, Limited]
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = smaller(larger(u.vref - vc, u.vuel), u.voel) + u.vs
+    error = clip(u.vref - vc, u.vuel, u.voel) + u.vs
     times = p.TC1, p.TB1, p.TC2, p.TB2
     vl, d.VL1, d.VL2 = lead_lags(error, (s.VL1, s.VL2), times, p)
     efd, d.VE = fired(vl, s, u, p)

@@ -28,7 +28,7 @@ test unlimited.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, lead_lag, smaller
+from exfit.models.blocks import clip, lag, lead_lag
 from exfit.models.rows import shared
 from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
 
@@ -82,7 +82,7 @@ def regulated(reference: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
-    gated = smaller(larger(regulated(u.vref, s, u, p, d), u.vuel), u.voel)
+    gated = clip(regulated(u.vref, s, u, p, d), u.vuel, u.voel)
     efd = clip(gated, u.vt * p.VRMIN, u.vt * p.VRMAX)
     _, d.VF = lag(efd, s.VF, p.KIA, p.TIA)
     return efd

@@ -17,7 +17,7 @@ and OPAL-RT's models, written after PSS/E's, agree. Typical data are ST5B's.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, limited_lag, smaller
+from exfit.models.blocks import clip, lag, limited_lag
 from exfit.models.exciters import st5b
 from exfit.models.exciters.st5b import SHEET, STATES
 from exfit.models.sheet import record
@@ -30,7 +30,7 @@ RECORDS = (record("URST5T", "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC"),)
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = smaller(larger(u.vref + u.vsum - vc, u.vuel), u.voel) + u.vs
+    error = clip(u.vref + u.vsum - vc, u.vuel, u.voel) + u.vs
     times = p.TC1, p.TB1, p.TC2, p.TB2
     vl, d.VL1, d.VL2 = st5b.lead_lags(error, (s.VL1, s.VL2), times, p)
     vr = clip(p.KR * vl, p.VRMIN, p.VRMAX)

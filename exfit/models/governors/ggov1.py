@@ -187,7 +187,7 @@ def droop(pe: Signal, valve: Signal, p: Signal) -> Signal:
 
 
 def fuel_demand(error: Signal, least: Signal, s: Signal, p: Signal) -> Demand:
-    """Return what the PID demands, at most ``least``; ``error`` is that before its dead band.
+    """Compute the PID's demand, at most ``least``; ``error`` is that before its dead band.
 
     With Rselect = -2 demand and error wait for each other; that loop is solved here: it is
     monotonous, so that a limit holds there as it does here.
@@ -203,7 +203,7 @@ def fuel_demand(error: Signal, least: Signal, s: Signal, p: Signal) -> Demand:
 
 
 def dead_band(error: Signal, p: Signal) -> Signal:
-    """Return by how much an error leaves the dead band."""
+    """Take the dead band off an error."""
     return error - clip(error, -p.db, p.db)
 
 

@@ -166,7 +166,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signa
 def reference(
     s: Signal, u: Signal, p: Signal, d: Signal, v: Signal
 ) -> tuple[Signal, Signal, Signal]:
-    """Return whether the time is over, the reference of the current, and what the sides see."""
+    """Compute the state of the timer, the reference of the current, the inputs of both sides."""
     current, d.I = lag(stator_current(u), s.I, 1.0, p.TITSCL)
     t, iref = timed_reference(current, s, p, d, p.TSCL, v < p.VTRESET)
     active, d.IPREF = lag(u.p / u.vt, s.IPREF, p.KPREF, p.TIPOEL)

@@ -65,7 +65,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 
 def distance(u: Signal, p: Signal) -> Signal:
-    """Return by how much the machine is outside of the circle, negative inside."""
+    """Compute the distance of the machine from the circle, negative inside."""
     vuc = modulus(p.KUC * u.vt - u.q / u.vt, u.p / u.vt)
     return smaller(vuc, p.VUCMAX) - smaller(p.KUR * u.vt, p.VURMAX)
 

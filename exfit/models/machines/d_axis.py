@@ -56,12 +56,12 @@ def d_rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
 
 
 def curve(flux: Signal, p: Signal) -> Signal:
-    """Return what saturation adds to the field current: quadratic through both points."""
+    """Compute the field current of saturation: quadratic through both points."""
     return quadratic(flux, 1.0, p.S10, 1.2, p.S12).vx
 
 
 def power_curve(flux: Signal, p: Signal) -> Signal:
-    """Return what saturation adds to the field current: flux times a power of it (GENROE)."""
+    """Compute the field current of saturation: flux times a power of it (GENROE)."""
     none = p.S10 <= 0.0
     base = where(none, 1.0, p.S10)
     exponent = log(where(none, 1.0, p.S12) / base) / log(1.2)
@@ -69,7 +69,7 @@ def power_curve(flux: Signal, p: Signal) -> Signal:
 
 
 def along_axes(form: Signal, flux: Axes, p: Signal) -> Axes:
-    """Return what the saturation of the air-gap flux adds on both axes.
+    """Compute the part of the saturated air-gap flux on both axes.
 
     ``flux`` is the voltage behind X''. The q axis saturates less, as its reactance is smaller.
     """
@@ -88,5 +88,5 @@ def quadrature(form: Signal, vt: Signal, i_p: Signal, i_q: Signal, p: Signal) ->
 
 
 def unsaturated_quadrature(vt: Signal, i_p: Signal, i_q: Signal, p: Signal) -> Signal:
-    """Return that reactance where the q axis does not saturate: Xq."""
+    """Give the reactance of a q axis that does not saturate: Xq."""
     return p.Xq

@@ -25,7 +25,7 @@ class Axes(NamedTuple):
 
 
 class Source(NamedTuple):
-    """What the stator sees of a machine: a voltage behind a reactance on each axis."""
+    """A machine as its stator sees it: a voltage behind a reactance on each axis."""
 
     voltage: Axes
     xd: Signal
@@ -96,7 +96,7 @@ def not_rising(values: Mapping[str, float], *symbols: str) -> Faults:
 
 
 def d_axis_order(values: Mapping[str, float]) -> Faults:
-    """Yield what contradicts itself on a d axis with a damper.
+    """Find contradictions on a d axis with a damper.
 
     X'd = X''d is a damper that is not seen: its time constant may be anything, such as 999.
     """

@@ -63,7 +63,7 @@ def rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
 
 
 def faults(values: Mapping[str, float]) -> Faults:
-    """Yield what contradicts itself in the data sheet."""
+    """Find contradictions in the data sheet."""
     yield from descending(values, "Xd", "Xpd")
     yield from saturation_order(values)
 

@@ -109,7 +109,7 @@ def rest(form: Callable[..., Signal], v: Axes, i: Axes, p: Signal, x: Signal) ->
 
 
 def faults(order: Callable[..., Faults], values: Mapping[str, float]) -> Faults:
-    """Yield what contradicts itself in a data sheet of a round-rotor machine."""
+    """Find contradictions in a data sheet of a round-rotor machine."""
     yield from d_axis_order(values)
     yield from not_rising(values, "Xq", "Xpq")
     yield from winding_time(values)

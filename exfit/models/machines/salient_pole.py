@@ -106,7 +106,7 @@ def rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
 
 
 def faults(values: Mapping[str, float]) -> Faults:
-    """Yield what contradicts itself in a data sheet of a salient-pole machine."""
+    """Find contradictions in a data sheet of a salient-pole machine."""
     yield from d_axis_order(values)
     yield from descending(values, "Xq", "Xppd")
 

@@ -79,7 +79,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 
 def numerator(d: Signal, p: Signal) -> Signal:
-    """Return what A5 and A6 add to the output of both filters, from the slopes of their states."""
+    """Compute the part of A5 and A6 in the output of both filters, from the states' slopes."""
     lagged, curved = p.A3 >= SHORTEST, is_curved(p.A3, p.A4)
     filtered = (p.A1 >= SHORTEST) | is_curved(p.A1, p.A2)
     slope = where(curved | lagged, d.V2, d.V1)

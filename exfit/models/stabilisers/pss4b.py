@@ -150,7 +150,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 
 def transduced(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
-    """Return what the bands of low and intermediate frequency get, and that of high frequency."""
+    """Compute the inputs of the bands: of low and intermediate frequency, and of high frequency."""
     low, d.XLI, d.YLI = second_order_lead(u.vsi1, s.XLI, s.YLI, p.DLI, p.CLI, p.BLI, p.ALI)
     low, d.XLI1, d.YLI1 = notch(low, s.XLI1, s.YLI1, p.BWLI1, p.WLI1)
     low, d.XLI2, d.YLI2 = notch(low, s.XLI2, s.YLI2, p.BWLI2, p.WLI2)
