@@ -19,7 +19,7 @@ from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import open_circuit
 from exfit.plants.playback import DRIVING, playback
 from exfit.plants.unit import UnitOnLoad
-from exfit.records.channel_recognition import guess_signals
+from exfit.records.channel_names import guess_signals
 from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 
 MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["quadratic"]

@@ -116,7 +116,7 @@ def figures_of(t: Array, curves: Array, initial: Array) -> dict[str, Array]:
 
 
 def _first_crossings(t: Array, way: Array, level: float) -> Array:
-    """Return when each response (K, M) first reaches a level, nan where it never does."""
+    """Times at which responses (K, M) first reach a level, nan where they never do."""
     above = way >= level
     k, row = np.argmax(above, axis=1), np.arange(len(way))
     before = np.maximum(k - 1, 0)
@@ -125,7 +125,7 @@ def _first_crossings(t: Array, way: Array, level: float) -> Array:
 
 
 def _settled(t: Array, way: Array) -> Array:
-    """Return when each response (K, M) is last outside its band, nan where it ends there."""
+    """Times at which responses (K, M) are last outside their bands, nan where they end there."""
     outside = np.abs(way - 1.0) > BAND
     last, row = len(t) - 1 - np.argmax(outside[:, ::-1], axis=1), np.arange(len(way))
     after = np.minimum(last + 1, len(t) - 1)
@@ -142,7 +142,7 @@ def _between(
     after: NDArray[np.intp],
     level: Array,
 ) -> Array:
-    """Return when the line through two samples of each response passes a level."""
+    """Times at which the lines through two samples of each response pass a level."""
     low, high = way[row, before], way[row, after]
     with np.errstate(all="ignore"):
         share = np.clip((level - low) / (high - low), 0.0, 1.0)

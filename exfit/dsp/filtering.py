@@ -108,7 +108,7 @@ class Filtering:
         return np.asarray(simulated[0] + rise / self.averaged.window)
 
     def apply(self, samples: Array) -> Array:
-        """Return what is compared of a signal (M,), one number for each kept sample."""
+        """Filter a signal (M,) as it is compared, one number for each kept sample."""
         if self._nothing_to_do:
             return samples
         whole = self._bridged(samples)
@@ -198,7 +198,7 @@ class Filtering:
 
 
 def outliers(time: Array, samples: Array, limit: float, scatter: float | None = None) -> Mask:
-    """Return which samples (M,) lie off the line through the medians of their neighbours.
+    """Find the samples (M,) that lie off the line through the medians of their neighbours.
 
     The line is the repeated median over seven samples, which three spikes do not move and along
     which a steep rise is no spike. Off is farther than ``limit`` robust standard deviations: the
@@ -230,7 +230,7 @@ def outliers(time: Array, samples: Array, limit: float, scatter: float | None = 
 
 
 def _from_lines(time: Array, samples: Array) -> Array:
-    """Return how far each sample of each row lies from the row's repeated-median line."""
+    """Distance of each sample of each row from the row's repeated-median line."""
     others = [np.flatnonzero(np.arange(OUTLIER_WINDOW) != k) for k in range(OUTLIER_WINDOW)]
     slopes = [
         median((samples[:, rest] - samples[:, [k]]) / (time[:, rest] - time[:, [k]]), axis=1)

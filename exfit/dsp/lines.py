@@ -82,7 +82,7 @@ def cosine_and_sine(frequency: float, time: Array) -> Array:
 
 
 def share_by_chance(share: float, count: int, tested: int) -> float:
-    """Return how probably one of the ``tested`` frequencies has this share of white noise.
+    """Probability that one of the ``tested`` frequencies has this share of white noise.
 
     ``count`` frequencies share its power. It is the first term of Fisher's sum, which is never too
     small, and too large by less than its square.

@@ -56,7 +56,7 @@ def _quantum(samples: Array) -> float:
 
 
 def drift_at_rest(samples: Array) -> float:
-    """Return by how much the second half of samples at rest (M,) is off the first; 0 by chance."""
+    """Difference between the second and the first half of samples at rest (M,); 0 by chance."""
     half = len(samples) // 2
     if half < FEWEST_IN_HALF:
         return 0.0

@@ -54,7 +54,7 @@ def spikes(time: Array, samples: Array, scatter: float, limit: float) -> Places:
 
 
 def _are_alone(samples: Array, outlying: Places, largest_change: float) -> bool:
-    """Return whether each outlier, or pair of them, returns to the level that it left."""
+    """Check whether each outlier, or pair of them, returns to the level that it left."""
     for run in np.split(outlying, np.flatnonzero(np.diff(outlying) > 1) + 1):
         before = samples[max(run[0] - LEVEL_SAMPLES, 0) : run[0]]
         after = samples[run[-1] + 1 : run[-1] + 1 + LEVEL_SAMPLES]
@@ -117,7 +117,7 @@ def stuck(samples: Array) -> tuple[tuple[int, int], ...]:
 
 
 def _repeats(samples: Array, starts: Places, lengths: Places) -> float:
-    """Return how probably a sample repeats the one before, the longest run left out."""
+    """Probability that a sample repeats the one before, the longest run left out."""
     longest = int(np.argmax(lengths))
     others = np.delete(samples, slice(starts[longest], starts[longest] + lengths[longest]))
     _, counts = np.unique(others, return_counts=True)
@@ -157,7 +157,7 @@ def _excerpt(samples: Array) -> Array:
 
 
 def _near(places: Places, count: int, far: int) -> NDArray[np.bool_]:
-    """Return which of ``count`` samples lie no farther than ``far`` from any of the places."""
+    """Mask of ``count`` samples: those that lie no farther than ``far`` from any of the places."""
     edges = np.zeros(count + 1, np.int64)
     np.add.at(edges, np.maximum(places - far, 0), 1)
     np.add.at(edges, np.minimum(places + far + 1, count), -1)

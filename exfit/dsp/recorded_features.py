@@ -214,7 +214,7 @@ def _smoothing(
 
 
 def _is_noise(left: Array) -> bool:
-    """Return whether what is left scatters from sample to sample as it does altogether."""
+    """Check whether what is left scatters from sample to sample as it does altogether."""
     return float(np.std(left)) < LEFT_IS_NOISE * noise(left)
 
 
@@ -326,7 +326,7 @@ def _with_errors(own: Features, drawn: Mapping[str, Array], between_samples: flo
 
 
 def _of_two_kinds(draws: Array, half: float) -> bool:
-    """Return whether the middle of draws has a gap that is wide beside the error they give."""
+    """Check for a gap in the middle of draws that is wide beside the error they give."""
     low, high = (round(share * len(draws)) for share in MIDDLE)
     middle = np.sort(draws)[low:high]
     return len(middle) > 1 and float(np.max(np.diff(middle))) > MOST_APART * half

@@ -109,7 +109,7 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
 
 
 def _is_even(time: Array, rate: float) -> bool:
-    """Return whether instants lie on an even clock, up to the rounding of their stamps."""
+    """Check whether instants lie on an even clock, up to the rounding of their stamps."""
     away = time - np.linspace(time[0], time[-1], len(time))
     return float(np.max(np.abs(away))) * rate <= OFF_CLOCK
 
@@ -125,7 +125,7 @@ def _finer_share(least: float) -> Fraction:
 
 
 def _spline(time: Array, signal: Array, at: Array) -> Array:
-    """Return what a cubic spline through the samples gives at other instants."""
+    """Interpolate the samples at other instants by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(time, signal)(at))

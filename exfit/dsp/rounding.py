@@ -18,7 +18,7 @@ NEGLIGIBLE = 1e-4  # of the variance of rounding
 
 
 def is_coarse(step: float, scatter: float) -> bool:
-    """Return whether the errors of rounding to a step repeat, beside errors of this scatter."""
+    """Check whether the errors of rounding to a step repeat, beside errors of this scatter."""
     return step > COARSE * scatter
 
 

@@ -51,12 +51,12 @@ class Sampling:
 
     @property
     def even(self) -> bool:
-        """Return whether the steps are alike, gaps aside."""
+        """Whether the steps are alike, gaps aside."""
         return max(self.largest - self.step, self.step - self.smallest) <= MOST_UNEVEN * self.step
 
 
 def present_samples(time: Array, samples: Array) -> tuple[Array, Array]:
-    """Return those instants and samples (M,) of a signal that are not missing (nan)."""
+    """Select the instants and samples (M,) of a signal that are not missing (nan)."""
     present = np.isfinite(samples)
     return (time, samples) if present.all() else (time[present], samples[present])
 
@@ -78,13 +78,13 @@ def even_step(time: Array, purpose: str) -> float:
 
 
 def increasing(time: Array) -> Mask:
-    """Return which stamps (M,) exceed all before them."""
+    """Mask of the stamps (M,) that exceed all before them."""
     before = np.concatenate([[-np.inf], np.maximum.accumulate(time)[:-1]])
     return np.asarray(time > before)
 
 
 def sampling_of(time: Array) -> Sampling:
-    """Return how a clock (M,) in s runs; raises ValueError for fewer than two samples."""
+    """Examine the clock (M,) of a record, in s; raises ValueError for fewer than two samples."""
     if len(time) < FEWEST_STAMPS:
         raise ValueError(f"{len(time)} samples; at least {FEWEST_STAMPS} are needed")
     forward = increasing(time)

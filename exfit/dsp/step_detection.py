@@ -386,7 +386,7 @@ def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) 
 
 
 def _rises(way: Array, scatter: float) -> Iterator[tuple[int, int]]:
-    """Yield where less and less of a rise begins and ends, given the ``way`` (M,) from rest."""
+    """Give the beginning and the end of less and less of a rise, by the ``way`` (M,) from rest."""
     size = float(np.max(way))
     far = max(COMPARED_RISE * size, min(LEAST_RISE * scatter, size))
     while True:

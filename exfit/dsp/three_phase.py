@@ -172,7 +172,7 @@ def _waveform_step(time: Array) -> float:
 
 
 def _frequency(clock: Array, vector: Complex) -> float:
-    """Return how fast a vector (M,) turns, Hz."""
+    """Frequency of a vector (M,) that turns, Hz."""
     middle = clock - np.mean(clock)
     return float(middle @ np.unwrap(np.angle(vector)) / (middle @ middle) / (2.0 * pi))
 
@@ -249,7 +249,7 @@ def _check_balance(time: Array, positive: Array, negative: Array) -> None:
 
 
 def _drift(positive: Complex, step: float, reach: int) -> Array:
-    """Return by how much the frequency (Hz) about each sample differs from the mean."""
+    """Deviation of the frequency (Hz) about each sample from the mean."""
     phase = np.unwrap(np.angle(positive))
     reach = min(reach, (len(phase) - 1) // 2)
     inner = (phase[2 * reach :] - phase[: len(phase) - 2 * reach]) / (4.0 * pi * reach * step)

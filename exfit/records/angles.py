@@ -1,5 +1,6 @@
-"""Angles of phasors: from degrees or radians as recorded, wrapped or not, to one that is smooth."""
+"""Angles of phasors: from degrees or radians, wrapped or not, to one that is smooth; its faults."""
 
+from collections.abc import Iterator
 from math import pi
 
 import numpy as np
@@ -9,6 +10,10 @@ Array = NDArray[np.float64]
 
 TURNS = {"deg": 360.0, "rad": 2.0 * pi}  # of a turn in a unit
 MOST_BETWEEN_SAMPLES = 0.25  # turns: an angle that moves farther may have been wrapped or not
+LEAST_MOVE = 2e-3  # Hz, rms: with less neither shows the other
+SMOOTHED_OVER = 0.2  # s
+LIKE_FREQUENCY = (0.5, 2.0)  # times what the frequency moves by
+ALIKE = 0.5  # correlation
 
 
 class AngleError(ValueError):
@@ -50,7 +55,7 @@ def unwrapped(angle: Array) -> Array:
 
 
 def wraps(angle: Array, unit: str) -> int:
-    """Return how often angles (M,) jump by most of a turn of their unit."""
+    """Count the jumps of angles (M,) by most of a turn of their unit."""
     jumps = np.abs(np.diff(angle[np.isfinite(angle)]))
     return int(np.count_nonzero(jumps > 0.75 * TURNS[unit]))
 
@@ -64,3 +69,46 @@ def unit_by_range(angle: Array) -> str | None:
         return "deg"
     largest = float(np.max(np.abs(angle), initial=0.0, where=np.isfinite(angle)))
     return "rad" if largest <= TURNS["rad"] and wraps(angle, "rad") else None
+
+
+def angle_findings(time: Array, name: str, angle: Array, frequency: Array | None) -> Iterator[str]:
+    """Find what is wrong with an angle (M,) in rad beside the recorded frequency (M,) in Hz."""
+    try:
+        smooth = unwrapped(angle)
+    except AngleError as fault:
+        yield f"{name}: at {time[fault.row]:.6g} s {fault}"
+        return
+    if frequency is None:
+        return
+    present = np.isfinite(smooth) & np.isfinite(frequency)
+    t, f = time[present], _smoothed(time[present], frequency[present])
+    rate = _smoothed(t, np.gradient(smooth[present], t) / (2.0 * pi))
+    f, rate = f - np.mean(f), rate - np.mean(rate)
+    sizes = [float(np.sqrt(np.mean(y * y))) for y in (rate, f)]
+    if max(sizes) < LEAST_MOVE:
+        return
+    ratio = sizes[0] / max(sizes[1], 1e-12)
+    alike = float(rate @ f) / max(len(f) * sizes[0] * sizes[1], 1e-300)
+    low, high = LIKE_FREQUENCY
+    if not low <= ratio <= high:
+        yield (
+            f"{name}: turns {ratio:.3g} times as fast as the recorded frequency moves, not {low:g} "
+            f"... {high:g}: degrees taken for radians are 57.3 times as fast, mHz for Hz 1000 times"
+        )
+    elif alike < -ALIKE:
+        yield (
+            f"{name}: turns against the recorded frequency (correlation {alike:.2f}): scale: -1 on "
+            "the channel angle turns it"
+        )
+    elif alike < ALIKE:
+        yield (
+            f"{name}: does not turn as the recorded frequency moves (correlation {alike:.2f}, not "
+            f"above {ALIKE:g}): is it the angle of the same voltage, and not relative to another?"
+        )
+
+
+def _smoothed(time: Array, samples: Array) -> Array:
+    """Return a signal (M,) averaged over a short time about each instant."""
+    width = max(round(SMOOTHED_OVER / float(np.median(np.diff(time)))), 1)
+    padded = np.pad(samples, (width // 2, width - 1 - width // 2), mode="edge")
+    return np.convolve(padded, np.ones(width) / width, "valid")

@@ -4,8 +4,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from exfit.records.channel_inspection import AT_REST_PU, InspectedChannel, InspectedPhases
-from exfit.records.channel_names import CONTROL_ERROR, Clarity, NameReading, read_name
-from exfit.records.channel_recognition import Guess, guess_signals
+from exfit.records.channel_names import (
+    CONTROL_ERROR,
+    Clarity,
+    Guess,
+    NameReading,
+    guess_signals,
+    read_name,
+)
 from exfit.records.field_base import PERCENT
 from exfit.records.steps import RecordedStep
 from exfit.records.units import quantity_of
@@ -79,14 +85,14 @@ def _with(channel: InspectedChannel, identities: Mapping[str, Identity]) -> Insp
 
 
 def _is_control_error(channel: InspectedChannel) -> bool:
-    """Return whether a channel that may be a control error rests at zero, as one does."""
+    """Check whether a channel that may be a control error rests at zero, as one does."""
     others = read_name(channel.name, channel.unit).others
     swing = channel.high - channel.low
     return CONTROL_ERROR in others and abs(channel.level) < LARGEST_ERROR * swing
 
 
 def _identity(channel: InspectedChannel, guess: Guess, moves: bool, tested: bool) -> Identity:
-    """Return what a channel is taken for; ``tested`` says whether the record shows any step."""
+    """Identify a channel; ``tested`` says whether the record shows any step."""
     reading, signal = guess.reading, guess.signal
     still = tested and not moves and signal in RESPONDING
     question = "; ".join(_questions(channel, guess, still))
@@ -96,7 +102,7 @@ def _identity(channel: InspectedChannel, guess: Guess, moves: bool, tested: bool
 
 
 def _reasons(channel: InspectedChannel, reading: NameReading, moves: bool) -> Iterator[str]:
-    """Yield why a channel is taken for its signal: name, unit, level, shape."""
+    """Give the reasons for the signal of a channel: name, unit, level, shape."""
     if reading.why:
         yield reading.why
     if quantity_of(channel.unit):
@@ -130,7 +136,7 @@ def _questions(channel: InspectedChannel, guess: Guess, still: bool) -> Iterator
 
 
 def _looks_terminal(channel: InspectedChannel) -> bool:
-    """Return whether the unit or the level of a voltage is that of a generator's terminals."""
+    """Check unit and level of a voltage for those of a generator's terminals."""
     low, high = AT_REST_PU
     level = channel.level / PERCENT if channel.unit == "%" else channel.level
     return channel.unit == "kV" or (channel.unit in ("%", "pu", None) and low <= level <= high)
@@ -139,7 +145,7 @@ def _looks_terminal(channel: InspectedChannel) -> bool:
 def _open_question(
     channel: InspectedChannel, taken: Collection[str], candidates: Mapping[str, InspectedChannel]
 ) -> str:
-    """Return what must be asked about a channel that is taken for no signal, or nothing."""
+    """Question about a channel that is taken for no signal, "" for none."""
     reading = read_name(channel.name, channel.unit)
     if reading.others and not {*reading.others} & {*taken}:
         return f"is it {' or '.join(reading.others)}? {reading.why} fits either"

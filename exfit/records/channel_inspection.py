@@ -67,7 +67,7 @@ class InspectedChannel:
 
     @property
     def constant(self) -> bool:
-        """Return whether it never changes."""
+        """Whether it never changes."""
         return self.low == self.high
 
     @property
@@ -171,7 +171,7 @@ def inspect_channel(
     own_steps: ChannelSteps,
     steps: Sequence[RecordedStep],
 ) -> InspectedChannel:
-    """Return what the samples (M,) of one channel show.
+    """Inspect the samples (M,) of one channel.
 
     ``unit`` is that of the channel and its source, ``own_steps`` are those that it shows, ``steps``
     those of the test.
@@ -209,7 +209,7 @@ def inspect_channel(
 
 
 def _drift(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:
-    """Return how far a channel moves before the first step, 0 by chance or where that is little."""
+    """Measure the drift of a channel before the first step, 0 by chance or where it is little."""
     if not steps or steps[0].from_start:
         return 0.0
     drift = drift_at_rest(samples[time < _rests(time, steps)[0][1]])
@@ -217,7 +217,6 @@ def _drift(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:
 
 
 def _rests(time: Array, steps: Sequence[RecordedStep]) -> list[tuple[float, float]]:
-    """Return where a record rests: before its first step, and long after its last."""
     first, last = float(time[0]), float(time[-1])
     if not steps:
         return [(first, last)]

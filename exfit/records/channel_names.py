@@ -1,7 +1,7 @@
-"""What the name and the unit of a recorder's column show: which signal it is, and how surely."""
+"""The signal of each column by its name and unit, and how surely it is that signal."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -35,6 +35,13 @@ POWER_FACTORY_VARIABLES = {
     "ut": "vt", "ve": "efd", "ie": "ifd", "pgt": "p", "qgt": "q", "usetp": "vref",
     "xspeed": "speed",
 }  # fmt: skip
+IN_TURN = sorted((row for row in ROWS if row.words), key=lambda row: row.turn)
+TRIPLES = (
+    ("l1", "l2", "l3"), ("12", "23", "31"), ("ab", "bc", "ca"), ("rs", "st", "tr"),
+    ("a", "b", "c"), ("r", "s", "t"), ("1", "2", "3"),
+)  # fmt: skip
+LINE_TO_LINE = TRIPLES[1:4]
+OF_VOLTAGE = re.compile(r"^(u|v|.*volt|.*spannung)")
 
 
 class Clarity(IntEnum):
@@ -64,7 +71,7 @@ class NameReading:
 
 
 def read_name(name: str, unit: str | None) -> NameReading:
-    """Return what a column is by its name and unit."""
+    """Read the name and the unit of a column for the signal that it is."""
     program = _of_program(name)
     if program is not None:
         return program
@@ -128,7 +135,7 @@ def _stabiliser(own: NameReading, kinds: Mapping[str, str]) -> NameReading:
 
 
 def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
-    """Return what the words for a quantity and for a place show together."""
+    """Read the words for a quantity and for a place together."""
     if quantity in POWERS:
         return _power(kinds, quantity)
     place = next((place for place in ("field", "stator") if place in kinds), "")
@@ -142,7 +149,7 @@ def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
 
 
 def _without_place(kinds: Mapping[str, str]) -> NameReading:
-    """Return what a word for a quantity shows by itself."""
+    """Read a word for a quantity by itself."""
     if "voltage" in kinds and "current" not in kinds:
         return NameReading("vt", Clarity.QUANTITY, _named(kinds["voltage"]))
     if "current" in kinds and "voltage" not in kinds:
@@ -197,7 +204,7 @@ def _own(words: tuple[str, ...]) -> NameReading | None:
 
 
 def _of_program(name: str) -> NameReading | None:
-    """Return what a channel of a planning program is, by that program's names."""
+    """Read the name of a channel by the names that planning programs give."""
     text = bare(name).strip()
     channel = PSSE.fullmatch(text)
     if channel is not None:
@@ -213,7 +220,7 @@ def _of_program(name: str) -> NameReading | None:
 
 
 def _quantity(kinds: Mapping[str, str]) -> str | None:
-    """Return what a name says to be measured; None where it does not, or says two things."""
+    """Find the quantity that a name says to be measured; None for none, or two."""
     for quantity in reversed(POWERS):  # a reactive power is none that is active
         if quantity in kinds:
             return quantity
@@ -227,7 +234,7 @@ def _row(quantity: str, place: str) -> SignalRow | None:
 
 
 def _fits(unit: str | None, row: SignalRow) -> bool:
-    """Return whether numbers in a unit can be a signal."""
+    """Check whether numbers in a unit can be a signal."""
     quantity = quantity_of(unit)
     if quantity is None:
         turning = row.symbol == "speed" and unit in OF_SPEED
@@ -237,3 +244,78 @@ def _fits(unit: str | None, row: SignalRow) -> bool:
 
 def _named(*words: str) -> str:
     return f"its name: {' '.join(words)}"
+
+
+@dataclass(frozen=True)
+class Guess:
+    """The signal that a column seems to be by its name and unit, and the columns it shares it with.
+
+    ``rivals`` are columns whose names show the same signal as clearly.
+    """
+
+    reading: NameReading
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def signal(self) -> str:
+        """The signal."""
+        return str(self.reading.signal)
+
+
+def guess_signals(
+    names: Sequence[str], units: Mapping[str, str], moving: Collection[str] = ()
+) -> dict[str, Guess]:
+    """Return the signals that columns seem to be, each signal once, by the clearest name.
+
+    Of equally clear names the columns that are ``moving`` with the test come first. Where several
+    remain that have no more than a quantity in common, none of them is taken.
+    """
+    readings = {name: read_name(name, units.get(name)) for name in names}
+    guesses: dict[str, Guess] = {}
+    for row in IN_TURN:
+        ranked = [
+            ((reading.clarity, reading.order, name not in moving), name)
+            for name, reading in readings.items()
+            if reading.signal == row.symbol
+        ]
+        if not ranked:
+            continue
+        first = min(rank for rank, _ in ranked)
+        name, *rivals = (name for rank, name in ranked if rank == first)
+        if not rivals or readings[name].clarity < Clarity.QUANTITY:
+            guesses[name] = Guess(readings[name], tuple(rivals))
+    return guesses
+
+
+def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
+    """Return the columns that are the three phases of a voltage: Ua Ub Uc, UL1 UL2 UL3, U12 ..."""
+    groups: list[tuple[str, ...]] = []
+    by_lower_case = {name.lower(): name for name in names}
+    for name in names:
+        for triple in triples(name, by_lower_case):
+            quantities = {quantity_of(units.get(column)) for column in triple}
+            voltage = quantities == {"voltage"} or (
+                quantities == {None} and OF_VOLTAGE.match(bare(name).lower())
+            )
+            if voltage and not any({*triple} & {*group} for group in groups):
+                groups.append(triple)
+    return tuple(groups)
+
+
+def connection_of(columns: Sequence[str]) -> str:
+    """Return the connection of three recorded voltages, by their names: U12, Uab, URS ..."""
+    lowered = [column.lower() for column in columns]
+    for marks in LINE_TO_LINE:
+        if all(mark in name for mark, name in zip(marks, lowered, strict=True)):
+            return "phase-to-phase"
+    return "phase-to-ground"
+
+
+def triples(name: str, by_lower_case: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
+    """Yield the columns that differ from one in the mark of the phase alone."""
+    text = name.lower()
+    for marks in TRIPLES:
+        for at in (match.start() for match in re.finditer(re.escape(marks[0]), text)):
+            phases = [text[:at] + mark + text[at + len(marks[0]) :] for mark in marks]
+            if at > 0 and all(phase in by_lower_case for phase in phases):
+                yield tuple(by_lower_case[phase] for phase in phases)

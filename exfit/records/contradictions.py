@@ -15,7 +15,7 @@ CERTAIN_CHANGE = (0.01, 6.0)  # of the level and times the noise: a change whose
 def contradictions(
     channels: Sequence[InspectedChannel], steps: Sequence[RecordedStep]
 ) -> Iterator[str]:
-    """Yield what contradicts itself in the channels of a file, in sentences."""
+    """Find the contradictions between the channels of a file, in sentences."""
     by_signal = {channel.signal: channel for channel in channels if channel.signal}
     voltage = by_signal.get("vt")
     for step in steps:
@@ -62,7 +62,7 @@ def _disputes(
 
 
 def size_in_words(size: float) -> str:
-    """Return why a step of the reference (pu) is none that a regulator is tested with."""
+    """Describe a step of the reference (pu) as too large for a test."""
     return (
         f"{size:+.4g} pu is {100.0 * size:+.4g} % of rated voltage, beyond "
         f"{100.0 * LARGEST_STEP:g} %: no regulator is tested so; 5 % is 0.05 pu"
@@ -102,7 +102,7 @@ def _opposite(
 def _moved_with(
     voltage: InspectedChannel, channel: InspectedChannel, step: RecordedStep, sign: float
 ) -> bool:
-    """Return whether a channel certainly moves as the voltage does, or against it (-1)."""
+    """Check whether a channel certainly moves as the voltage does, or against it (-1)."""
     size = step.sizes.get(channel.name, 0.0)
     return _certain(channel, size) and sign * size * step.sizes.get(voltage.name, 0.0) > 0.0
 

@@ -28,14 +28,14 @@ class ScaleRange:
 
 
 def is_on_load(channels: Sequence[InspectedChannel]) -> bool:
-    """Return whether a channel shows active power at rest, or the record that load is rejected."""
+    """Check for active power at rest in a channel, or for a record of a load rejection."""
     power = _of(channels, "p")
     rejected = any(channel.rejected_load for channel in channels)
     return rejected or (power is not None and shows_power(power))
 
 
 def shows_power(power: InspectedChannel) -> bool:
-    """Return whether a channel of active power shows any at rest."""
+    """Check for power at rest in a channel of active power."""
     return abs(power.level) > max(ON_LOAD, CERTAIN_POWER * power.noise)
 
 
@@ -55,7 +55,7 @@ def scale_to_find(
 
 
 def base_findings(channels: Sequence[InspectedChannel]) -> Iterator[str]:
-    """Yield what contradicts that field voltage and current are in per unit of the air-gap line."""
+    """Find contradictions to a field voltage and current in per unit of the air-gap line."""
     in_range = {}
     for signal in FIELD:
         channel = _of(channels, signal)
@@ -115,7 +115,7 @@ def _voltage(channels: Sequence[InspectedChannel]) -> float:
 
 
 def _range(channels: Sequence[InspectedChannel]) -> tuple[float, float]:
-    """Return where field voltage and current rest, pu of the air-gap line."""
+    """Range in which field voltage and current rest, pu of the air-gap line."""
     reactive = _of(channels, "q")
     shares = WITHOUT_LOAD
     if is_on_load(channels):

@@ -13,8 +13,7 @@ from exfit.dsp.jumps import rest_end
 from exfit.dsp.quality import mains_frequency
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
-from exfit.records.angle_findings import angle_findings
-from exfit.records.angles import in_radians
+from exfit.records.angles import angle_findings, in_radians
 from exfit.records.channel_identity import identified
 from exfit.records.channel_inspection import (
     PLACES_LISTED,
@@ -22,13 +21,13 @@ from exfit.records.channel_inspection import (
     InspectedPhases,
     inspect_channel,
 )
-from exfit.records.channel_recognition import guess_signals, three_phases
+from exfit.records.channel_names import guess_signals, three_phases
 from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
 from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
 from exfit.records.formats import PLAY_IN
 from exfit.records.formats.memory import TooLargeError
-from exfit.records.formats.table import Table, column_error, listed, refuse_uneven
+from exfit.records.formats.table import RecordTable, column_error, listed, refuse_uneven
 from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
@@ -163,9 +162,9 @@ class Inspection:
 
 
 def inspect(
-    table: Table, clock: Sequence[str] | None = None, unit: str | None = None
+    table: RecordTable, clock: Sequence[str] | None = None, unit: str | None = None
 ) -> Inspection:
-    """Return what a recorder's file holds.
+    """Inspect a recorder's file: its clock, its channels and their faults, the steps of the test.
 
     Args:
         table: the file.
@@ -213,7 +212,7 @@ def inspect(
     )
 
 
-def _find_clock(table: Table, columns: Sequence[str] | None, unit: str | None) -> Clock:
+def _find_clock(table: RecordTable, columns: Sequence[str] | None, unit: str | None) -> Clock:
     """Return the clock of a file; raises RecordError where no column seems to hold the time."""
     columns = tuple(columns or table.clock)
     if not columns:
@@ -223,7 +222,7 @@ def _find_clock(table: Table, columns: Sequence[str] | None, unit: str | None) -
     return Clock(columns, unit)
 
 
-def _stamps(table: Table, clock: Clock) -> Array:
+def _stamps(table: RecordTable, clock: Clock) -> Array:
     """Return the time (M,) in s, which need not increase."""
     stamps = table.instants(clock.columns, clock.unit)
     if len(stamps) < FEWEST_SAMPLES:
@@ -236,7 +235,7 @@ def _stamps(table: Table, clock: Clock) -> Array:
 
 
 def _columns_of_numbers(
-    table: Table, clock: Clock, stamps: Array
+    table: RecordTable, clock: Clock, stamps: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Return the columns of numbers as long as the time, and why the others are none.
 
@@ -260,7 +259,9 @@ def _columns_of_numbers(
     return columns, refused
 
 
-def _numbers(table: Table, names: Sequence[str], clock: Clock, stamps: Array) -> dict[str, Array]:
+def _numbers(
+    table: RecordTable, names: Sequence[str], clock: Clock, stamps: Array
+) -> dict[str, Array]:
     """Return columns of numbers; raises RecordError where they are none or unevenly long."""
     columns = table.numbers(names, frozenset(names))
     refuse_uneven(table.path, {clock.columns[0]: stamps, **columns})
@@ -272,7 +273,7 @@ def _numbers(table: Table, names: Sequence[str], clock: Clock, stamps: Array) ->
     return columns
 
 
-def _unit(table: Table, name: str) -> tuple[str | None, str]:
+def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
     """Return the unit of a column and its source."""
     stated = table.units.get(name)
     if stated is not None:
@@ -310,8 +311,8 @@ def effective_value(samples: Mapping[str, Array], columns: Sequence[str]) -> Arr
     return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
 
 
-def _flagged(table: Table, pmu: PmuContent | None) -> str:
-    """Return what the flags of a PMU say of bad rows; "" where there are none."""
+def _flagged(table: RecordTable, pmu: PmuContent | None) -> str:
+    """Describe the bad rows by the flags of a PMU; "" where there are none."""
     if pmu is None or pmu.status is None:
         return ""
     try:
@@ -328,7 +329,7 @@ def _flagged(table: Table, pmu: PmuContent | None) -> str:
 
 
 def _angle_findings(inspection: Inspection) -> Iterator[str]:
-    """Yield what speaks against the angle of a PMU: its turns, and the frequency beside it."""
+    """Find what speaks against the angle of a PMU: its turns, and the frequency beside it."""
     pmu = inspection.pmu
     if pmu is None or pmu.voltage.angle_unit is None:
         return

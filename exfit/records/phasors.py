@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from exfit.dsp.three_phase import Connection
 from exfit.errors import RecordError
 from exfit.records.angles import AngleError, in_radians, unwrapped
-from exfit.records.formats.table import NONE, Array, Table, column_error
+from exfit.records.formats.table import NONE, Array, RecordTable, column_error
 from exfit.records.units import alike, scale_between
 from exfit.signals import OF_CURRENT_PHASOR
 
@@ -61,13 +61,13 @@ class Phasors(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PhasorTable:
-    """A Table with the columns that are computed of its phasors: ``phasors.vt`` and others.
+    """A RecordTable with the columns that are computed of its phasors: ``phasors.vt`` and others.
 
     The voltage ``vt``, the power ``p`` and ``q`` and the current ``it`` are per unit, of the
     positive sequence; ``angle`` is that of the voltage in rad.
     """
 
-    table: Table
+    table: RecordTable
     phasors: Phasors
 
     @property
@@ -151,7 +151,7 @@ class PhasorTable:
         return np.asarray(whole / self._base(phasor))
 
     def _base(self, phasor: Phasor) -> float:
-        """Return what 1 pu is in the unit of a phasor's magnitudes."""
+        """Size of 1 pu in the unit of a phasor's magnitudes."""
         kv, mva = self.phasors.kv, self.phasors.mva
         if alike(phasor.unit, "pu"):
             return 1.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.records.angles import unit_by_range, wraps
-from exfit.records.channel_recognition import triples
+from exfit.records.channel_names import triples
 from exfit.records.units import WORDS, bare, quantity_of, usual
 from exfit.records.vocabulary import KINDS, folded, words_of
 
@@ -93,7 +93,7 @@ class _Pair:
 def pmu_content(
     samples: Mapping[str, Array], units: Mapping[str, str], names: Sequence[str]
 ) -> PmuContent | None:
-    """Return what columns (M,) hold of a phasor measurement unit, None where there is no phasor.
+    """Find the columns (M,) of a phasor measurement unit, None where there is no phasor.
 
     ``units`` are those of columns that have one, ``names`` all columns of the file.
     """
@@ -238,7 +238,7 @@ def _groups(pairs: Sequence[_Pair]) -> Iterator[tuple[_Pair, ...]]:
 
 
 def _quantity(pair: _Pair, units: Mapping[str, str]) -> str | None:
-    """Return whether a pair is a voltage or a current, by its unit or its name."""
+    """Tell a voltage from a current by the unit or the name of a pair."""
     quantity = quantity_of(units.get(pair.magnitude))
     if quantity in QUANTITIES or pair.numbered:  # a number says nothing, the unit's name no more
         return quantity

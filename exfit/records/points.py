@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.records.formats import open_table
-from exfit.records.formats.table import Table, column_error
+from exfit.records.formats.table import RecordTable, column_error
 from exfit.records.units import alike
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def given_points(rows: Sequence[Sequence[float]], signals: Sequence[str], source
     return Points(columns, {}, source, digest)
 
 
-def _check_unit(table: Table, column: str, unit: str | None) -> None:
+def _check_unit(table: RecordTable, column: str, unit: str | None) -> None:
     in_file = table.units.get(column)
     if unit is not None and in_file is not None and not alike(in_file, unit):
         raise column_error(table.path, column, f"in {in_file} as the file says, not in {unit}")

@@ -18,7 +18,7 @@ from exfit.records.clock import (
     why_unusable,
 )
 from exfit.records.formats import open_table
-from exfit.records.formats.table import NONE, Table, column_error, read_bytes, refuse_uneven
+from exfit.records.formats.table import NONE, RecordTable, column_error, read_bytes, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
 from exfit.records.units import alike, needs_base, unit_of, usual
 from exfit.signals import unit_of_signal
@@ -174,7 +174,10 @@ def _column_names(channel: ChannelLike | ThreePhases) -> tuple[str, ...]:
 
 
 def _columns(
-    table: Table, clock: Clock, channels: Mapping[str, ChannelLike | ThreePhases], missing: bool
+    table: RecordTable,
+    clock: Clock,
+    channels: Mapping[str, ChannelLike | ThreePhases],
+    missing: bool,
 ) -> dict[str, Array]:
     """Return the columns (M,) of all channels, nan where a sample may be missing and is."""
     names = [name for channel in channels.values() for name in _column_names(channel)]
@@ -183,14 +186,14 @@ def _columns(
 
 
 def _within_windows(voltages: Iterable[_PhaseVoltage], rows: Rows) -> Rows:
-    """Return those rows in which every voltage of waveforms is known."""
+    """Select the rows in which every voltage of waveforms is known."""
     for voltage in voltages:
         if voltage.window is not None:
             rows = rows[np.isfinite(voltage.samples[rows])]
     return rows
 
 
-def _instants(table: Table, clock: Clock) -> Array:
+def _instants(table: RecordTable, clock: Clock) -> Array:
     """Return the time (M,) in s, which may repeat; raises RecordError where it goes back."""
     time = table.instants(clock.columns, clock.unit)
     check_finite(time, clock.label, table.place)
@@ -200,14 +203,14 @@ def _instants(table: Table, clock: Clock) -> Array:
 
 
 def _without_repeats(
-    table: Table,
+    table: RecordTable,
     clock: Clock,
     time: Array,
     columns: Mapping[str, Array],
     rows: Rows,
     repeats: Repeats,
 ) -> tuple[Rows, tuple[str, ...]]:
-    """Return those rows of which each has a time of its own, and what was left out.
+    """Select the rows that have a time of their own each, and describe the others.
 
     Raises RecordError where rows of one time differ and nothing says which counts.
     """
@@ -232,7 +235,7 @@ def _without_repeats(
 
 
 def _smooth_angle(
-    table: Table, channel: ChannelLike | ThreePhases, angle: Array, rows: Rows
+    table: RecordTable, channel: ChannelLike | ThreePhases, angle: Array, rows: Rows
 ) -> Array:
     """Return the angle (M,) in the given rows without jumps by whole turns."""
     from exfit.records.phasors import smooth_angle
@@ -242,7 +245,7 @@ def _smooth_angle(
 
 
 def _leave_out(
-    table: Table, status: "Status", columns: dict[str, Array], rows: Rows, missing: bool
+    table: RecordTable, status: "Status", columns: dict[str, Array], rows: Rows, missing: bool
 ) -> None:
     """Put nan into those of the given rows that their flags call bad.
 
@@ -262,7 +265,7 @@ def _leave_out(
 
 
 def _of_phases(
-    table: Table, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
+    table: RecordTable, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
 ) -> _PhaseVoltage:
     """Return the voltage of three phases at the given rows.
 
@@ -302,7 +305,7 @@ def _resampled(
 
 
 def _check_units(
-    table: Table, channels: Mapping[str, ChannelLike | ThreePhases], per_unit: frozenset[str]
+    table: RecordTable, channels: Mapping[str, ChannelLike | ThreePhases], per_unit: frozenset[str]
 ) -> None:
     """Raise a RecordError for a column that the file says to be in another unit."""
     for signal, channel in channels.items():
@@ -325,7 +328,7 @@ def _check_units(
 
 
 def _how_to_scale(unit: str) -> str:
-    """Return what makes numbers of a unit per unit, as a case has it."""
+    """Describe how a case makes numbers of a unit per unit."""
     if usual(unit) == PERCENT:
         return f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
     return f"unit: {unit} and base: what 1 pu is in {unit}"
@@ -344,7 +347,9 @@ def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None)
     return rows
 
 
-def _signal(table: Table, channel: ChannelLike, column: Array, rows: Rows, missing: bool) -> Array:
+def _signal(
+    table: RecordTable, channel: ChannelLike, column: Array, rows: Rows, missing: bool
+) -> Array:
     """Return a channel in per unit; raises RecordError where it is not finite, nor missing."""
     with np.errstate(over="ignore", invalid="ignore"):
         per_unit = column[rows] if channel.base is None else column[rows] / channel.base

@@ -51,7 +51,7 @@ class DetectedTest:
         return self.steps[0].at
 
     def name(self, size: float | None = None) -> str:
-        """Return what it is, as up-5%-at-312s; of a size (pu) that is known otherwise."""
+        """Name it, as up-5%-at-312s; by a size (pu) that is known otherwise."""
         size = self.changes[0] if size is None else size
         words = ["pulse" if len(self.steps) == 2 else "steps"] if len(self.steps) > 1 else []
         if size:
@@ -76,7 +76,7 @@ def tests_of(inspection: Inspection) -> tuple[DetectedTest, ...]:
 
 
 def is_whole_record(test: DetectedTest, inspection: Inspection) -> bool:
-    """Return whether the record of a test needs no window: it has no other, and little beyond."""
+    """Check whether the record of a test needs no window: it has no other, and little beyond."""
     start, end = test.window
     alone = len(test.steps) == len(inspection.steps)
     return alone and float(np.ptp(inspection.time)) <= WHOLE_RECORD * (end - start)
@@ -122,7 +122,7 @@ def _window(test: DetectedTest, before: float, after: float) -> tuple[float, flo
 
 
 def _settled(inspection: Inspection) -> list[float]:
-    """Return when the response to each step has settled, s; where the next one begins at most."""
+    """Find when the response to each step has settled, s; where the next begins at most."""
     time, response = _response(inspection)
     ends = [*(step.at for step in inspection.steps[1:]), float(inspection.time[-1])]
     return [
@@ -132,7 +132,7 @@ def _settled(inspection: Inspection) -> list[float]:
 
 
 def _settled_at(time: Array, response: Array, start: float, end: float) -> float:
-    """Return when a response to a step at ``start`` is where it ends for good."""
+    """Find when a response to a step at ``start`` is near its end for good."""
     first, last = np.searchsorted(time, [start, end])
     if last - first < FEWEST_SMOOTHED:
         return start

@@ -65,7 +65,7 @@ class BreakerOpening:
         )
 
     def causes(self, at: float) -> bool:
-        """Return whether what seems a step (s) of a channel is the response to the opening."""
+        """Check whether a step (s) that a channel seems to show is the response to the opening."""
         return -BEFORE_OPENING <= at - self.at <= RESPONDS_FOR
 
 
@@ -89,7 +89,7 @@ def breaker_opening(
 
 
 def _goes_on(time: Array, voltage: Array, opening: BreakerOpening) -> bool:
-    """Return whether there is a voltage after the opening, as before."""
+    """Check for a voltage after the opening, as before."""
     begin, end = opening.at - opening.error, opening.at + opening.error
     before = voltage[(time < begin) & (time >= begin - LOOKED_AT_AFTER)]
     after = voltage[(time > end) & (time <= end + LOOKED_AT_AFTER)]
@@ -100,7 +100,7 @@ def _goes_on(time: Array, voltage: Array, opening: BreakerOpening) -> bool:
 def _fall(
     time: Array, samples: Mapping[str, Array], loads: Mapping[str, InspectedChannel]
 ) -> BreakerOpening | None:
-    """Return when powers and currents fall to zero, None where they do not, or not all of them."""
+    """Find the fall of powers and currents to zero, None where any of them does not."""
     smooth = {
         signal: _smoothed(*present_samples(time, samples[channel.name]))
         for signal, channel in loads.items()
@@ -127,7 +127,7 @@ def _smoothed(time: Array, samples: Array) -> tuple[Array, Array]:
 
 
 def _zeros(smooth: Mapping[str, Array], loads: Mapping[str, InspectedChannel]) -> dict[str, float]:
-    """Return what counts as zero of each signal; powers have one scale."""
+    """Level of each signal that counts as zero; powers have one scale."""
     largest = {signal: float(np.max(np.abs(y), initial=0.0)) for signal, y in smooth.items()}
     power = max((largest[signal] for signal in POWERS if signal in largest), default=0.0)
     return {
@@ -148,7 +148,7 @@ class _Fall(NamedTuple):
     remains: bool = False
 
     def is_certain(self, zero: float) -> bool:
-        """Return whether the level is well above what counts as zero."""
+        """Check whether the level is well above what counts as zero."""
         return abs(self.level) > CERTAIN_FALL * zero
 
 
@@ -193,6 +193,6 @@ def _jump(time: Array, samples: Array, channel: InspectedChannel) -> BreakerOpen
 
 
 def rejection_findings(opening: BreakerOpening | None) -> Iterator[str]:
-    """Yield what must be known of a record in which the breaker opens."""
+    """Describe a record in which the breaker opens."""
     if opening is not None:
         yield f"{opening.in_words}; {REMEDY}"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.formats.cells import quoted
-from exfit.records.formats.table import Table, column_error, listed
+from exfit.records.formats.table import RecordTable, column_error, listed
 from exfit.records.formats.text import TextTable
 
 Mask = NDArray[np.bool_]
@@ -38,7 +38,7 @@ class BadRow(NamedTuple):
     why: str
 
 
-def bad_rows(table: Table, status: Status) -> tuple[BadRow, ...]:
+def bad_rows(table: RecordTable, status: Status) -> tuple[BadRow, ...]:
     """Return the rows of a file that its flags call bad.
 
     Numbers, also hexadecimal as 0x2000, are the word STAT of C37.118: bad are those with a data
@@ -65,7 +65,7 @@ def _by_convention(flags: Sequence[str]) -> Iterator[BadRow]:
             yield BadRow(row, flag, why[flag])
 
 
-def _refuse_ambiguous(table: Table, status: Status, flags: Sequence[str]) -> None:
+def _refuse_ambiguous(table: RecordTable, status: Status, flags: Sequence[str]) -> None:
     """Raise a RecordError where all flags are 0 or 1 and both occur, or all are 1."""
     if {_plain(flag) for flag in flags} in ({"0", "1"}, {"1"}):
         what = "holds 0 and 1, of which either may be good: record.status.accept says which"
@@ -73,7 +73,7 @@ def _refuse_ambiguous(table: Table, status: Status, flags: Sequence[str]) -> Non
 
 
 def _fault(flag: str) -> str:
-    """Return what a flag says to be wrong, "" where nothing is."""
+    """Describe the fault of a row by its flag, "" where there is none."""
     word = _word(flag)
     if word is None:
         return "" if flag.strip().casefold() in GOOD_WORDS else "not one of good, ok, valid"
@@ -100,7 +100,7 @@ def _plain(flag: str) -> str:
     return flag.strip().casefold() if word is None else str(word)
 
 
-def _flags(table: Table, column: str) -> list[str]:
+def _flags(table: RecordTable, column: str) -> list[str]:
     """Return the entries of a column as texts."""
     try:
         return [f"{flag:.0f}" for flag in table.numbers([column])[column]]
@@ -111,7 +111,7 @@ def _flags(table: Table, column: str) -> list[str]:
     return [cells[at] for _, cells in table.rows() if at < len(cells)]
 
 
-def status_error(table: Table, status: Status, rows: Sequence[BadRow]) -> RecordError:
+def status_error(table: RecordTable, status: Status, rows: Sequence[BadRow]) -> RecordError:
     """Return the error of a file with bad rows: the first of them, how many, what to do."""
     first = rows[0]
     return column_error(

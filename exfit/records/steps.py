@@ -162,7 +162,7 @@ def _steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSt
 
 
 def _switches(samples: Array) -> bool:
-    """Whether a channel jumps between a few levels, as a recorded reference does."""
+    """Check whether a channel jumps between a few levels, as a recorded reference does."""
     jumps = np.flatnonzero(np.diff(samples)) + 1
     ends = np.concatenate([[0], jumps, [len(samples)]])
     return 0 < len(jumps) < MOST_LEVELS and bool(np.min(np.diff(ends)) >= SAMPLES_AT_REST)
@@ -231,7 +231,7 @@ def combined_steps(changes: Mapping[str, Sequence[DetectedStep]]) -> tuple[Recor
 
 
 def _close(change: DetectedStep, others: Iterable[DetectedStep]) -> bool:
-    """Whether a channel may show the step that one of the others shows."""
+    """Check whether a channel may show the step that one of the others shows."""
     return any(
         change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
         for other in others
@@ -239,7 +239,7 @@ def _close(change: DetectedStep, others: Iterable[DetectedStep]) -> bool:
 
 
 def _returns(name: str, change: DetectedStep, group: Mapping[str, DetectedStep]) -> bool:
-    """Whether a channel only returns from its first move, as a field voltage does."""
+    """Check whether a channel only returns from its first move, as a field voltage does."""
     first = group.get(name)
     if first is None or change.jumps or change.size * first.size > 0.0:
         return False

@@ -59,14 +59,14 @@ def usual(unit: str) -> str:
 
 
 def alike(unit: str, other: str) -> bool:
-    """Return whether two texts are the same unit: kV and KV, pu and p.u.; but not MW and mW."""
+    """Compare two texts as units: kV is KV, pu is p.u.; but MW is not mW."""
     return usual(unit) == usual(other) or (
         unit_of(unit) is None and unit.strip().casefold() == other.strip().casefold()
     )
 
 
 def quantity_of(unit: str | None) -> str | None:
-    """Return what a unit measures: voltage, current, power, reactive, time ...; None for others."""
+    """Quantity that a unit measures: voltage, current, power, reactive, time ...; None if none."""
     if unit is None:
         return None
     symbol = usual(unit)
@@ -79,7 +79,7 @@ def quantity_of(unit: str | None) -> str | None:
 
 
 def needs_base(unit: str) -> bool:
-    """Return whether numbers of a unit are per unit only after a division by their base."""
+    """Check whether numbers of a unit are per unit only after a division by their base."""
     return usual(unit) not in PER_UNIT
 
 
@@ -118,14 +118,14 @@ def _after_in(_: str, unit: str) -> bool:
 
 
 def _after_slash(name: str, unit: str) -> bool:
-    """Return whether a unit is that of what precedes it, and no part of one, as in V/Hz."""
+    """Check for the unit of what precedes it, and no part of one, as in V/Hz."""
     before = quantity_of(name.split()[-1])
     of_another = unit_of(name.split()[-1]) is not None and before != quantity_of(unit)
     return _in_brackets(name, unit) and not of_another
 
 
 def _apart(name: str, unit: str) -> bool:
-    """Return whether a unit follows a mark that may also be a part of the name.
+    """Check for a unit that follows a mark that may also be a part of the name.
 
     There letters alone are phases, and min is a limit, except after a time.
     """
@@ -159,7 +159,7 @@ def _prefixed(unit: str) -> tuple[str, str] | None:
 
 
 def scale_between(unit: str, other: str) -> float | None:
-    """Return how many of another unit one of a unit is: 1000 V for a kV; None for no such pair."""
+    """Number of another unit that makes one of a unit: 1000 V for a kV; None for no such pair."""
     symbol, wanted = usual(unit), usual(other)
     if symbol in ANGLES and wanted in ANGLES:
         return ANGLES[symbol] / ANGLES[wanted]
@@ -170,7 +170,7 @@ def scale_between(unit: str, other: str) -> float | None:
 
 
 def base_of_own(unit: str, own: str, rated: float = 1.0) -> float | None:
-    """Return how many of a ``unit`` are one of a signal's ``own``; None where none are.
+    """Number of a ``unit`` that makes one of a signal's ``own``; None where none does.
 
     1 pu of a frequency is the ``rated`` one, Hz.
     """

@@ -52,7 +52,7 @@ def _chosen() -> Path:
 
 @cache
 def _is_usable(folder: Path) -> bool:
-    """Return whether a folder, made where it is missing, is the user's own; report why not."""
+    """Check that a folder, made where it is missing, is the user's own; report why not."""
     try:
         folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         why = _why_not_private(folder.stat())
@@ -66,7 +66,7 @@ def _is_usable(folder: Path) -> bool:
 
 
 def _why_not_private(status: os.stat_result) -> str | None:
-    """Return why a file or folder may be of others; None where it is the user's own.
+    """Give the reason why a file or folder may be of others; None where it is the user's own.
 
     On Windows the access rights of the folder decide, which those of the user's profile are.
     """

@@ -10,7 +10,7 @@ LINES_OF_ERRORS = 3
 
 
 def ending(code: int, process: str) -> str:
-    """Return how a process of this exit code ended."""
+    """Describe the end of a process by its exit code."""
     if code < 0:
         return f"{process} was ended by {_signal_name(-code)}"
     if code > HIGHEST_CODE:  # an exception of Windows

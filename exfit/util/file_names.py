@@ -57,7 +57,7 @@ def files_named_after(name: str) -> tuple[str, ...]:
 
 
 def unusable(name: str) -> str | None:
-    """Return why a name, which is not empty, is that of no file on some system; None if it is."""
+    """Find the fault of a file's name, which is not empty, on any system; None for none."""
     if folded(name.partition(".")[0].rstrip()) in DEVICES:
         return "is a device of Windows, where no file can have this name"
     if name[-1] in ". ":
@@ -69,7 +69,7 @@ def unusable(name: str) -> str | None:
 
 
 def folded(name: str) -> str:
-    """Return what distinguishes a name on every system: some ignore case and forms of accents."""
+    """Reduce a name to its part that every system tells apart, whatever its case and accents."""
     return normalize("NFC", normalize("NFC", name).casefold())
 
 

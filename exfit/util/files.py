@@ -49,7 +49,7 @@ def refuse_bytes(path: Path) -> None:
 
 
 def why_unreadable(fault: OSError | ValueError) -> str:
-    """Return why a file cannot be read."""
+    """Give the reason why a file cannot be read."""
     if isinstance(fault, UnicodeEncodeError):
         return _what_lacks(fault.object)
     # a ValueError is that of a name with a null character
@@ -57,7 +57,7 @@ def why_unreadable(fault: OSError | ValueError) -> str:
 
 
 def _why_no_text(name: bytes) -> str:
-    """Return why the name of a file is no text: its bytes are none, or the locale lacks letters."""
+    """Give the reason why the name of a file is no text."""
     try:
         return _what_lacks(name.decode())
     except UnicodeDecodeError:
@@ -227,7 +227,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _takes_bytes(path: Path) -> bool:
-    """Return whether a path leads to what is no file that could be replaced, as /dev/stdout."""
+    """Check for a path to something that cannot be replaced by a file, as /dev/stdout."""
     try:
         kind = path.stat().st_mode
     except OSError:
@@ -247,7 +247,7 @@ def _computer() -> str:
 
 
 def _runs(process: int) -> bool:
-    """Return whether a process of this computer may still run; always true on Windows."""
+    """Check whether a process of this computer may still run; always true on Windows."""
     if os.name == "nt":
         return True  # os.kill would send it Ctrl-C there
     try:

@@ -7,7 +7,7 @@ SMALLEST = 1e-100  # but 0: of a smaller one the square loses its digits
 
 
 def magnitude_fault(value: float) -> str | None:
-    """Return why a number is too large or too near 0 to compute with, None where it is not."""
+    """Give the fault of a number that is too large or too near 0, None where it has none."""
     if not isfinite(value):
         return f"{value:g} is not a finite number"
     if abs(value) > LARGEST:

@@ -12,7 +12,7 @@ ROOT = "EXFIT_LAID_OUT"  # the variable of the environment that names the folder
 
 
 def on_disk(path: Path) -> Path:
-    """Return where the file that a case names as ``path`` is read: the path itself by default."""
+    """Find the place of a file that a case names: the path itself by default."""
     root = os.environ.get(ROOT)
     return below(Path(root), path) if root else path
 

@@ -18,7 +18,7 @@ THREADS = "EXFIT_THREADS"  # the variable of the environment that says how many 
 
 
 def processors() -> int:
-    """Return how many threads shall compute: EXFIT_THREADS, else the processors of this process.
+    """Count the threads that shall compute: EXFIT_THREADS, else the processors of this process.
 
     These are the ones that it may use where the system says so, else all. Raises ExfitError where
     EXFIT_THREADS is no whole number from 1.

@@ -59,12 +59,12 @@ def entries(kind: type) -> tuple[Entry, ...]:
 
 
 def _has_entries(value: Any) -> bool:
-    """Return whether a value or a type is that of a data class or a NamedTuple."""
+    """Check for a data class or a NamedTuple, a value or a type."""
     return is_dataclass(value) or hasattr(value, "_fields")
 
 
 def _named_values(kind: Any) -> bool:
-    """Return whether a type is a tuple of pairs of a name and a value."""
+    """Check for a tuple of pairs of a name and a value."""
     args = get_args(kind)
     return get_origin(kind) is tuple and args[1:] == (...,) and get_args(args[0])[:1] == (str,)
 

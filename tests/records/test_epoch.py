@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from exfit.errors import RecordError
-from exfit.records.epoch import EpochError, from_first, of_soc
+from exfit.records.clock import EpochError, from_first, of_soc
 from exfit.records.formats import open_table
 
 START = 1_715_956_267

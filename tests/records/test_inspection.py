@@ -24,7 +24,7 @@ from exfit.case.draft.suggestion import (
 )
 from exfit.dsp.step_detection import DetectedStep
 from exfit.errors import RecordError
-from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
+from exfit.records.channel_names import connection_of, guess_signals, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.steps import combined_steps

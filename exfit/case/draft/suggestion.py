@@ -10,7 +10,7 @@ from exfit.case.draft.bases import Base
 from exfit.case.draft.case_draft import Noted, Remark, Section, in_braces
 from exfit.case.open_values import QUESTION
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
-from exfit.records.channel_recognition import connection_of
+from exfit.records.channel_names import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
 from exfit.records.inspection import Inspection
 from exfit.records.rejection import POWERS, BreakerOpening

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.clock import Clock, check_finite, check_increasing
-from exfit.records.formats import Table, open_table
+from exfit.records.formats import RecordTable, open_table
 from exfit.records.formats.table import listed, refuse_uneven
 from exfit.records.units import needs_base
 from exfit.signals import COMPARED
@@ -86,7 +86,7 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
     return Curve(name, path, table.sha256, time[last], signals, header, int(np.sum(~last)))
 
 
-def _refuse_other_units(table: Table, places: Mapping[str, str]) -> None:
+def _refuse_other_units(table: RecordTable, places: Mapping[str, str]) -> None:
     """Raise a RecordError for a column that its file says is not per unit."""
     for signal, column in places.items():
         unit = table.units.get(column)
@@ -115,7 +115,7 @@ def _holds_response(path: Path) -> bool:
         return False
 
 
-def _chosen(table: Table, names: Sequence[str]) -> str | None:
+def _chosen(table: RecordTable, names: Sequence[str]) -> str | None:
     """Return which of the names is a column; raises RecordError where several are."""
     columns = [name for name in dict.fromkeys(names) if name in table.names]
     if len(columns) > 1:
@@ -123,7 +123,7 @@ def _chosen(table: Table, names: Sequence[str]) -> str | None:
     return columns[0] if columns else None
 
 
-def _clock(table: Table, names: Sequence[str]) -> tuple[str, ...]:
+def _clock(table: RecordTable, names: Sequence[str]) -> tuple[str, ...]:
     """Return the columns with the time: the one that is named, else those that seem to hold it."""
     column = _chosen(table, names)
     if column is not None:
@@ -135,7 +135,7 @@ def _clock(table: Table, names: Sequence[str]) -> tuple[str, ...]:
     return table.clock
 
 
-def _check_clock(table: Table, clock: Sequence[str], time: Array) -> None:
+def _check_clock(table: RecordTable, clock: Sequence[str], time: Array) -> None:
     """Raise a RecordError where time is not finite or goes back; an instant may repeat."""
     label = Clock(tuple(clock)).label
     check_finite(time, label, table.place)

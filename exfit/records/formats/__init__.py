@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from exfit.errors import RecordError
-from exfit.records.formats.table import Table
+from exfit.records.formats.table import RecordTable
 from exfit.util.files import siblings
 
-__all__ = ["PLAY_IN", "Table", "open_table"]
+__all__ = ["PLAY_IN", "RecordTable", "open_table"]
 
 COMTRADE = (".cfg", ".cff")
 BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
@@ -15,7 +15,7 @@ IN_CHILD = {".mat": "matlab", ".parquet": "parquet"}
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 
-def open_table(path: Path, sheet: str | None = None, memory: float | None = None) -> Table:
+def open_table(path: Path, sheet: str | None = None, memory: float | None = None) -> RecordTable:
     """Open a file of any kind that is known, by its suffix; ``sheet`` of a workbook.
 
     ``memory`` (GB) is what reading may take; None: 1 GB, or four times the file's size up to 4 GB.
@@ -42,7 +42,7 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
     return read_text_table(path, memory)
 
 
-def _in_child(module: str, path: Path, sheet: str | None, memory: float | None) -> Table:
+def _in_child(module: str, path: Path, sheet: str | None, memory: float | None) -> RecordTable:
     from exfit.records.formats.child import read_table
 
     return read_table(module, path, sheet, memory)

@@ -1,6 +1,9 @@
-"""The cells of a text: what is a number, what a missing sample, and what is neither."""
+"""The cells of a table: numbers, missing samples, and the head of names and units above them."""
 
 import re
+from collections.abc import Mapping, Sequence
+
+from exfit.records.units import unit_in, unit_of
 
 CELL_SHOWN = 40  # characters of a cell in a message
 EMPTY = "an empty cell"
@@ -9,10 +12,18 @@ INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 MISSING = re.compile(r"|[+-]?nan|-+|\*+", re.IGNORECASE)
 MINUTES = re.compile(r"[0-9]{1,2}:[0-9]{2}[.,][0-9]+")
 THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
+# the types of channels in the second row of a JSIS file (WECC, 2013)
+CHANNEL_TYPES = frozenset(
+    ("T", "VMP", "VAP", "VMA", "VAA", "VMB", "VAB", "VMC", "VAC", "VMN", "VAN", "VP", "IMP", "IAP",
+     "IMA", "IAA", "IMB", "IAB", "IMC", "IAC", "IMN", "IAN", "IP", "F", "R", "P", "Q", "S", "Z",
+     "CP", "CQ", "D", "SC", "OTHER")
+)  # fmt: skip
+FEWEST_TYPES = 3
+NO_UNIT = ("", "-", "1", "[-]", "[1]")
 
 
 def is_number(cell: str, comma: bool | None) -> bool:
-    """Return whether a cell is an ASCII number with that decimal mark; also nan, inf, not 1_000."""
+    """Check for an ASCII number with that decimal mark; also nan, inf, not 1_000."""
     cell = cell.strip()
     if NUMBER.fullmatch(cell):
         return ("." if comma else ",") not in cell
@@ -20,7 +31,7 @@ def is_number(cell: str, comma: bool | None) -> bool:
 
 
 def is_missing(cell: str) -> bool:
-    """Return whether a cell says that there is no sample: empty, nan, dashes, stars."""
+    """Check for a cell that stands for no sample: empty, nan, dashes, stars."""
     return MISSING.fullmatch(cell.strip()) is not None
 
 
@@ -30,7 +41,7 @@ def quoted(cell: object) -> str:
 
 
 def why_not(cell: str, comma: bool | None) -> str:
-    """Return why a cell is no number."""
+    """Describe the fault of a cell that is no number."""
     cell = cell.strip()
     if not cell:
         return EMPTY
@@ -42,3 +53,30 @@ def why_not(cell: str, comma: bool | None) -> str:
     if comma and NUMBER.fullmatch(cell):
         return f"{what} with a decimal comma, which other cells have"
     return what
+
+
+def names_of(cells: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns by the cells of their row."""
+    return tuple(cell.strip() or str(at + 1) for at, cell in enumerate(cells))
+
+
+def is_units(cells: Sequence[str]) -> bool:
+    """Check for a row of units: each cell is a unit, or the mark that there is none."""
+    return all(cell.strip() in NO_UNIT or unit_of(cell) for cell in cells)
+
+
+def are_channel_types(cells: Sequence[str]) -> bool:
+    """Check for the row of types of channels of a JSIS file."""
+    filled = [cell.strip().upper() for cell in cells if cell.strip()]
+    return len(filled) >= FEWEST_TYPES and CHANNEL_TYPES.issuperset(filled)
+
+
+def units_of(names: Sequence[str], row: Sequence[str] = ()) -> dict[str, str]:
+    """Return the units by column: from a row or fields of their own, else out of the names."""
+    own = dict(zip(names, map(unit_of, row), strict=False))
+    return stated({name: own.get(name) or unit_in(name) for name in names})
+
+
+def stated(units: Mapping[str, str | None]) -> dict[str, str]:
+    """Return the units of those columns that have one."""
+    return {name: unit for name, unit in units.items() if unit and unit not in NO_UNIT}

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import find_clock, in_seconds, soc_in_seconds
-from exfit.records.epoch import are_soc
+from exfit.records.clock import are_soc, find_clock, in_seconds, soc_in_seconds
 from exfit.records.formats.memory import MemoryLimit
 from exfit.records.formats.table import (
     NONE,
@@ -30,7 +29,7 @@ SECOND = np.timedelta64(1, "s")
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """A Table over columns that are fetched by position when they are requested.
+    """A RecordTable over columns that are fetched by position when they are requested.
 
     ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
     day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
@@ -158,7 +157,7 @@ def missing_package(path: Path, package: str, extra: str) -> RecordError:
 
 
 def sound(path: Path, kind: str, read: Callable[[], T]) -> T:
-    """Return what a package reads of a file; raises RecordError where it is not of that kind."""
+    """Read a file by a package; raises RecordError where it is not of that kind."""
     try:
         return read()
     except (RecordError, MemoryError):

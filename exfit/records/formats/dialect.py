@@ -14,9 +14,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from exfit.errors import RecordError
-from exfit.records.formats.cells import CELL_SHOWN, INFINITE, NUMBER, is_missing
+from exfit.records.formats.cells import (
+    CELL_SHOWN,
+    INFINITE,
+    NUMBER,
+    are_channel_types,
+    is_missing,
+    is_units,
+    names_of,
+    units_of,
+)
 from exfit.records.formats.decoding import Text
-from exfit.records.formats.heads import are_channel_types, is_units, names_of, units_of
 from exfit.records.formats.memory import MemoryLimit
 from exfit.records.formats.timestamps import is_timestamp
 
@@ -96,7 +104,7 @@ class _Heading(NamedTuple):
 
 
 def is_value(cell: str) -> bool:
-    """Return whether a cell is a number, with a point or a comma, or a timestamp."""
+    """Check for a number, with a point or a comma, or a timestamp."""
     return bool(NUMBER.fullmatch(cell) or INFINITE.fullmatch(cell)) or is_timestamp(cell)
 
 
@@ -121,7 +129,7 @@ def split_rows(
 
 
 def is_comment(text: str, separator: str | None) -> bool:
-    """Return whether a row, or its first cell, begins with the mark of a comment."""
+    """Check whether a row, or its first cell, begins with the mark of a comment."""
     return text.lstrip().startswith(tuple(mark for mark in COMMENT_MARKS if mark != separator))
 
 
@@ -137,7 +145,7 @@ def head_of(text: Text, limit: MemoryLimit) -> list[str]:
 
 
 def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
-    """Return how a file is written, by its first lines.
+    """Find the dialect of a file by its first lines.
 
     Raises RecordError where there are no rows of numbers, where their names do not fit them,
     and where two separators are possible.
@@ -176,7 +184,7 @@ def _layouts(path: Path, head: Sequence[str]) -> list[_Layout]:
 
 
 def _may_have_spaces(line: str) -> bool:
-    """Return whether spaces may separate columns in a line; where it is quoted, they may."""
+    """Check whether spaces may separate columns in a line; where it is quoted, they may."""
     return len(line.split(maxsplit=1)) > 1 or '"' in line
 
 
@@ -239,7 +247,7 @@ def _row(line: int, cells: list[str], text: str, separator: str | None) -> TextR
 
 
 def _width(rows: Sequence[TextRow]) -> int:
-    """Return how many cells most rows of numbers have; there may be more rows of titles above."""
+    """Count the cells of most rows of numbers; there may be more rows of titles above."""
     shares = [_share_of_full(row) for row in rows]
     for least in (0.5, 0.0, -1.0):
         widths = [len(row.cells) for row, share in zip(rows, shares, strict=True) if share > least]
@@ -272,7 +280,7 @@ def _is_full(row: TextRow, cells: int, columns: Sequence[int]) -> bool:
 
 
 def _is_partial(row: TextRow, shape: _Shape) -> bool:
-    """Return whether a row has some of the values that belong there, or too many or too few."""
+    """Check for a row with some of the values that belong there, or too many or too few."""
     if row.comment:
         return False
     if len(row.cells) == shape.cells:
@@ -281,7 +289,7 @@ def _is_partial(row: TextRow, shape: _Shape) -> bool:
 
 
 def _heading(above: Sequence[TextRow], first: TextRow, shape: _Shape) -> _Heading:
-    """Return what the rows above the ``first`` row of numbers call its columns."""
+    """Read the names of columns in the rows above the ``first`` row of numbers."""
     plain = [row for row in above if not row.comment]
     for rows in (plain, [row for row in above if row.comment]):
         heading = _named_above_types(rows, shape) or _named(rows, shape)
@@ -319,7 +327,7 @@ def _named_above_types(rows: Sequence[TextRow], shape: _Shape) -> _Heading | Non
 
 
 def _fault_of_names(plain: Sequence[TextRow], first: TextRow, shape: _Shape) -> str | None:
-    """Return what is wrong with the row above the numbers, None where it may be a title."""
+    """Describe the fault of the row above the numbers, None where it may be a title."""
     last = plain[-1] if plain else first
     if len(last.cells) > 1 and not any(last.values):
         return f"{first.line}: cells in this row: {len(first.cells)}, columns: {len(last.cells)}"
@@ -343,7 +351,7 @@ def _fitted(row: TextRow, shape: _Shape) -> tuple[str, ...]:
 
 
 def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
-    """Return whether the first number with a decimal mark has a comma; None where none has any."""
+    """Check the first number with a decimal mark for a comma; None where none has any."""
     for row in rows:
         for cell in map(str.strip, row):
             if NUMBER.fullmatch(cell) and ("," in cell or "." in cell):

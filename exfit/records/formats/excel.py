@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.cells import quoted
+from exfit.records.formats.cells import is_units, names_of, quoted, units_of
 from exfit.records.formats.columns import Contents, missing_package, sound
-from exfit.records.formats.heads import is_units, names_of, units_of
 from exfit.records.formats.table import column_error, read_bytes
 
 if TYPE_CHECKING:
@@ -129,7 +128,7 @@ def _table(name: str, rows: Sequence[Row]) -> _Sheet | None:
 
 
 def _is_sample(row: Row) -> bool:
-    """Return whether a row holds a sample: numbers and timestamps, more of them than of texts."""
+    """Check for a row of a sample: numbers and timestamps, more of them than of texts."""
     texts = sum(isinstance(cell, str) and cell != "" for cell in row)
     numbers = sum(not isinstance(cell, str) for cell in row)
     return numbers >= FEWEST_CELLS and numbers > texts
@@ -140,7 +139,7 @@ def _is_units(row: Row) -> bool:
 
 
 def _is_head(row: Row, below: Row) -> bool:
-    """Return whether a row names the columns of the one below: texts over two cells or more."""
+    """Check for a row that names the columns of the one below: texts over two cells or more."""
     named = [isinstance(cell, str) and cell.strip() != "" for cell in row]
     over = sum(name and cell != "" for name, cell in zip(named, below, strict=True))
     return over >= FEWEST_CELLS and all(isinstance(cell, str) for cell in row)
@@ -201,7 +200,7 @@ def _column(cells: Sequence[Any], name: str, where: Callable[[int], str]) -> NDA
 
 
 def _kind(cell: Any) -> str:
-    """Return what a cell holds; of a blank one nothing."""
+    """Kind of a cell, "" of a blank one."""
     if isinstance(cell, str):
         return "text" if cell.strip() else ""
     if isinstance(cell, date | datetime):

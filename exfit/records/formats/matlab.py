@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.records.formats.cells import units_of
 from exfit.records.formats.columns import Contents, sound
-from exfit.records.formats.heads import units_of
 from exfit.records.formats.table import Array, column_error, read_bytes
 
 HEAD, TAG = 128, 8  # bytes of a file's head and of an element's, in version 5
@@ -86,7 +86,7 @@ def _refuse_cut_off(path: Path, data: bytes) -> None:
 
 
 def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
-    """Yield what may be columns in a variable, by name."""
+    """Find the columns in a variable, by name."""
     if not isinstance(value, np.ndarray) or depth > DEEPEST:
         return
     if value.dtype.names:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.records.formats.cells import stated
 from exfit.records.formats.columns import Contents, missing_package, sound
-from exfit.records.formats.heads import stated
 from exfit.records.formats.memory import readable
 from exfit.records.formats.table import column_error
 from exfit.records.units import unit_in

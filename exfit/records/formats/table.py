@@ -17,7 +17,7 @@ NONE: frozenset[str] = frozenset()
 COLUMNS_SHOWN = 30
 
 
-class Table(Protocol):
+class RecordTable(Protocol):
     """Named columns, each (M,); messages name a fault by its place in the file."""
 
     @property
@@ -85,8 +85,8 @@ def listed(names: Sequence[str]) -> str:
     return first + more
 
 
-def increases(table: Table, columns: Sequence[str]) -> bool:
-    """Return whether columns can be the time, numbers or timestamps that increase throughout."""
+def increases(table: RecordTable, columns: Sequence[str]) -> bool:
+    """Check whether columns can be the time, numbers or timestamps that increase throughout."""
     try:
         instants = table.instants(columns)
     except TooLargeError:

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import find_clock, in_seconds, soc_in_seconds
-from exfit.records.epoch import are_soc
+from exfit.records.clock import are_soc, find_clock, in_seconds, soc_in_seconds
 from exfit.records.formats.cells import is_missing, is_number, quoted, why_not
 from exfit.records.formats.decoding import Text, decoded
 from exfit.records.formats.dialect import (
@@ -49,7 +48,7 @@ STAMP_BYTES = 120  # of a row, while timestamps become numbers
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """A delimited text as a Table, whose columns are read when they are requested."""
+    """A delimited text as a RecordTable, whose columns are read when they are requested."""
 
     path: Path
     sha256: str
@@ -169,7 +168,7 @@ class TextTable:
         return (line for line in lines if not self._is_skipped(line))
 
     def _is_skipped(self, line: str) -> bool:
-        """Return whether a line is a comment, and not a row that begins with its mark."""
+        """Check for a comment, which is no row that begins with its mark."""
         separator = self.dialect.separator
         if not is_comment(line, separator):
             return False

@@ -60,7 +60,7 @@ class _Stamps:
 
 
 def is_timestamp(cell: str) -> bool:
-    """Return whether a cell has the form of a date, a time of day, or both."""
+    """Check for the form of a date, a time of day, or both."""
     return cell.lstrip(" \t")[:1].isdigit() and _any_form().fullmatch(cell) is not None
 
 
@@ -144,7 +144,7 @@ def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
 
 
 def _kind(form: re.Match[str]) -> tuple[bool, str, bool, bool, bool]:
-    """Return what all timestamps of a column have in common."""
+    """Find the form that all timestamps of a column have in common."""
     dated = any(form[part] is not None for part in ("year", "left", "named"))
     # a month in letters fixes the order, and is the second of the three
     ordered = form["mark"] == "." or form["named"] is not None
@@ -207,7 +207,7 @@ def _days(stamps: _Stamps) -> Whole:
 
 
 def _is_day_first(order: str, left: Whole, middle: Whole) -> bool | None:
-    """Return whether the first of two parts of the dates is the day; None if it may be either."""
+    """Check whether the first of two parts of the dates is the day; None if it may be either."""
     if order != EITHER:
         return order == "dmy"
     if (left > MONTHS_A_YEAR).any():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from exfit.records.formats.heads import is_units, names_of, units_of
+from exfit.records.formats.cells import is_units, names_of, units_of
 
 
 def test_names_stay_as_they_are_and_a_column_without_one_is_called_by_its_number():

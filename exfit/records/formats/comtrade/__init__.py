@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from exfit.records.formats.cells import stated
 from exfit.records.formats.columns import Columns
 from exfit.records.formats.comtrade.channels import analog_of, status_of, time_of
 from exfit.records.formats.comtrade.configuration import config_of
 from exfit.records.formats.comtrade.data import ComtradeSamples, samples_of
 from exfit.records.formats.comtrade.files import ComtradeFiles, files_of
-from exfit.records.formats.heads import stated
-from exfit.records.formats.table import Array, Table
+from exfit.records.formats.table import Array, RecordTable
 from exfit.records.units import unit_in
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TIME = "time"
 
 
-def read_comtrade(path: Path, memory: float | None = None) -> Table:
+def read_comtrade(path: Path, memory: float | None = None) -> RecordTable:
     """Return the table of a COMTRADE record: the time, the analog and the status channels.
 
     The columns are called by the channels' identifiers, after ``time`` in s, 0 at the first
