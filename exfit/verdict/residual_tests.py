@@ -160,28 +160,26 @@ def stretch(count: int) -> int:
 
 
 def residual_tests(evidence: Evidence) -> tuple[ResidualTests, ...]:
-    """Return the tests of each channel of each record; none where there is no uncertainty.
+    """Test the residuals of each channel of each record; none where there is no uncertainty.
 
     A robust loss counts errors as the fit does: what it takes for spikes does not decide.
     """
     if evidence.uncertainty is None:
         return ()
-    return tuple(_tests(evidence))
-
-
-def _tests(evidence: Evidence) -> Iterator[ResidualTests]:
-    residuals, values = evidence.residuals, evidence.values
+    residuals, values, tests = evidence.residuals, evidence.values, list[ResidualTests]()
     errors = [_errors(record) for record in evidence.records]
     influence, _ = residuals.influence(np.concatenate(errors))
     each = iter(np.split(influence, np.cumsum(residuals.sizes)[:-1]))
-    noises = iter(evidence.uncertainty.confidence.noise if evidence.uncertainty else ())
+    noises = iter(evidence.uncertainty.confidence.noise)
     for record in evidence.records:
         instants = _step_instants(record, values)
         for channel, (size, scatter) in zip(
             record.setup.channels, _sizes(record, values), strict=True
         ):
             rmse = next(noises).estimated * size
-            yield _tests_of(record, channel, next(each) * size, rmse, scatter, instants)
+            errors_of_one = next(each) * size
+            tests.append(_tests_of(record, channel, errors_of_one, rmse, scatter, instants))
+    return tuple(tests)
 
 
 def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[Scatter]]]:

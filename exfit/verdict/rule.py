@@ -1,4 +1,4 @@
-"""What a fit comes to, by one rule, which docs/verdict.md states."""
+"""The verdict on a fit, by one rule, which docs/verdict.md states."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from exfit.estimate import Stop
 from exfit.inference.wording import digits, listed
-from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.comparisons import Overlay
 from exfit.results.recorder_averages import RecorderAverages
 from exfit.results.typical_values import first_of
 from exfit.results.verdict import (
@@ -34,7 +34,7 @@ OTHER_WAY = -0.3  # correlation of response and record: below it no noise and no
 
 
 def verdict_of(evidence: Evidence) -> Verdict:
-    """Return what a fit comes to, why, and the likeliest causes.
+    """Judge a fit: the verdict, its reason, and the likeliest causes.
 
     An interruption in what follows the tests of its residuals leaves the verdict as it is.
     """
@@ -47,9 +47,11 @@ def verdict_of(evidence: Evidence) -> Verdict:
     matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)
     averages = evidence.averages
     good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
+    noise_is_carried = any(test.carried > NEGLIGIBLE for test in tests)
     contradicted: list[Contradiction | RecorderAverages] = []
     try:
-        contradicted += _contradictions(evidence, tests) if good_but_for_averages else ()
+        if good_but_for_averages and not noise_is_carried:
+            contradicted += contradictions(evidence)
     except KeyboardInterrupt:
         words, reason = MATCHES, UNTESTED
         evidence.pace.stopped((VALUES,), interrupted=True)
@@ -59,14 +61,8 @@ def verdict_of(evidence: Evidence) -> Verdict:
         words, reason = MATCHES, contradicted[0].reason
     causes = (*(each.cause for each in contradicted), *causes_of(evidence, matched))
     if words == MATCHES:
-        causes = (*causes, *_in_doubt(averages), *_undetermined(evidence))
+        causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
-
-
-def _contradictions(evidence: Evidence, tests: Sequence[ResidualTests]) -> list[Contradiction]:
-    """Values of the case that the record contradicts, none where its noise is carried."""
-    carried = any(test.carried > NEGLIGIBLE for test in tests)
-    return [] if carried else contradictions(evidence)
 
 
 def _shown(
@@ -78,14 +74,8 @@ def _shown(
     return (averages,) if matched or averages.reason in reason else ()
 
 
-def _in_doubt(averages: RecorderAverages | None) -> Iterator[Cause]:
-    """Yield that the recorder may average, where that matters and the record does not show it."""
-    if averages is not None and averages.matters and not averages.shown:
-        yield averages.cause
-
-
 def verdict_alone(evidence: Evidence) -> Verdict:
-    """Return what a fit comes to and why, by its residuals alone: without causes."""
+    """Judge a fit by its residuals alone, without causes."""
     tests = residual_tests(evidence)
     return Verdict(*_judged(evidence, tests), residuals=tests)
 
@@ -101,7 +91,10 @@ def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[Verdict
     if not solution.success and not (seen and solution.stop is Stop.STALLED):
         return NOT_CONVERGED, solution.message
     if seen:
-        return MISSES, _missed(max(seen, key=lambda test: test.share), evidence)
+        most = max(seen, key=lambda test: test.share)
+        signal = _label(most.record, most.signal, evidence) or most.signal
+        share, times = digits(100.0 * most.share), digits(most.times)
+        return MISSES, f"{signal} is off by {share} % of its range (rmse {times} x noise)"
     doubts = [*_doubts(evidence, tests)]
     if doubts:
         return MATCHES, "; ".join(doubts)
@@ -109,7 +102,7 @@ def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[Verdict
 
 
 def _no_match(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
-    """Yield the signals that the response matches no better than a constant would.
+    """Find signals for which a constant would match as well as the response.
 
     The signal that a record is judged by counts as it is; another where what is left can be seen.
     """
@@ -119,16 +112,14 @@ def _no_match(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[st
         signals = [judged, *(signal for signal in comparison.channels if signal != judged)]
         for signal in signals:
             counts = signal == judged or (comparison.name, signal) in seen
-            if counts and not comparison.channels[signal].describes:
-                yield _how_it_fails(comparison, signal, evidence)
-
-
-def _how_it_fails(comparison: Comparison, signal: str, evidence: Evidence) -> str:
-    where = _label(comparison.name, signal, evidence)
-    if correlation(comparison.overlays[signal]) < OTHER_WAY:
-        return f"the response goes the other way{f' ({where})' if where else ''}"
-    what = where or "the record"
-    return f"the response matches {what} no better than a constant would"
+            if not counts or comparison.channels[signal].describes:
+                continue
+            where = _label(comparison.name, signal, evidence)
+            if correlation(comparison.overlays[signal]) < OTHER_WAY:
+                yield f"the response goes the other way{f' ({where})' if where else ''}"
+            else:
+                what = where or "the record"
+                yield f"the response matches {what} no better than a constant would"
 
 
 def correlation(overlay: Overlay) -> float:
@@ -140,14 +131,8 @@ def correlation(overlay: Overlay) -> float:
     return float(measured @ simulated) / size if size else 0.0
 
 
-def _missed(test: ResidualTests, evidence: Evidence) -> str:
-    signal = _label(test.record, test.signal, evidence) or test.signal
-    share, times = digits(100.0 * test.share), digits(test.times)
-    return f"{signal} is off by {share} % of its range (rmse {times} x noise)"
-
-
 def _label(record: str, signal: str, evidence: Evidence) -> str:
-    """Return which signal is meant, "" where there is no other."""
+    """Name a signal, and its record of several; "" where there is no other."""
     several = len(evidence.records) > 1
     if not several and len(evidence.residuals.channels) == 1:
         return ""
@@ -155,7 +140,8 @@ def _label(record: str, signal: str, evidence: Evidence) -> str:
 
 
 def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
-    """Yield what keeps a fit that matches from being good."""
+    """Name the reasons for which a fit that matches is not good."""
+
     undetermined = evidence.undetermined
     if undetermined:
         verb = "is" if len(undetermined) == 1 else "are"
@@ -175,8 +161,6 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
 
 
 def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[str]:
-    """Yield which residuals are not noise, or more of it than their record has."""
-
     def signals(chosen: Iterable[ResidualTests]) -> str:
         return listed([_label(t.record, t.signal, evidence) or t.signal for t in chosen])
 
@@ -189,7 +173,10 @@ def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[s
 
 
 def _undetermined(evidence: Evidence) -> Iterator[Cause]:
-    """Yield which parameters the records do not determine."""
+    """Name averages that may matter, and the parameters that are not determined, with remedies."""
+    averages = evidence.averages
+    if averages is not None and averages.matters and not averages.shown:
+        yield averages.cause
     names = evidence.undetermined
     if len(names) == 1:
         remedy = "fix it if it is known, or plan a test that shows it (`exfit identify`)"

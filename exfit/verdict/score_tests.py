@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import slopes_of
@@ -19,7 +18,6 @@ from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
 from exfit.results.typical_values import parameters_of
 from exfit.results.verdict import REJECTED, Cause
-from exfit.simulation.inputs import InputStep
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
 from exfit.verdict.causes.steps import correct_instant, correct_step
@@ -95,7 +93,7 @@ class Contradiction(NamedTuple):
 
 
 def contradictions(evidence: Evidence) -> list[Contradiction]:
-    """Return what the record contradicts of what its case holds fixed, the likeliest first.
+    """Test what the case of a record holds fixed, and list what it contradicts, likeliest first.
 
     The residuals are projected on what a value does that the free parameters cannot do, in their
     own variances: chi-square of one degree of freedom, if the value is right. It may be exceeded
@@ -113,30 +111,23 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
         linear, directions, shift = _linearised(evidence)
     except SimulationError:
         return []
-    spread = _spread(evidence)
+    noises = evidence.uncertainty.confidence.noise
+    deviations = [  # of the weighted errors, widened if they are not white
+        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
+        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
+    ]
+    spread = np.repeat(deviations, evidence.residuals.sizes)
     scores = [
         score
         for held, direction in directions
         if (score := _score(held, direction, linear, spread, shift)) is not None
     ]
-    rejected = [each for each in scores if _tail(each.chi_square) * len(scores) < REJECTED]
+    rejected = [
+        each for each in scores if erfc(sqrt(0.5 * each.chi_square)) * len(scores) < REJECTED
+    ]
     largest = max((each.chi_square for each in rejected), default=0.0)
     rejected = [each for each in rejected if each.chi_square > LEAST_SHARE * largest]
     return sorted(rejected, key=lambda each: -each.likelihood)
-
-
-def _tail(chi_square: float) -> float:
-    return erfc(sqrt(0.5 * chi_square))
-
-
-def _spread(evidence: Evidence) -> Array:
-    """Return the standard deviation (M,) of the weighted errors, widened if they are not white."""
-    noises = evidence.uncertainty.confidence.noise if evidence.uncertainty else ()
-    spreads = [
-        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
-        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
-    ]
-    return np.repeat(spreads, evidence.residuals.sizes)
 
 
 def _score(
@@ -194,19 +185,14 @@ def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, flo
         for held, opened in _of_test(evidence, number):
             extended = with_opened(extended, number, [opened])
             of_test.append(held)
-    fixed = _acting(evidence)
-    freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
-    return with_freed(extended, freed), of_test, fixed
-
-
-def _acting(evidence: Evidence) -> dict[str, float]:
-    """Return the fixed values of the unit that its responses depend on, but for zeros."""
     rows, used = evidence.case.rows(), parameters_of(evidence.case)
-    return {
+    fixed = {  # what the responses depend on, but for zeros
         name: value
         for name, value in evidence.residuals.fixed.items()
         if value and name in rows and name in used
     }
+    freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
+    return with_freed(extended, freed), of_test, fixed
 
 
 def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
@@ -239,7 +225,9 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
         nuisance = Nuisance(f"held{number}.{kind}{step}", kind, step)
         return Opened(nuisance, value, value - 1.0, value + 1.0)
 
-    steps = _steps_of_test(evidence, experiment)
+    steps = experiment.simulator.inputs.steps
+    if evidence.case.kind.finds_rest:  # the others are jumps of what is recorded
+        steps = tuple(step for step in steps if step.signal in REFERENCES)
     for place, step in enumerate(steps):
         if step.step and ("step", place) not in found:
             words = f"the step of {step.step:+g} pu{of_record}"
@@ -255,14 +243,6 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
         given = evidence.records[number].given_vt0
         voltage = Held(f"vt0 = {given:g}{of_record}", LEAVE_VT0_OUT, unit="pu") if given else Held()
         yield voltage, opened("vt0", experiment.own[VT0])
-
-
-def _steps_of_test(evidence: Evidence, experiment: Experiment) -> tuple[InputStep, ...]:
-    """Return the steps that a test makes; the others of an event are jumps of what is recorded."""
-    steps = experiment.simulator.inputs.steps
-    if not evidence.case.kind.finds_rest:
-        return steps
-    return tuple(step for step in steps if step.signal in REFERENCES)
 
 
 def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Array]]:
