@@ -141,7 +141,7 @@ def _network_values(view: Case) -> dict[str, float]:
 
 
 def _beyond(nuisances: Sequence[Nuisance], free: Sequence[FreeParameter], delay: float) -> float:
-    """Return by how much longer than the record, s, a fit that may read it earlier simulates."""
+    """Time (s) after the end of the record that a fit simulates which may read it earlier."""
     earlier = sum(
         parameter.start - parameter.low
         for parameter, nuisance in zip(free, nuisances, strict=True)

@@ -111,7 +111,7 @@ def _movements(residuals: Residuals) -> Array:
 
 
 def _agree(before: Array, after: Array, tolerance: float) -> bool:
-    """Return whether two sets of deviations give the same weights."""
+    """Test whether two sets of deviations give the same weights."""
     changes = np.log(after / before)
     return float(np.ptp(changes)) <= tolerance
 
@@ -146,7 +146,7 @@ def _with_channels(experiment: Experiment, changed: Callable[[Channel], Channel]
 
 
 def weight_notes(residuals: Residuals) -> Iterator[str]:
-    """Yield how the channels are weighted, where their residuals decide it."""
+    """Note the weights of channels, where their residuals decide them."""
     several = len(residuals.experiments) > 1
     weighted_by_noise = any(each.whitening is not None for each in residuals.experiments)
     deviations = [

@@ -33,7 +33,7 @@ INDEPENDENT = 2.0  # times the length over which filtered noise is correlated
 
 
 class NoiseShape(NamedTuple):
-    """What becomes of white noise in a channel: its ``gain``, and how it is correlated.
+    """White noise as it comes out of a channel: its ``gain``, and its correlation.
 
     Of samples that are ``apart`` by so many, each is independent of the one before.
     """
@@ -103,7 +103,7 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Cha
 
 
 def _kept(record: Record, signal: str, section: Section) -> Mask:
-    """Return which samples of a channel are compared: numbers, and no outliers."""
+    """Mask of the samples of a channel to compare: numbers, and no outliers."""
     from exfit.dsp.filtering import outliers
 
     samples = record.signals[signal]
@@ -119,7 +119,7 @@ def _kept(record: Record, signal: str, section: Section) -> Mask:
 
 
 def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> "Filtering | None":
-    """Return what is done to the samples of a channel, None where nothing is."""
+    """Filter and averages of a channel's samples, None where there is neither."""
     from exfit.dsp.filtering import Filtering, MovingAverage
 
     widest = len(kept) // LEAST_WINDOWS
@@ -170,7 +170,7 @@ def finest_noise(case: Case, own: float) -> float:
 
 
 def noise_shape(channel: Channel) -> NoiseShape:
-    """Return what the averages of a channel's record and its filter make of white noise."""
+    """Shape of white noise after the averages of a channel's record and its filter."""
     from exfit.inference.noise import effective_samples
 
     filtering = channel.filtering

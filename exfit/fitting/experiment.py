@@ -46,7 +46,7 @@ class Channel:
         return samples if self.filtering is None else self.filtering.apply(samples)
 
     def compared(self, simulated: Array) -> Array:
-        """Return what is compared of simulated signals (K, M), a row (errors,) of each."""
+        """Treat simulated signals (K, M) as the record is, a row (errors,) of each."""
         if self.filtering is None:
             return simulated
         return np.stack([self.filtered(samples) for samples in simulated])
@@ -64,24 +64,24 @@ class Channel:
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Which samples are compared, (M,)."""
+        """Mask of the samples to compare, (M,)."""
         if self.filtering is None:
             return np.ones(len(self.measured), dtype=bool)
         return self.filtering.kept
 
     @property
     def samples(self) -> int:
-        """How many samples are compared."""
+        """Number of samples to compare."""
         return int(np.count_nonzero(self.kept))
 
     @property
     def size(self) -> int:
-        """How many errors there are: one for each of these samples."""
+        """Number of errors: one for each of these samples."""
         return self.samples
 
     @property
     def plain(self) -> bool:
-        """Whether samples are compared as they are."""
+        """Flag of samples that are compared as they are."""
         if self.filtering is None:
             return True
         return self.filtering.filter is None and self.filtering.averaged is None
@@ -106,12 +106,12 @@ class Experiment:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """The signals that are compared."""
+        """Signals to compare."""
         return tuple(channel.signal for channel in self.channels)
 
     @property
     def moves(self) -> bool:
-        """Whether the fit moves what its simulations do not have side by side."""
+        """Flag of a fit that moves what its simulations do not have side by side."""
         return any(
             nuisance.kind in ("at", "shift", "step", "drift", "switching", "delay")
             for nuisance in self.nuisances
@@ -119,7 +119,7 @@ class Experiment:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """How many errors each channel has."""
+        """Number of errors of each channel."""
         return tuple(channel.size for channel in self.channels)
 
     def parameters(self, values: Values) -> dict[str, float]:
@@ -157,7 +157,7 @@ class Experiment:
 
     @cached_property
     def _averages(self) -> Averages | None:
-        """What short windows of averages show of the simulation, None where that is its samples."""
+        """Short windows of averages of the simulation, None where those are its samples."""
         filterings = [channel.filtering for channel in self.channels]
         return averages_of(filterings) if self.simulator.responder.alone else None
 
@@ -247,7 +247,6 @@ class Experiment:
         return errors if self.whitening is None else self.whitening.errors(errors)
 
     def _moved_channel(self, channel: Channel) -> bool:
-        """Return whether the scale or offset of a channel is found."""
         return any(nuisance.rescales(channel.signal) for nuisance in self.nuisances)
 
     def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ Values = Mapping[str, float]
 
 
 def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
-    """Return what a test changes, in the order of time; a switch says what is from then on.
+    """List the changes that a test makes, in the order of time; a switch sets a value from then on.
 
     ``values`` are those of the network at the start. Raises CaseError where the source would lose
     its voltage.
@@ -60,7 +60,7 @@ def _opening(test: BumpTest) -> Iterator[InputStep]:
 
 
 def _step_of(event: StepSection | Switch, name: str, level: float | None) -> float | None:
-    """Return by how much an event changes R, X or E; None where it leaves it."""
+    """Change of R, X or E by an event; None where it leaves it."""
     if isinstance(event, StepSection):
         return event.step if name == "E" else None
     then: float | None = getattr(event, name)

@@ -16,7 +16,7 @@ POSSIBLE_VOLTAGES = (0.1, 2.0)  # pu: voltages beyond are those of another unit 
 
 
 def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
-    """Return the parameters that a record gives: the levels of its signals at the start."""
+    """Parameters that a record gives: the levels of its signals at the start."""
     from exfit.plants.playback import initial
 
     kind, vt0 = case.kind, initial_voltage(test, record)
@@ -44,7 +44,7 @@ def _refuse_impossible(vt0: float, record: Record) -> None:
 
 
 def deviation(test: BumpTest, record: Record, signal: str) -> Array:
-    """Return by how much a recorded signal (M,) deviates from where it starts."""
+    """Deviation of a recorded signal (M,) from its start."""
     if signal == "vt":
         return record.signals[signal] - initial_voltage(test, record)
     return record.signals[signal] - initial_level(test, record, signal)

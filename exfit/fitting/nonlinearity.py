@@ -17,7 +17,7 @@ MOST_RISE = 1.25  # times the rise that linear theory predicts: there an end may
 
 
 class TraceEnd(NamedTuple):
-    """Where a parameter reaches an end of its linear interval: all parameters there, scaled (N,).
+    """End of a parameter's linear interval: all parameters there, scaled (N,).
 
     ``within``: all of them lie within their bounds.
     """

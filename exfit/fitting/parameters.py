@@ -18,7 +18,7 @@ UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a parameter beforehand: its mean and standard deviation."""
+    """Prior of a parameter: its mean and standard deviation."""
 
     mean: float
     std: float
@@ -74,7 +74,7 @@ class FreeParameter:
         return {self.scaled(bound): bound for bound in (self.high, self.low)}
 
     def scaled(self, value: float) -> float:
-        """Return the number that the estimator moves."""
+        """Number that the estimator moves for a value."""
         return float(np.log(value)) if self.logarithmic else value / self._linear_scale
 
     def value(self, scaled: float) -> float:
@@ -84,14 +84,14 @@ class FreeParameter:
         return float(np.exp(scaled)) if self.logarithmic else scaled * self._linear_scale
 
     def bound(self, value: float) -> Literal["min", "max"] | None:
-        """Return which bound a value lies on."""
+        """Name the bound on which a value lies."""
         if value == self.low:
             return "min"
         return "max" if value == self.high else None
 
     @property
     def scaled_least(self) -> float:
-        """What is scaled of ``least``."""
+        """Scaled form of ``least``."""
         return -inf if self.logarithmic else self.least / self._linear_scale
 
     def slope(self, scaled: float) -> float:

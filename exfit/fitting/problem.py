@@ -15,7 +15,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """What a fit makes small, in two forms with the same cost and gradient at every point.
+    """Residuals of a fit, in two forms with the same cost and gradient at every point.
 
     ``residuals`` are those of all samples; ``compressed`` are fewer, or the same where nothing is
     gained.
@@ -63,7 +63,7 @@ def residuals_of(
 
 
 def robust_of(case: Case) -> Robust | None:
-    """Return the loss that a case has in place of the squares."""
+    """Loss of a case in place of the squares."""
     from exfit.dsp.robust_loss import LOSSES
 
     estimate = case.estimate

@@ -22,7 +22,7 @@ REALISATIONS = 4
 def carried_noise(
     setup: ExperimentSetup, values: Values, realisations: int = REALISATIONS
 ) -> list[Array]:
-    """Return by how much more noise on the recorded inputs moves each channel, pu.
+    """Draw moves of each channel, pu, by more noise on the recorded inputs.
 
     White noise as strong as that of each input is added to it, several times: what the response
     then does (realisations, errors) is what the record's own noise does to it. It is empty without

@@ -94,7 +94,7 @@ def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
 
 
 def read_section(file: RecordFile, folder: Path, per_unit: bool, f0: float = 1.0) -> Record:
-    """Return the record that a section describes, its file relative to a folder.
+    """Read the record of a section, its file relative to a folder.
 
     ``per_unit``: numbers that the section takes as they are must not be in another unit by the
     file. ``f0`` is the rated frequency, Hz. Raises RecordError where it cannot be read.
@@ -226,7 +226,7 @@ def column_of(channel: ChannelSection) -> Column:
 
 
 def standing_alone(channel: ChannelSection | PhasesSection | ReferenceFile) -> bool:
-    """Return whether a case takes the numbers of a column for per unit."""
+    """Test whether a case takes the numbers of a column for per unit."""
     if isinstance(channel, PhasesSection):
         return False
     return channel.unit is None and channel.base is None and channel.scale == 1.0

@@ -75,7 +75,7 @@ class Residuals:
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
-        """How many errors each channel of each record has."""
+        """Number of errors of each channel of each record."""
         return tuple(size for experiment in self.experiments for size in experiment.sizes)
 
     @property
@@ -85,12 +85,12 @@ class Residuals:
 
     @property
     def count(self) -> int:
-        """How many errors there are."""
+        """Number of errors."""
         return sum(self.sizes)
 
     @property
     def samples(self) -> int:
-        """How many samples are compared: as many, unless they are compressed."""
+        """Number of samples that are compared: as many, unless they are compressed."""
         return sum(channel.samples for channel in self.channels)
 
     @property
@@ -122,7 +122,7 @@ class Residuals:
 
     @property
     def shift(self) -> Array:
-        """What is taken from the errors (M,) of the records for the bias by what drives them."""
+        """Shift that is taken from the errors (M,) of the records for the bias by inputs."""
         return np.concatenate(
             [
                 np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.shift
@@ -131,7 +131,7 @@ class Residuals:
         )
 
     def match(self, residuals: Array, rmse: float) -> bool:
-        """Return whether no channel of any record has a root mean square error above ``rmse``.
+        """Test that no channel of any record has a root mean square error above ``rmse``.
 
         ``residuals`` (samples + priors,) are weighted; those of priors do not count.
         """
@@ -192,7 +192,7 @@ class Residuals:
         return np.vstack([slopes, of_priors])
 
     def influence(self, errors: Array) -> tuple[Array, Array]:
-        """Return how far each weighted error pulls, and the derivative of that; (samples,)."""
+        """Pull of each weighted error, and the derivative of that; (samples,)."""
         if self.robust is None:
             return errors, np.ones_like(errors)
         loss = self.robust.loss
@@ -200,7 +200,7 @@ class Residuals:
 
     @property
     def priors(self) -> dict[int, Prior]:
-        """What is known beforehand, by the place of the parameter among the free ones."""
+        """Priors by the place of the parameter among the free ones."""
         return {
             k: parameter.prior
             for k, parameter in enumerate(self.free)
@@ -342,7 +342,7 @@ class Residuals:
         return [np.where(np.arange(len(theta)) == k, to, theta) for k in range(len(theta))]
 
     def moves(self, theta: Array) -> list[dict[str, float]]:
-        """Return which values each scaled parameter moves, and how fast.
+        """Values that each scaled parameter moves, with their rates.
 
         Raises SimulationError where what follows them moves infinitely fast.
         """

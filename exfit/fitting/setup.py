@@ -62,7 +62,7 @@ class ExperimentSetup:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The signals that are compared."""
+        """Signals to compare."""
         return self.experiment.channels
 
     def with_start_values(self, values: Values) -> dict[str, float]:

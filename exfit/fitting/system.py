@@ -65,7 +65,7 @@ def _system_of(case: Case, recording: Recording | None) -> System:
 
 
 def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]:
-    """Return the inputs that the tests and records of a case change; the reference always is one.
+    """Inputs that the tests and records of a case change; the reference always is one.
 
     The breaker is one where it opens: in the test of the ``recording``, or else in any.
     """
@@ -111,7 +111,7 @@ def stabilised(case: Case) -> Stabilised | None:
 
 
 def recorded_in_all(case: Case) -> frozenset[str]:
-    """Return the signals that all records of a case hold."""
+    """Signals in all records of a case."""
     records = [{*file.channels} for file in _record_files(case).values()]
     return frozenset(set.intersection(*records) if records else ())
 

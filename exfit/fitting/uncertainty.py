@@ -35,7 +35,7 @@ PLURALS = {"has": "have", "is": "are", "lies": "lie", "depends": "depend"}
 
 
 class Sensitivity(NamedTuple):
-    """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S,), pu.
+    """Move of a signal over ``time`` (S,) in s for 100 % of each parameter: (S,), pu.
 
     What counts as 100 % says `Linearisation.ranked_size`. What belongs to a record is not among the
     parameters.
@@ -84,7 +84,7 @@ class UncertaintyAnalysis:
     given_errors: Mapping[str, GivenError] = field(default_factory=dict)
 
     def variance_given(self, name: str) -> float:
-        """Return what the errors of given values add to the variance of a parameter."""
+        """Variance of a parameter by the errors of given values."""
         return sum(error.shifts[name] ** 2 for error in self.given_errors.values())
 
     def without_intervals(self, why: str) -> "UncertaintyAnalysis":
@@ -106,7 +106,7 @@ class UncertaintyAnalysis:
 
     @property
     def open(self) -> tuple[str, ...]:
-        """What is not determined, and what could be done about it, in words."""
+        """Word what is not determined, with remedies."""
         without = {
             name: parameter
             for name, parameter in self.confidence.parameters.items()
@@ -130,12 +130,12 @@ class UncertaintyAnalysis:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What a reader must know of it, in words."""
+        """List all that a reader must know of it, in words."""
         return (*self.confidence.sentences, *self.open)
 
 
 def shared_reason(names: Sequence[str], why: str) -> str:
-    """Return why one or several parameters have no interval, or an open one."""
+    """Word the reason for which one or several parameters have no interval, or an open one."""
     if len(names) > 1:
         verb, _, rest = why.partition(" ")
         why = f"{PLURALS.get(verb, verb)} {rest}"
@@ -145,7 +145,7 @@ def shared_reason(names: Sequence[str], why: str) -> str:
 def uncertainty_at(
     problem: FitProblem, theta: Array, of_record: tuple[str, ...]
 ) -> UncertaintyAnalysis:
-    """Return how well the records determine the scaled parameters theta (N,).
+    """Analyse the uncertainty of the scaled parameters theta (N,).
 
     ``of_record`` names what belongs to a record and is no parameter of the unit. Raises
     SimulationError where a derivative is not finite.
@@ -154,7 +154,7 @@ def uncertainty_at(
 
 
 def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> UncertaintyAnalysis:
-    """Return the uncertainty that a linearisation at theta (N,) shows."""
+    """Analyse the uncertainty by a linearisation at theta (N,)."""
     intervals = within_bounds(confidence(linear), problem.residuals.free)
     return UncertaintyAnalysis(
         confidence=intervals,
@@ -181,7 +181,7 @@ def within_bounds(intervals: Confidence, free: Sequence[FreeParameter]) -> Confi
 
 
 def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
-    """Yield that of each channel: at the record's samples or, where compressed, of the grid."""
+    """Sensitivity of each channel: at the record's samples or, where compressed, of the grid."""
     residuals = problem.residuals
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.ranked_size / slopes_of(residuals, theta)
@@ -248,7 +248,7 @@ def _prior_rows(residuals: Residuals) -> Iterator[PriorRow]:
 def _channels(
     residuals: Residuals, rows: Sequence[int], errors: Array, slopes: Array
 ) -> Iterator[ResidualBlock]:
-    """Yield where the errors of each channel are among those (M,) of all, and its rows.
+    """Yield the places of each channel's errors among those (M,) of all, and its rows.
 
     ``slopes`` (R, N) are the derivatives of the errors, in as many rows or in fewer.
     """
@@ -272,7 +272,7 @@ def _channels(
 
 
 def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None:
-    """Return what the steps of a recorder add to the weighted errors (M,) of a channel.
+    """Errors (M,) of a channel by the steps of its recorder, weighted.
 
     ``slopes`` (M, N) are the derivatives of these. None where the steps are no larger than its
     noise, and for a planned test, which has no errors.
@@ -289,6 +289,6 @@ def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None
 
 
 def slices(sizes: Sequence[int]) -> list[slice]:
-    """Return where blocks of these sizes lie, one behind the other."""
+    """Places of blocks of these sizes, one behind the other."""
     ends = list(accumulate(sizes))
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]

@@ -118,7 +118,7 @@ def _event(case: Case, recording: Recording, values: Values, given: GivenSteps) 
 
 
 def _stepped(case: Case, test: BumpTest) -> str | None:
-    """Return the signal that is stepped, None with a plant whose tests have no steps.
+    """Name the signal that is stepped, None with a plant whose tests have no steps.
 
     Raises CaseError where the test of the case changes the network, or opens the breaker.
     """
@@ -143,7 +143,7 @@ def _built(case: Case, recording: Recording, values: Values, test: Test) -> Expe
 
 
 def _inspected(file: RecordFile, folder: Path) -> Inspection:
-    """Return what all channels of a file show: more than those that the case names."""
+    """Inspect all channels of a file: more than those that the case names."""
     clock = clock_of(file.time)
     table = open_table(folder / file.file, file.sheet, file.memory)
     return inspect(table, clock.columns, clock.unit)
@@ -281,7 +281,7 @@ def _earliest(record: Record, steps: Sequence[RecordedStep], k: int) -> float:
 
 
 def _start(record: Record, steps: Sequence[RecordedStep]) -> Test:
-    """Return what of a test says where it starts: at rest, at the level of the record."""
+    """Keys of a test that say where it starts: at rest, at the level of the record."""
     test: dict[str, Any] = dict.fromkeys(("vt0", "begin", "duration", "steady_until"))
     test |= dict.fromkeys(REFERENCES, ())
     vt = record.signals.get("vt")
@@ -295,7 +295,7 @@ def _start(record: Record, steps: Sequence[RecordedStep]) -> Test:
 
 
 def _earlier(test: BumpTest, signal: str, record: Record) -> Test:
-    """Return what was done before a record, as the test of the case gives it; {} for nothing."""
+    """Keys of a test for the steps before a record, as the case gives them; {} for none."""
     steps = tuple(
         event
         for event in test.events(signal)
@@ -309,7 +309,7 @@ def _earlier(test: BumpTest, signal: str, record: Record) -> Test:
 def _begins_there(
     setup: ExperimentSetup, values: Values, first: RecordedStep, sizes: Sequence[float]
 ) -> bool:
-    """Return whether a record begins where the steps before it have led the simulation."""
+    """Test whether a record begins where the steps before it have led the simulation."""
     vt = setup.record.signals.get("vt")
     if vt is None:
         return True

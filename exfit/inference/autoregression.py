@@ -96,7 +96,7 @@ def _likelihood(angles: Array, products: Array, dof: int) -> float:
 
 
 def _whitener(angles: Array) -> Array:
-    """Return what makes white errors of those that are correlated, from the last one back."""
+    """Matrix that makes correlated errors white, from the last one back."""
     return np.concatenate([[1.0], -_coefficients(LARGEST_PARTIAL * np.tanh(angles))])
 
 

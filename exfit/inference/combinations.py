@@ -23,7 +23,7 @@ TIED = 6  # digits: components that differ less are equal but for rounding
 
 @dataclass(frozen=True)
 class SignalChange:
-    """By how much a signal moves: root mean square, in pu and in standard deviations of noise."""
+    """Change of a signal: root mean square, in pu and in standard deviations of noise."""
 
     signal: str
     rms: Annotated[float, nan]
@@ -48,7 +48,7 @@ class Combination:
     reached: Mapping[str, Annotated[float, inf]] = field(default_factory=dict)
 
     def leaves(self, intervals: Mapping[str, tuple[float, float]]) -> bool:
-        """Return whether a move leads out of the interval of a parameter, by name."""
+        """Test whether a move leads out of the interval of a parameter, by name."""
         return any(
             not intervals[name][0] <= value <= intervals[name][1]
             for name, value in self.reached.items()
@@ -72,7 +72,7 @@ def seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Ar
 
 
 def exact_combinations(lin: Linearisation, noise: Sequence[Noise]) -> Iterator[Combination]:
-    """Yield what changes no signal; parameters on a bound too: this may be why they are there."""
+    """Find combinations that change no signal; of parameters on a bound too, which may be why."""
     factors = factored(lin, np.ones(len(lin.names), dtype=bool))
     signals = listed([block.label for block in lin.channels])
     still = tuple(SignalChange(block.label, 0.0, 0.0) for block in lin.channels)
@@ -110,7 +110,7 @@ def weak_combinations(
 
 
 def changes_of(lin: Linearisation, noise: Sequence[Noise], errors: Array) -> Iterator[SignalChange]:
-    """Yield by how much each channel changes with the weighted errors (M,)."""
+    """Change of each channel with the weighted errors (M,)."""
     for channel, channel_noise in zip(lin.channels, noise, strict=True):
         rms = float(np.linalg.norm(errors[channel.rows])) / sqrt(channel_noise.samples)
         yield SignalChange(

@@ -30,7 +30,7 @@ IntervalMethod = Literal["linear", "profile", "hull", "windows", "averages"]
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How well one parameter is known.
+    """Uncertainty of one parameter.
 
     std_error       in its own unit; None where nothing determines it
     relative_error  std_error / |value|; None also where the value is 0
@@ -50,12 +50,12 @@ class Uncertainty:
 
     @property
     def determined(self) -> bool:
-        """Whether the record limits the parameter on both sides."""
+        """Flag of a parameter that the record limits on both sides."""
         return closed(self.interval)
 
 
 def closed(interval: Interval | None) -> bool:
-    """Return whether there is an interval with limits on both sides."""
+    """Test whether there is an interval with limits on both sides."""
     return interval is not None and None not in interval
 
 
@@ -69,7 +69,7 @@ class Correlation:
 
 @dataclass(frozen=True, eq=False)
 class Confidence:
-    """What linear theory says of all parameters together.
+    """Confidence of all parameters together, by linear theory.
 
     dof          degrees of freedom behind the noise; infinite if all of it was given
     sentences    what is remarkable about the noise
@@ -145,7 +145,7 @@ def confidence(
 
 
 def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
-    """Return by how much the cost rises from its minimum to the ends of each profile's interval.
+    """Rise of the cost from its minimum to the ends of each profile's interval.
 
     Half the squared quantile of its error, times the variance of the parameter over that by the
     cost alone, the inverse of its second derivatives (Royall & Tsou 2003). With one channel and
@@ -192,7 +192,7 @@ def _variance_ratios(factors: Factors, noise: tuple[Noise, ...]) -> Array:
 def partners_on_bounds(
     lin: Linearisation, noise: tuple[Noise, ...], least: float = CORRELATED
 ) -> dict[str, tuple[str, ...]]:
-    """Return which parameters would be others if those on a bound were let go, and which these are.
+    """Name parameters that would change if those on a bound were let go, each with these.
 
     Those are all that correlate with one on a bound by more than ``least``, by linear theory for
     all parameters free, or that cannot be distinguished from one.
@@ -222,7 +222,7 @@ def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
 
 
 def uncertainty(factors: Factors, k: int, share: float, t: float, why: str | None) -> Uncertainty:
-    """Return what is known of parameter k.
+    """Uncertainty of parameter k.
 
     ``share``: its standard error, of 100 %; ``t``: half of its interval in standard errors;
     ``why`` it has no interval.
@@ -242,7 +242,7 @@ def uncertainty(factors: Factors, k: int, share: float, t: float, why: str | Non
 
 
 def reason(factors: Factors, k: int, share: float, data: str, hint: str) -> str | None:
-    """Return why a parameter has no interval."""
+    """Word the reason for which a parameter has no interval."""
     lin = factors.lin
     if lin.held[k] is not None:
         return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: the bound decides, not {data}"

@@ -36,12 +36,12 @@ class Factors:
 
     @property
     def leverage(self) -> float:
-        """How many parameters the errors determine; what the priors determine does not count."""
+        """Number of parameters that the errors determine, those by priors aside."""
         return float(np.sum(self.left[: len(self.lin.jacobian)] ** 2))
 
     @cached_property
     def determined(self) -> Mask:
-        """Which of all parameters (N,) are determined at all."""
+        """Mask of the parameters (N,) that are determined at all."""
         determined = np.zeros(len(self.has_effect), dtype=np.bool_)
         determined[self.has_effect] = ~self.joined.any(axis=0)
         return determined
@@ -81,7 +81,7 @@ class Factors:
         return max(widened, rounded, key=lambda errors: float(np.sum(errors**2)))
 
     def rounding_errors(self, noise: Sequence["Noise"]) -> tuple[Array, Array] | None:
-        """Return how the errors of a recorder's rounding spread relative changes.
+        """Spread of relative changes by the errors of a recorder's rounding.
 
         That is the standard deviation (N,) of all other errors, which are normal, and the waves
         (N, 2 K) that rounding adds; None unless the covariance of one channel is by its rounding.
@@ -177,6 +177,6 @@ def pivots(rows: Array) -> list[int]:
 
 
 def takes_part(directions: Array) -> Mask:
-    """Return which components of each direction (d, k) count."""
+    """Mask of the components of each direction (d, k) that count."""
     size = np.abs(directions)
     return np.asarray(size > TAKES_PART * np.max(size, axis=1, keepdims=True, initial=0.0))

@@ -26,7 +26,7 @@ class FixingErrors(NamedTuple):
 
 @dataclass(frozen=True)
 class Fixing:
-    """What fixing parameters, all ``names`` of them, brings for the standard errors of the others.
+    """Gain in the standard errors of the others by fixing parameters, all ``names`` of them.
 
     errors: name to relative standard error with nothing fixed and now; infinite: not determined.
     """
@@ -37,13 +37,13 @@ class Fixing:
 
     @property
     def concerned(self) -> frozenset[str]:
-        """The parameters that its sentence speaks of: those to fix, and those then known better."""
+        """Parameters of its sentence: those to fix, and those then known better."""
         better = (name for name, each in self.errors.items() if each.after < BETTER * each.before)
         return frozenset((*self.names, *better))
 
 
 def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
-    """Yield which parameters to fix, one more each time, until the others are known to WEAK.
+    """Suggest parameters to fix, one more each time, until the others are known to WEAK.
 
     The next is the first that a rank-revealing QR picks from the weak directions (Golub, Klema &
     Stewart 1976), exact ones before others. Nuisances are never fixed; their errors do not count.
@@ -88,7 +88,7 @@ def next_to_fix(factors: Factors, noise: Sequence[Noise], model: Mask) -> int:
 def fixing_sentence(
     lin: Linearisation, fixed: Sequence[int], others: Indices, before: Array, now: Array
 ) -> str:
-    """Return what fixing brings, the most improved first."""
+    """Word the gain by fixing, the most improved first."""
     start = f"with {listed([lin.names[k] for k in fixed])} fixed"
     better = [int(k) for k in others if now[k] < BETTER * before[k]]
     if not better:

@@ -21,7 +21,7 @@ from exfit.inference.linear import Array, Linearisation
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """What the record determines of relative changes of the parameters ``names`` (K,).
+    """Relative changes of the parameters ``names`` (K,) that the record determines.
 
     Those on a bound and those without effect are not among them. singular_values (K,) descend,
     0 where exactly redundant; directions (K, K) has a row for each; condition is the ratio of the
@@ -39,7 +39,7 @@ class Identifiability:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What to report: the combinations, and what fixing parameters would bring."""
+        """The combinations in words, and the gain by fixing parameters."""
         return (
             *(combination.sentence for combination in self.unseen),
             *(fixing.sentence for fixing in self.suggestion),
@@ -58,7 +58,7 @@ class Identifiability:
 
 
 def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiability:
-    """Return which combinations of parameters the record does not see, and what would help.
+    """Find combinations of parameters that the record does not see, and remedies.
 
     Singular values and right directions of the Jacobian to relative changes
     (`Linearisation.size`), its rows divided by the noise: 1 / singular value is the standard error

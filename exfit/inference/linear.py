@@ -25,7 +25,7 @@ LEAST_CURVATURE = 1e-3  # of least squares: a loss that takes nearly every sampl
 
 
 class Rounding(NamedTuple):
-    """What a recorder that rounds to a ``step`` adds to the weighted errors of a channel.
+    """Errors that a recorder which rounds to a ``step`` adds to those of a channel, weighted.
 
     ``waves`` (samples, 2 K): waves waves' is the covariance of what is the same again where the
     signal stays at one level, cosines first, then sines; it is part of the ``variance`` of the
@@ -58,13 +58,13 @@ class ResidualBlock:
 
     @property
     def samples(self) -> slice:
-        """Which of the errors are its own."""
+        """Places of its errors."""
         return self.rows if self.errors is None else self.errors
 
 
 @dataclass(frozen=True)
 class PriorRow:
-    """What was known of a parameter: it adds the residual noise * (x - mean) / std to the fit.
+    """Prior of a parameter: it adds the residual noise * (x - mean) / std to the fit.
 
     noise is what the fit took as the standard deviation of a weighted error.
     """
@@ -149,7 +149,7 @@ class Linearisation:
 
     @cached_property
     def own_size(self) -> Array:
-        """The change that counts as 100 % where the question is whether a parameter is determined.
+        """Change that counts as 100 % where a parameter is judged to be determined or not.
 
         It is `size`, but the value itself where the bounds keep it from zero.
         """
@@ -159,7 +159,7 @@ class Linearisation:
 
     @cached_property
     def ranked_size(self) -> Array:
-        """The change that counts as 100 % where the effects of parameters are ranked, (N,).
+        """Change that counts as 100 % where the effects of parameters are ranked, (N,).
 
         It is the value and, of a value of 0, the interval between the bounds.
         """
@@ -168,7 +168,7 @@ class Linearisation:
 
     @property
     def free(self) -> Mask:
-        """Which parameters lie on no bound (N,)."""
+        """Mask of the parameters that lie on no bound (N,)."""
         return np.array([side is None for side in self.held], dtype=bool)
 
     @cached_property
@@ -197,5 +197,5 @@ class Linearisation:
 
     @property
     def prior_noise(self) -> Array:
-        """What the fit took as the standard deviation of an error, for each prior (P,)."""
+        """Standard deviation of an error as the fit took it, for each prior (P,)."""
         return np.array([prior.noise for prior in self.priors])

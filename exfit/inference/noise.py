@@ -58,12 +58,12 @@ class Noise:
 
     @property
     def series(self) -> Autoregression | None:
-        """The autoregression that describes the residuals."""
+        """Autoregression that describes the residuals."""
         partial = self.partial_autocorrelations
         return Autoregression(partial) if partial else None
 
     def sentences(self, alone: bool) -> Iterator[str]:
-        """Yield what is remarkable; ``alone``: there is no other channel."""
+        """Word all that is remarkable; ``alone``: there is no other channel."""
         if self.given is not None and self.accepted is False:
             used = "the larger one" if self.std != self.given else "the one given"
             yield (
@@ -124,7 +124,7 @@ def noise_of(factors: Factors) -> tuple[Noise, ...]:
 
 
 class OwnFit(NamedTuple):
-    """What the errors (M,) of one channel would be, had the parameters been fitted to it alone.
+    """Errors (M,) of one channel, had the parameters been fitted to it alone.
 
     left_over  of its errors (M,)
     amounts    (K,) of what a fit to all channels left to be fitted to this one
@@ -137,7 +137,7 @@ class OwnFit(NamedTuple):
 
 
 def own_fit(factors: Factors, channel: ResidualBlock) -> OwnFit:
-    """Return what a change of the parameters explains of the errors of one channel.
+    """Deduct from the errors of one channel all that a change of the parameters explains.
 
     An error of the parameters that another channel caused, by its larger noise, is no noise of
     this one.
@@ -153,7 +153,7 @@ def own_fit(factors: Factors, channel: ResidualBlock) -> OwnFit:
 
 
 def is_explained(factors: Factors, fit: OwnFit, place: int, noise: Sequence[Noise]) -> bool:
-    """Return whether the noise of all channels explains what one left to be fitted.
+    """Test whether the noise of all channels explains what one left to be fitted.
 
     By a chi-square test at 1 %. Where it does not, as where the model cannot match two channels at
     once, that is an error like any other.
@@ -208,7 +208,7 @@ def _noise(factors: Factors, channel: ResidualBlock, influence: Array, share: fl
 
 
 def is_white(p_value: float | None) -> bool:
-    """Return whether a test of whiteness does not reject it at 1 %."""
+    """Test for whiteness at 1 %."""
     return p_value is None or p_value >= SURPRISING
 
 
@@ -231,7 +231,7 @@ def _chosen(estimated: float, given: float | None, accepted: bool | None) -> flo
 
 
 def agrees(estimated: float, given: float | None, dof: float) -> bool | None:
-    """Return whether a given standard deviation passes the chi-square test at 1 %, two-sided.
+    """Test a given standard deviation by chi-square at 1 %, two-sided.
 
     Without degrees of freedom nothing speaks against it.
     """
@@ -255,7 +255,7 @@ def autocorrelations(errors: Array) -> Array:
 
 
 def whiteness(errors: Array) -> float | None:
-    """Return the probability that white noise is as correlated as this (Ljung & Box 1978).
+    """Probability that white noise is as correlated as this (Ljung & Box 1978).
 
     Over min(20, M / 5) lags. The loss of degrees of freedom to the parameters of a fit, few beside
     its samples, is left out.
@@ -270,7 +270,7 @@ def whiteness(errors: Array) -> float | None:
 
 
 def effective_samples(errors: Array) -> float:
-    """Return how many independent errors are worth as much for a mean: n / (1 + 2 sum rho).
+    """Number of independent errors of the same worth for a mean: n / (1 + 2 sum rho).
 
     The sum ends where a pair of neighbours, lags 2k and 2k + 1, no longer adds to it: the initial
     positive sequence (Geyer 1992, section 3.3). Never more than there are.

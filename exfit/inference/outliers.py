@@ -35,7 +35,7 @@ class Estimates(NamedTuple):
 
 
 class Deviations(NamedTuple):
-    """How far each estimate (N,) lies from what the others say of it.
+    """Deviation of each estimate (N,) from what the others say of it.
 
     ``centre`` and ``spread`` are mean and standard deviation of the units without the outliers;
     ``deviation`` is in standard deviations of such a difference, ``probability`` that of any of the
@@ -57,7 +57,7 @@ class _Deleted(NamedTuple):
 
 
 def deviations(estimates: Estimates) -> Deviations:
-    """Return how far each of FEWEST estimates or more lies from the others, and the outliers.
+    """Deviations of FEWEST estimates or more from the others, and the outliers.
 
     Where all are alike but for a spread that is normal, the probability that any is called an
     outlier is LEVEL at most.
@@ -77,7 +77,7 @@ def deviations(estimates: Estimates) -> Deviations:
 
 
 def _beside_the_others(estimates: Estimates, removed: NDArray[np.int_], steps: int) -> Deviations:
-    """Return how far each estimate lies from those that were not removed."""
+    """Deviation of each estimate from those that were not removed."""
     count = len(estimates.values)
     kept = np.setdiff1d(np.arange(count), removed)
     residual, probability = np.zeros(count), np.ones(count)

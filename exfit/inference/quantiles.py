@@ -14,7 +14,7 @@ LARGE = 50.0  # from here on the series of the gamma functions' ratio has all di
 
 
 def chi_square_tail(statistic: float, dof: int) -> float:
-    """Return the probability that chi-square exceeds a statistic, for whole degrees of freedom.
+    """Probability that chi-square exceeds a statistic, for whole degrees of freedom.
 
     Source: Abramowitz & Stegun 1964, 26.4.4, 26.4.5 and 26.4.8.
     """
@@ -54,7 +54,7 @@ def student_quantile(dof: float, probability: float) -> float:
 
 
 def wave_quantile(normal: float, waves: Array, level: float) -> float:
-    """Return what the size of a normal error and a wave of any phase stays below, at a level.
+    """Bound, at a level, of the sum of a normal error and a wave of any phase.
 
     ``normal`` is the standard deviation of the first; ``waves`` (2 K,) are the amplitudes of the
     cosines and sines of the phase and its multiples, over the root of 2.

@@ -13,7 +13,7 @@ OF_INTERVAL = "is 0: 1 % of its interval"
 
 
 class ParameterEffect(NamedTuple):
-    """By how much 1 % of a parameter moves the records.
+    """Effect of 1 % of a parameter on the records.
 
     ``rms`` is the root mean square of the change of each channel over its samples, per unit;
     ``of_noise`` is that of all samples together, each in standard deviations of its noise: below

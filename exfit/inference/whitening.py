@@ -51,7 +51,7 @@ class WhitenedRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """What makes errors (M,) white: W (M, M), W'W the inverse of their covariance over scale^2.
+    """Matrix that makes errors (M,) white: W (M, M), W'W the inverse of their covariance / scale^2.
 
     An error becomes what those before it in time do not predict, over the standard deviation of
     that. The white errors have the standard deviation ``scale``; ``deviations`` (M,) are those that
@@ -83,7 +83,7 @@ class Whitening:
 
 
 def whitening(noise: CarriedNoise, order: Rows, scale: float) -> Whitening:
-    """Return what makes errors white that follow one another in time by ``order`` (M,)."""
+    """Make a whitening of errors that follow one another in time by ``order`` (M,)."""
     return Whitening(
         tuple(_parts(noise, order, scale)),
         scale,

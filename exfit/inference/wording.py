@@ -30,7 +30,7 @@ def error(lin: Linearisation, index: int, share: float) -> str:
 
 
 def move(lin: Linearisation, index: int, share: float) -> str:
-    """Return by how much a parameter moves; what would more than double it, as a factor."""
+    """Word the move of a parameter; what would more than double it, as a factor."""
     if lin.logarithmic[index] and abs(share) > 1.0:
         return _factor(share)
     return ("+" if share > 0.0 else "-") + error(lin, index, abs(share))

@@ -27,11 +27,11 @@ class MachineBreaker(NamedTuple):
     factor: Signal
 
     def until_open(self, closed: Signal) -> Signal:
-        """Return what is as with the breaker ``closed`` until it opens, and then zero."""
+        """Keep a value until the breaker that is ``closed`` opens, then zero."""
         return where(self.open, 0.0, closed)
 
     def once_open(self, slope: Signal) -> Signal:
-        """Return what is zero until the breaker opens."""
+        """Take zero until the breaker opens, then the value."""
         return where(self.open, slope, 0.0)
 
     def current(self, closed: Axes) -> Axes:

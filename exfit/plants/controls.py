@@ -18,7 +18,7 @@ HEARD = ("speed", "p", "vt", "pa", "none")
 
 
 def governor_rest(governor: Model, power: Signal, p: Signals) -> Rest:
-    """Return how a governor holds a power: its states and setpoints by their names there."""
+    """Rest of a governor that holds a power: its states and setpoints by their names there."""
     x, u = Names(), Names(dw=0.0, p=power)
     pref = governor.rest(power, u, named_parameters(p, GOVERNOR, governor.sheet), x)
     written = {GOVERNOR + name: value for name, value in vars(x).items()}
@@ -37,7 +37,7 @@ def governing(governor: Model, u: Names, p: Signals, r: Signals, x: Signals, d: 
 
 
 def rests_at(governor: Model, values: Mapping[str, float], power: float) -> bool:
-    """Return whether a governor with these values holds a power at rest: no limit is in its way."""
+    """Test whether a governor with these values holds a power at rest: no limit is in its way."""
     p, x, d = Names(**values), Names(), Names()
     u = Names(dw=0.0, p=np.float64(power))
     with np.errstate(all="ignore"):
@@ -48,7 +48,7 @@ def rests_at(governor: Model, values: Mapping[str, float], power: float) -> bool
 
 
 def listening(stabiliser: Stabilised, heard: Names) -> Names:
-    """Return what a stabiliser sees, ``vsi1`` and ``vsi2``; of the speed, what it deviates.
+    """Inputs of a stabiliser, ``vsi1`` and ``vsi2``; of the speed, its deviation.
 
     The power ``p`` is there too: some are switched by it, whatever they listen to.
     """
@@ -57,7 +57,7 @@ def listening(stabiliser: Stabilised, heard: Names) -> Names:
 
 
 def rests_with_output(stabiliser: Stabilised, values: Mapping[str, float]) -> bool:
-    """Return whether a stabiliser with these values has an output while its unit is at rest."""
+    """Test whether a stabiliser with these values has an output while its unit is at rest."""
     model, p, x = stabiliser.model, Names(**values), Names()
     seen = listening(stabiliser, Names(speed=0.0, p=1.0, vt=1.0, pa=0.0, none=0.0))
     model.rest(0.0, seen, p, x)

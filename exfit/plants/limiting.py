@@ -25,7 +25,7 @@ PLACES = (*GATES, SUMMING)
 
 
 def acts_without_load(limiter: Attached) -> bool:
-    """Return whether a limiter has something to limit on open circuit: the field current."""
+    """Test whether a limiter has something to limit on open circuit: the field current."""
     return limiter.model.inputs == ("ifd",)
 
 
@@ -86,7 +86,7 @@ def limiting(
 
 
 def limited_inputs(limiters: Iterable[Attached], signals: Signals) -> dict[str, Signal]:
-    """Return what an exciter sees of limiters whose outputs are given.
+    """Inputs of an exciter by limiters whose outputs are given.
 
     At a gate of overexcitation the smaller of two acts, at one of underexcitation the larger.
     """
@@ -99,7 +99,7 @@ def limited_inputs(limiters: Iterable[Attached], signals: Signals) -> dict[str, 
 
 
 def _both(name: str, a: Signal, b: Signal) -> Signal:
-    """Return what two limiters at one input of an exciter do together."""
+    """Combine two limiters at one input of an exciter."""
     if name == "vsum":
         return a + b
     return smaller(a, b) if name.startswith("voel") else larger(a, b)

@@ -53,14 +53,14 @@ class LoadedMachine(NamedTuple):
 
 
 def loaded_at_rest(vt: Signal, at: Flow, machine: Machine, p: Names) -> LoadedMachine:
-    """Return the machine that holds vt and a current at rest; efd is then its field current."""
+    """Rest of the machine that holds vt and a current; efd is then its field current."""
     stator, fluxes = rotor_frame(vt, at, machine, p), Names()
     machine.rest(stator.v, stator.i, p, fluxes)
     return LoadedMachine(stator, fluxes, machine.field(fluxes, stator.i, p))
 
 
 def current(at: Source, E: Signal, R: Signal, X: Signal, delta: Signal) -> Axes:
-    """Return the current that a machine drives into E behind R + jX."""
+    """Current of a machine into E behind R + jX."""
     drop_d, drop_q = at.voltage.d - E * sin(delta), at.voltage.q - E * cos(delta)
     xd, xq = at.xd + X, at.xq + X
     scale = 1.0 / (R * R + xd * xq)

@@ -51,7 +51,7 @@ class OpenMachine(NamedTuple):
 
 
 def machine_on_open_circuit(machine: Machine, x: Signals, p: Names) -> OpenMachine:
-    """Return what a machine without stator current shows; the fluxes of its q axis are zero."""
+    """Signals of a machine without stator current; the fluxes of its q axis are zero."""
     states = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
     ifd = machine.field(states, NO_CURRENT, p)
 
@@ -62,7 +62,7 @@ def machine_on_open_circuit(machine: Machine, x: Signals, p: Names) -> OpenMachi
 
 
 def at_rest(machine: Machine, vt: Signal, p: Names) -> tuple[dict[str, Signal], Signal]:
-    """Return the states that hold vt without stator current, and the field current."""
+    """States that hold vt without stator current, and the field current."""
     fluxes = Names()
     machine.rest(Axes(0.0, vt), NO_CURRENT, p, fluxes)
     return values_of(fluxes, machine.d_axis), machine.field(fluxes, NO_CURRENT, p)

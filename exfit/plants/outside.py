@@ -38,7 +38,7 @@ def _nowhere(*_: Any) -> Any:
 
 @cache
 def outside(model: Model, inputs: tuple[str, ...]) -> System:
-    """Return what stands for the unit: all signals stay where they are, vt at its start."""
+    """Stand in for the unit: all signals stay where they are, vt at its start."""
 
     def rest(_: Signals) -> Rest:
         return Rest({STATE: 0.0}, {})

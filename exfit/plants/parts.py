@@ -48,7 +48,7 @@ class Names(SimpleNamespace):
 
 
 def exciter_inputs(**given: Signal) -> Names:
-    """Return what an exciter sees, per unit: what is not given does not act.
+    """Inputs of an exciter, per unit: one that is not given does not act.
 
     ``vt`` terminal voltage, ``vc1`` the same with load compensation, ``ifd`` field current, ``p``
     and ``q`` active and reactive power of the machine, ``speed`` of the machine, ``vref``
@@ -140,7 +140,7 @@ def motion(written: Names, states: tuple[str, ...], outputs: Signals) -> Motion:
 
 
 class ExciterRest(NamedTuple):
-    """How an exciter holds its output: its states, and its setpoints with the reference."""
+    """Rest of an exciter that holds its output: states, and setpoints with the reference."""
 
     states: Signals
     setpoints: Signals

@@ -36,12 +36,12 @@ class Attached(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """What it limits, as its name begins: oel, uel, scl."""
+        """Kind of limiter, as its name begins: oel, uel, scl."""
         return kind_of_limiter(self.model.name)
 
     @property
     def prefix(self) -> str:
-        """How its parameters and states begin."""
+        """Beginning of the names of its parameters and states."""
         return f"{self.kind}."
 
     @property
@@ -54,12 +54,12 @@ class Attached(NamedTuple):
 
 
 def kind_of_limiter(name: str) -> str:
-    """Return what a limiter of the catalogue limits, as its name begins: oel, uel, scl."""
+    """Kind of a limiter of the catalogue, as its name begins: oel, uel, scl."""
     return name[:3].lower()
 
 
 class Equipment(NamedTuple):
-    """What a plant is built of.
+    """Parts and data from which a plant is built.
 
     ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
     ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
@@ -86,7 +86,7 @@ def no_network(given: Collection[str]) -> Sheet:
 
 @dataclass(frozen=True)
 class PlantKind:
-    """What surrounds an exciter; ``name`` as a case has it, ``title`` as a report has it.
+    """Surroundings of an exciter; ``name`` as a case has it, ``title`` as a report has it.
 
     ``needs`` are the parts that a case gives, ``events`` what a test may change, ``signals`` what
     a record may hold. Of these ``driving`` drive the simulation in place of the plant: ``required``
@@ -118,27 +118,27 @@ class PlantKind:
 
     @property
     def has_exciter(self) -> bool:
-        """Whether there is an exciter in it."""
+        """Flag of a plant with an exciter."""
         return "exciter" in self.needs
 
     @property
     def has_machine(self) -> bool:
-        """Whether there is a machine in it."""
+        """Flag of a plant with a machine."""
         return "machine" in self.needs
 
     @property
     def on_load(self) -> bool:
-        """Whether the machine feeds a network."""
+        """Flag of a machine that feeds a network."""
         return "network" in self.needs
 
     @property
     def closed_loop(self) -> bool:
-        """Whether an exciter controls a machine in a simulated plant."""
+        """Flag of an exciter that controls a machine in a simulated plant."""
         return self.has_exciter and self.has_machine and not self.plays_back
 
     @property
     def plays_back(self) -> bool:
-        """Whether a record drives the simulation, which cannot be without one."""
+        """Flag of a simulation that a record drives, and that cannot be without one."""
         return bool(self.required)
 
     @property
@@ -148,7 +148,7 @@ class PlantKind:
 
     @property
     def compared(self) -> tuple[str, ...]:
-        """The signals that are compared with a record."""
+        """Signals to compare with a record."""
         return tuple(signal for signal in self.signals if signal not in self.driving)
 
 

@@ -36,7 +36,7 @@ DIFFERENCE = 1e-6  # pu of efd, for its slope
 
 
 def initial(signal: str) -> str:
-    """Return the parameter that holds a recorded signal's level at the start."""
+    """Name the parameter of a recorded signal's level at the start."""
     return f"{signal}0"
 
 

@@ -66,7 +66,7 @@ class UnitOnLoad(NamedTuple):
 
     @property
     def setpoints(self) -> tuple[str, ...]:
-        """What holds the unit at rest."""
+        """Setpoints that hold the unit at rest."""
         held = ("vref", *self.exciter.setpoints)
         if self.governor is None:
             return (*held, "Pm")
@@ -84,7 +84,7 @@ class UnitOnLoad(NamedTuple):
 
     @property
     def time_constants(self) -> tuple[str, ...]:
-        """The parameters that are times."""
+        """Parameters that are times."""
         return (
             *seconds("", self.exciter.sheet),
             *seconds(MACHINE, self.machine.sheet),
@@ -128,7 +128,7 @@ class Terminals(NamedTuple):
 
 
 class Controls(NamedTuple):
-    """What acts on a unit beside its terminals: reference, vs, and what is added to vc1.
+    """Inputs of a unit beside its terminals: reference, vs, and the voltage added to vc1.
 
     ``pref`` is the change of the governor's reference.
     """
@@ -148,7 +148,7 @@ class UnitState(NamedTuple):
 
 
 class Excited(NamedTuple):
-    """What a unit shows beside its terminals; the outputs of its limiters by name."""
+    """Signals of a unit beside its terminals; the outputs of its limiters by name."""
 
     efd: Signal
     ifd: Signal

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class InputShape(NamedTuple):
-    """What a step contributes to the tangent of its input: as its instant moves, or its size."""
+    """Contribution of a step to the tangent of its input: as its instant moves, or its size."""
 
     step: int
     instant: bool
@@ -28,14 +28,14 @@ class InputShape(NamedTuple):
         return change.share(segment)
 
     def rate(self, direction: Direction) -> float:
-        """Return how fast it grows in a direction."""
+        """Rate of its growth in a direction."""
         at, size = direction.steps.get(self.step, (0.0, 0.0))
         return at if self.instant else size
 
 
 @dataclass(frozen=True)
 class Moves:
-    """What the directions of some sets move, all together.
+    """Moves of the directions of some sets, all together.
 
     ``columns`` are the directions that need a run: that of a delay alone needs none; ``delayed``
     those that have a delay. ``free`` are the parameters that move; ``shapes`` belong to the inputs
@@ -49,11 +49,11 @@ class Moves:
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """The inputs that move."""
+        """Inputs that move."""
         return tuple(self.shapes)
 
     def tangents(self, system: System, directions: Sequence[Sequence[Direction]]) -> Array:
-        """Return how each parameter moves in each direction that needs a run, (K, np, N)."""
+        """Move of each parameter in each direction that needs a run, (K, np, N)."""
         place = {name: system.parameters.index(name) for name in self.free}
         tangents = np.zeros((len(directions), len(system.parameters), len(self.columns)))
         for of_set, own in zip(tangents, directions, strict=True):
@@ -63,7 +63,7 @@ class Moves:
         return tangents
 
     def rates(self, directions: Sequence[Sequence[Direction]]) -> Array | None:
-        """Return how fast each shape grows in these directions, (K, moving, shapes, N)."""
+        """Growth of each shape in these directions, (K, moving, shapes, N)."""
         if not self.shapes:
             return None
         sizes = (len(self.shapes), self._most_shapes, len(self.columns))
@@ -88,7 +88,7 @@ class Moves:
 
 
 def moves_of(system: System, inputs: Inputs, directions: Sequence[Sequence[Direction]]) -> Moves:
-    """Return what the directions of several sets move."""
+    """Collect the moves of the directions of several sets."""
     every = [(k, move) for own in directions for k, move in enumerate(own)]
     shapes = {shape for _, move in every if move.steps for shape in _shapes_of(move)}
     return Moves(
@@ -107,13 +107,11 @@ def _places(
 
 
 def _moving_parameters(system: System, moves: Sequence[Direction]) -> tuple[str, ...]:
-    """Return the parameters that move, in the order of the system."""
     free = {name for move in moves for name in move.parameters}
     return tuple(name for name in system.parameters if name in free)
 
 
 def _shapes_of(move: Direction) -> Iterator[InputShape]:
-    """Yield the shapes that grow in a direction."""
     for step, (at, size) in move.steps.items():
         if at:
             yield InputShape(step, True)

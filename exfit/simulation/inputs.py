@@ -42,7 +42,7 @@ class InputStep(NamedTuple):
         return self.at + self.ramp
 
     def share(self, part: GridSegment) -> Array:
-        """Return how much of the step the grid points (n + 1,) of a segment have seen."""
+        """Share of the step at the grid points (n + 1,) of a segment."""
         if not self.smooth and self.ramp:
             way: Array = (part.times - self.at) / self.ramp
             return way.clip(0.0, 1.0)
@@ -84,7 +84,7 @@ class InputStep(NamedTuple):
 
 
 def _steps_after(at: float, part: GridSegment, rows: slice) -> Array:
-    """Return by how many steps some grid points of a segment lie after an instant."""
+    """Distance of some grid points of a segment from an instant before them, in steps."""
     return np.arange(rows.start, rows.stop) - (at - part.start) / part.step
 
 
@@ -94,7 +94,7 @@ def _mean_of_step(x: Array) -> Array:
 
 
 def _mean_of_line(x: Array) -> Array:
-    """Return that of a line that rises from there by one in each half-width: its integral."""
+    """Mean of a line that rises from there by one in each half-width: its integral."""
     corner = 1.0 / 6.0 + 0.5 * x + 0.5 * x**2 - np.abs(x) ** 3 / 6.0
     return np.where(np.abs(x) < 1.0, corner, np.maximum(x, 0.0))
 
@@ -157,7 +157,7 @@ class SplinedInput:
         return values
 
     def slope(self, times: Array) -> Array:
-        """Return how fast it changes at some instants (n,) between the first and last, per s."""
+        """Slope at some instants (n,) between the first and last, per s."""
         values: Array = self._polynomials.derivative()(times)
         return values
 
@@ -203,7 +203,7 @@ class Inputs:
         return u + self.recorded[signal].on(part) if signal in self.recorded else u
 
     def stepped(self, signal: str, part: GridSegment) -> Array:
-        """Return what of an input is steps and ramps."""
+        """Sum of the steps and ramps of an input."""
         u = np.full(part.steps + 1, self.level(signal, part.start))
         for change in self.steps:
             rising = change.at <= part.start < change.end
@@ -224,7 +224,7 @@ class Inputs:
 
 
 class InputMove(NamedTuple):
-    """What an input does from ``start`` to ``end`` (s): by how much it changes, and at most."""
+    """Move of an input from ``start`` to ``end`` (s): its change, and the largest on the way."""
 
     start: float
     end: float
@@ -232,14 +232,14 @@ class InputMove(NamedTuple):
     largest: float
 
     def with_step(self, step: InputStep) -> "InputMove":
-        """Return the move that goes on with a step."""
+        """Continue the move with a step."""
         change = self.change + step.step
         return InputMove(self.start, step.end, change, max(self.largest, abs(change)))
 
 
 @dataclass(frozen=True)
 class Direction:
-    """What moves together in one derivative, and how fast each.
+    """Values that move together in one derivative, each with its rate.
 
     System parameters by name; steps of the inputs by their index, as (d at, d step) in s and pu,
     where only a smooth one has an instant that moves; the recorder's delay in s.

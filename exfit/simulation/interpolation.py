@@ -26,7 +26,7 @@ class GridSegment(NamedTuple):
 
     @property
     def end(self) -> float:
-        """Where it ends, s."""
+        """End of it, s."""
         return self.start + self.step * self.steps
 
     @property
@@ -37,7 +37,7 @@ class GridSegment(NamedTuple):
 
 @cache
 def lagrange(points: int) -> Array:
-    """Return the polynomials that are one at one of some points a step apart, zero at the others.
+    """Polynomials that are one at one of some points a step apart, zero at the others.
 
     A row of coefficients each, from the lowest power of the distance from their middle up, and
     below them those of their slopes: zero where there are fewer points than NEIGHBOURS,
@@ -105,7 +105,7 @@ class Interpolation:
         return samples
 
     def reading(self, changing: bool = False) -> SampleRows:
-        """Return what machine code reads; where it is ``changing``, its time derivatives too."""
+        """Arrays for machine code to read; where it is ``changing``, with time derivatives."""
         return self._changing if changing else self._plain
 
     @cached_property
@@ -123,11 +123,11 @@ class Interpolation:
 
     @property
     def _rows(self) -> NDArray[np.int64]:
-        """Which points of a run each sample is read from, (M, NEIGHBOURS)."""
+        """Points of a run from which each sample is read, (M, NEIGHBOURS)."""
         return np.asarray(np.minimum(self.first[:, None] + np.arange(NEIGHBOURS), self.last))
 
     def weights(self, block: slice) -> Array:
-        """Return how much each of the points counts that a block's samples are read from.
+        """Weight of each of the points from which a block's samples are read.
 
         They are NEIGHBOURS, from ``first`` on, but none is behind ``last``; (block, NEIGHBOURS).
         """

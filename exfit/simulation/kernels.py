@@ -36,7 +36,7 @@ def linear_kernel(system: System) -> LinearKernel:
 
 @cache
 def parameters_used(system: System, outputs: tuple[str, ...] | None = None) -> frozenset[str]:
-    """Return the parameters that a response of the system, or of some outputs, can depend on."""
+    """Name parameters on which a response of the system, or of some outputs, can depend."""
     traced = trace(system, system.outputs if outputs is None else outputs)
     targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
     reached = {node.index for node in in_order(targets)}
@@ -53,6 +53,6 @@ def time_constants(system: System) -> tuple[str, ...]:
 
 @cache
 def places_of_time_constants(system: System) -> NDArray[np.intp]:
-    """Return which of the parameters these are."""
+    """Places of the time constants among the parameters."""
     places = [system.parameters.index(name) for name in time_constants(system)]
     return np.array(places, dtype=np.intp)

@@ -53,14 +53,14 @@ class LimiterAction(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """When it acted, in words."""
+        """Word the time in which it acted."""
         first, last = self.spans[0][0], self.spans[-1][1]
         times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
         return f"{self.name} acts from {first:.4g} s to {last:.4g} s{times}"
 
 
 class Nearest(NamedTuple):
-    """How near a response came to a limit that it did not meet.
+    """Distance of a response from a limit that it did not meet.
 
     ``percent`` is the smallest distance, of the range between the floor and the ceiling; ``at`` is
     when (s), ``value`` the limit then.
@@ -74,7 +74,7 @@ class Nearest(NamedTuple):
 
 
 class Extreme(NamedTuple):
-    """How far a signal went towards a limit: its largest ``share`` of the way from zero to it."""
+    """Largest move of a signal towards a limit: its ``share`` of the way from zero to it."""
 
     limit: str
     share: float
@@ -90,7 +90,7 @@ class Followed(NamedTuple):
 
 
 def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
-    """Return the limits that the response to these values meets, in the order of their instants.
+    """Find the limits that the response to these values meets, in the order of their instants.
 
     A state is at its non-windup limit while it is on it, within rounding; any other value
     while it would be beyond. Found at every point of the simulation's grid, whose step is how
@@ -126,14 +126,14 @@ def limiter_actions(simulator: Simulator, values: Values) -> tuple[LimiterAction
 
 
 def _spans(held: NDArray[np.bool_], time: Array) -> Iterator[tuple[float, float]]:
-    """Yield from when to when something holds."""
+    """Yield start and end of each stretch in which a condition holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         yield float(time[first]), float(time[after - 1])
 
 
 def limits_at_rest(system: System, values: Values) -> tuple[str, ...]:
-    """Return the limits that a system rests on, so that even a small deviation may meet them.
+    """Find limits on which a system rests, so that even a small deviation may meet them.
 
     ``values`` are the parameters of the system.
     """
@@ -150,7 +150,7 @@ def limits_at_rest(system: System, values: Values) -> tuple[str, ...]:
 
 
 def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
-    """Return how near the response came to each limit that it did not meet, the nearest first.
+    """Distance of the response from each limit that it did not meet, the nearest first.
 
     Left out are limits on one side only, and those that are a hundred times further away than the
     signal ever moved, as 9999 is where there is none. Raises SimulationError where the start is no
@@ -180,7 +180,7 @@ def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
 
 
 def extremes(simulator: Simulator, values: Values) -> tuple[Extreme, ...]:
-    """Return how far the response went towards each of its limits, 1 or more where it met them.
+    """Largest move of the response towards each of its limits, 1 or more where it met them.
 
     Left out is what was always on the other side of zero. Raises SimulationError where the start
     is no rest.

@@ -37,7 +37,7 @@ def traced(system: System) -> Trace:
 
 
 def at_rest(of: Trace, values: Values) -> dict[Node, Any]:
-    """Return what the symbols of a graph are at rest."""
+    """Values of the symbols of a graph at rest."""
     p = {node: values[_name(node)] for node in of.p}
     start = evaluate(of.rest, p)
     starts = zip((*of.x, *of.r), (start[node] for node in of.rest), strict=True)
@@ -61,7 +61,7 @@ def limits_passed(system: System, values: Values) -> str:
 
 
 def limit_name(node: Node) -> str:
-    """Return the parameter that gives a limit: of all it is computed from, the one named so."""
+    """Name the parameter that gives a limit: of all from which it is computed, the one named so."""
     symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
     limits = [_name(n) for n in symbols if _is_limit(n)]
     return ", ".join(limits or map(_name, symbols))
@@ -117,7 +117,7 @@ def acting_at_rest(system: System, values: Values) -> str:
 
 
 def _of_limiters(system: System) -> Iterator[EquationLimit]:
-    """Yield the limits that limiters of excitation are."""
+    """Find limits that are limiters of excitation."""
     for name, output in limiter_outputs(system).items():
         yield from _gates_of(system, name, output)
 
@@ -138,7 +138,7 @@ def _gates_of(system: System, name: str, output: Node) -> Iterator[EquationLimit
 def _values_at_gates(
     system: System, output: Node, nearer: Callable[[Signal, Signal], Signal]
 ) -> list[Node]:
-    """Return what a limiter takes over from: of another one at its gate and the regulator both."""
+    """Values in place of which a limiter acts: another's at its gate and the regulator's both."""
     of, limiters = traced(system), set(limiter_outputs(system).values())
     gates = {node: _gated(node, output) for node in in_order([*of.slopes, *of.outputs])}
     values: dict[Node, None] = {}
@@ -152,7 +152,7 @@ def _values_at_gates(
 
 
 def _gated(node: Node, output: Node) -> Node | None:
-    """Return what a node takes the output of a limiter in place of; None where it does not."""
+    """Node in place of which a node takes the output of a limiter; None where it does not."""
     if not any(operand is output for operand in node.operands[1:]):
         return None
     if node.op == "clip":
@@ -164,7 +164,7 @@ def _gated(node: Node, output: Node) -> Node | None:
 
 
 def _inside_limiter(limit: EquationLimit) -> bool:
-    """Return whether a limit belongs to the equations of a limiter."""
+    """Test whether a limit belongs to the equations of a limiter."""
     return limit.limit.startswith(LIMITER_PREFIXES) or limit.signal.startswith(LIMITER_PREFIXES)
 
 
@@ -205,7 +205,7 @@ def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> Equat
 
 
 def _given(bound: Node) -> str:
-    """Return the parameter that gives a limit, also where it is computed at the start.
+    """Parameter of a limit, also where it is computed at the start.
 
     Where a parameter may select that by being 0, the setpoint has its name with a 0 behind it.
     """
@@ -214,7 +214,7 @@ def _given(bound: Node) -> str:
 
 
 def _state_in(node: Node, states: Mapping[Node, Node]) -> Node | None:
-    """Return the state that a node is, or is unless its lag is bypassed."""
+    """State that a node is, or is unless its lag is bypassed."""
     if node.op == "select":
         branch_states = (_state_in(branch, states) for branch in node.operands[1:])
         return next((state for state in branch_states if state is not None), None)

@@ -196,7 +196,7 @@ class Simulator:
         return result
 
     def on_grid(self, points: int | None = None) -> "Simulator":
-        """Return the simulator that gives all points of its grid, or so many, whatever the delay.
+        """Take all points of the grid, or so many, in place of samples, whatever the delay.
 
         An instant of an exact step is there twice: before and after it.
         """
@@ -219,7 +219,7 @@ class Simulator:
         return result
 
     def sampling(self) -> Interpolation:
-        """Return what reads the response at the sample times from the points of its grid."""
+        """Reader of the response at the sample times from the points of its grid."""
         if isinstance(self._sampling, Interpolation):
             return self._sampling
         return Interpolation(self._grid, self.times, self.delay)
@@ -287,11 +287,11 @@ class Simulator:
         return simulator
 
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
-        """Return by how much, at most and per unit, halving every step moves any of the outputs."""
+        """Largest change of any of the outputs by halving every step, per unit."""
         return max(self.step_errors(values, outputs).values())
 
     def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
-        """Return by how much, at most and per unit, halving every step moves each output.
+        """Largest change of each output by halving every step, per unit.
 
         At the points of the grid: a record with many more samples shows no more. Beside a smooth
         jump of what is recorded the step itself is another there.
@@ -434,7 +434,7 @@ class Simulator:
         return among_all(samples, parts), among_all(slopes, parts), parts
 
     def course(self, moves: Moves | None = None, changing: bool = False) -> Course:
-        """Return what the machine code runs through, with the tangents of inputs that move.
+        """Arrays for the machine code to run through, with the tangents of inputs that move.
 
         A run that is ``changing`` is sampled with its time derivative.
         """
@@ -497,5 +497,4 @@ def _in_blocks(
 
 
 def _fixed(change: InputStep) -> InputStep:
-    """Return what of a step cannot be moved."""
     return change._replace(at=0.0 if change.smooth else change.at, step=0.0)

@@ -62,7 +62,7 @@ class Bode:
 
 
 class Margins(NamedTuple):
-    """How far the voltage loop is from instability; None where the loop gain has no crossover.
+    """Distance of the voltage loop from instability; None where the loop gain has no crossover.
 
     ``gain`` (dB) is by how much the loop gain may rise, or, negative, must not fall; ``phase``
     (deg) how much the loop may lag more, or, negative, less. Of several crossovers it is that with
@@ -332,7 +332,7 @@ def _crossings(
 
 
 def bandwidth(of: StateSpace, at: Bode) -> float | None:
-    """Return where a response first falls 3 dB below its value at rest (Hz); None if it does not.
+    """Frequency (Hz) at which a response falls 3 dB below its value at rest; None without one.
 
     ``at`` is the response at frequencies between which it is looked for.
     """

@@ -84,7 +84,7 @@ def among_all(results: Array, parts: Counts) -> Array:
 
 
 def why_unreachable(system: System, step: float, values: Values, p: Array) -> SimulationError:
-    """Return what is to be reported of values, as a vector p (np,), that have no sub-steps."""
+    """Error to raise for values, as a vector p (np,), that have no sub-steps."""
     rest = linear_kernel(system).at_rest(p[None])
     radius = spectral_radii(rest.jacobian)
     moving = _moving(rest, radius)[0]
@@ -119,7 +119,7 @@ def substeps_for(system: System, step: float, values: Values, radius: float) -> 
 
 
 def too_fast(system: System, step: float, values: Values, radius: float) -> SimulationError:
-    """Return what is to be reported of values that need more than MOST_SUBSTEPS."""
+    """Error to raise for values that need more than MOST_SUBSTEPS."""
     lags = {name: values[name] for name in time_constants(system) if values[name] >= SHORTEST}
     shortest = min(lags, key=lambda name: lags[name], default=None)
     rate = max(radius, 1.0 / lags[shortest] if shortest else 0.0)
@@ -162,14 +162,14 @@ def _needed(step: float, rates: Array | float) -> Array:
 
 
 def _surely_still(rest: AtRest) -> Mask:
-    """Return which systems are at rest whatever their spectral radius, where that is finite."""
+    """Mask of systems at rest whatever their spectral radius, where that is finite."""
     # a sum is finite where all numbers are, or at most too large: then eigenvalues decide
     finite = np.isfinite(rest.x.sum(axis=1))
     return np.asarray(finite & (np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE))
 
 
 def _moving(rest: AtRest, radius: Array) -> Mask:
-    """Return which states (K, nx) move: more than what the rounding of a state leaves."""
+    """Mask of states (K, nx) that move: by more than the rounding of a state."""
     with np.errstate(all="ignore"):
         rounding = STATE_ROUNDING * np.max(np.abs(rest.x), axis=1) * radius
     limit = np.where(np.isfinite(rounding), REST_TOLERANCE + rounding, np.nan)

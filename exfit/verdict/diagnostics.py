@@ -65,7 +65,7 @@ def notes(
 
 
 def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator[str]:
-    """Yield how far from a minimum a search ended that a tolerance of the case ended."""
+    """Note the distance from a minimum of a search that a tolerance of the case ended."""
     if solution.stop not in AT_TOLERANCE:
         return
     ended = "the search ended at a tolerance of the case, not at a minimum"
@@ -80,7 +80,7 @@ def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator
 
 
 def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
-    """Yield how well a recorded reference is known: the size of the test is as uncertain."""
+    """Note the noise of a recorded reference: the size of the test is as uncertain."""
     for signal in REFERENCES:
         record = setup.references.get(signal, setup.record)
         given = test.reference(signal)
@@ -99,7 +99,7 @@ def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
 
 
 def distance_from_minimum(residuals: Residuals, solution: estimate.Result) -> float:
-    """Return how far (standard errors) a search that a tolerance ended may lie from a minimum.
+    """Estimate the distance (standard errors) of an ended search from a minimum.
 
     No parameter lies farther from the minimum of the linear model than z of its standard errors,
     where z^2 is twice the decrease that the model promises, in variances of the residuals. It is 0
@@ -113,7 +113,7 @@ def distance_from_minimum(residuals: Residuals, solution: estimate.Result) -> fl
 
 
 def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield how many samples of each channel of a record were taken for outliers."""
+    """Note the count of samples of each channel of a record that were taken for outliers."""
     for channel in channels:
         measured = np.isfinite(channel.measured)
         beyond = int(np.count_nonzero(measured & ~channel.kept))
@@ -127,7 +127,7 @@ def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
 
 
 def search_range_notes(case: Case) -> Iterator[str]:
-    """Yield which free parameters are held, and which the bounds let leave their data sheets."""
+    """Note free parameters that are held, and those whose bounds leave their data sheets."""
     for name in case.held():
         yield (
             f"{name} = 0: its lag or lead is bypassed, so that {name} is held at 0 and not fitted; "
@@ -147,7 +147,7 @@ def search_range_notes(case: Case) -> Iterator[str]:
 
 
 def diagram_notes(case: Case) -> Iterator[str]:
-    """Yield what is not settled about the diagrams of the models of a case."""
+    """Note open questions about the diagrams of the models of a case."""
     parts = case.parts
     limiters = (limiter.model for limiter in parts.limiters)
     for model in (parts.exciter, parts.stabiliser, parts.governor, *limiters):

@@ -100,7 +100,7 @@ def with_carried(scatter: Scatter, carried: Array) -> Scatter:
 
 
 def excess(rmse: float, scatter: Scatter) -> float:
-    """Return the probability that noise of this scatter leaves residuals as large as ``rmse``.
+    """Probability that noise of this scatter leaves residuals as large as ``rmse``.
 
     The logarithm of their ratio is taken as normal.
     """
@@ -110,7 +110,7 @@ def excess(rmse: float, scatter: Scatter) -> float:
 
 
 def step_pattern(errors: Array, steps: Sequence[int]) -> float | None:
-    """Return the probability that white noise has sums as large as this after its steps.
+    """Probability that white noise has sums as large as this after its steps.
 
     From the beginning and from each of the places ``steps`` on, the errors (M,) are divided into
     parts of 1, 2, 4 ... samples. Each part's sum, over the root of its length and the standard
@@ -127,7 +127,7 @@ def step_pattern(errors: Array, steps: Sequence[int]) -> float | None:
 
 
 def _parts(count: int, steps: Sequence[int]) -> list[int]:
-    """Return where the parts of a pattern begin."""
+    """Places at which the parts of a pattern begin."""
     inside = sorted({step for step in steps if 0 < step < count})[:MOST_STEPS]
     return [
         first + 2**k - 1
@@ -138,7 +138,7 @@ def _parts(count: int, steps: Sequence[int]) -> list[int]:
 
 
 def largest_deviation(errors: Array, scatter: float) -> float:
-    """Return what half of the errors (M,) of some fiftieth of a record exceed, noise deducted.
+    """Largest deviation of some fiftieth of a record: median of its errors, noise deducted.
 
     It is the largest median magnitude in windows of at least ten samples, less (in squares) what
     that of noise of this scatter hardly exceeds. Spikes do not move it.
@@ -155,7 +155,7 @@ def moving_median(samples: Array) -> Array:
 
 
 def stretch(count: int) -> int:
-    """Return how many of ``count`` samples a deviation lasts that is seen in their figure."""
+    """Samples, of ``count``, for which a deviation must last to be seen in their figure."""
     return min(max(count // STRETCHES, FEWEST_IN_STRETCH), count)
 
 
@@ -183,7 +183,7 @@ def residual_tests(evidence: Evidence) -> tuple[ResidualTests, ...]:
 
 
 def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[Scatter]]]:
-    """Yield how much of a weighted error is one of each channel, pu, and the channel's scatter.
+    """Yield the factor from a weighted error to one of the channel, pu, and the channel's scatter.
 
     That of white errors is what they were before, whose size their noise foretells.
     """
@@ -263,25 +263,24 @@ def _tests_of(
 
 
 def _compared(errors: Array) -> Array:
-    """Return the errors that are compared."""
     return errors[np.isfinite(errors)]
 
 
 def _at_rest(record: FittedRecord, signal: str) -> Array:
-    """Return what was measured before the first step, where the record should be at rest."""
+    """Samples before the first step, where the record should be at rest."""
     overlay = record.comparison.overlays[signal]
     until = -np.inf if record.steady_until is None else record.steady_until
     return overlay.measured[(record.comparison.time < until) & np.isfinite(overlay.error)]
 
 
 def _step_instants(record: FittedRecord, values: Values) -> list[float]:
-    """Return when (s) the record shows the steps of its test."""
+    """Instants (s) of the steps of a test, as the record shows them."""
     simulator = record.setup.experiment.with_inputs(values)
     return [step.at + simulator.delay for step in simulator.inputs.steps]
 
 
 def _range(overlay: Overlay) -> float:
-    """Return by how much a signal moves (pu): as simulated, or as measured but for its noise."""
+    """Range of a signal (pu): as simulated, or as measured but for its noise."""
     compared = np.isfinite(overlay.error)
     smooth = moving_median(overlay.measured[compared])
     return float(max(np.ptp(overlay.simulated[compared]), np.ptp(smooth)))

@@ -39,7 +39,7 @@ LARGEST_STEP_ERROR = 1e-4  # pu, or of the largest value of a signal that passes
 
 
 def unstable_rest_notes(simulator: Simulator, values: Values) -> Iterator[str]:
-    """Yield that what is at rest before the step does not stay there, by its fastest growth."""
+    """Note a rest before the step that is unstable, by its fastest growth."""
     rates = simulator.rates_at_rest(values)
     fastest = max(rates, key=lambda rate: float(rate.real), default=0.0)
     noise = ROUNDING_OF_RATES * max(map(abs, rates), default=0.0)
@@ -56,7 +56,7 @@ def unstable_rest_notes(simulator: Simulator, values: Values) -> Iterator[str]:
 
 
 def voltage_notes(case: Case, time: Array, vt: Array | None, name: str = "") -> Iterator[str]:
-    """Yield where a simulated terminal voltage (M,) passes what the models hold for.
+    """Note instants at which a simulated terminal voltage (M,) leaves the range of the models.
 
     ``name`` is that of its record.
     """
@@ -75,7 +75,7 @@ def voltage_notes(case: Case, time: Array, vt: Array | None, name: str = "") -> 
 def step_error_notes(
     case: Case, simulator: Simulator, values: Values, simulated: Mapping[str, Array]
 ) -> Iterator[str]:
-    """Yield by how much halving the step moves simulated signals (M,), where that is too much."""
+    """Note the change of simulated signals (M,) by halving the step, where that is too much."""
     signals = [name for name in simulated if name in case.kind.signals]
     errors = simulator.step_errors(values, simulator.system.outputs)
     for signal in signals:
@@ -105,7 +105,7 @@ def switching_notes(setup: ExperimentSetup) -> Iterator[str]:
 
 
 def unphysical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield the values that lie outside the range of their data sheet."""
+    """Note values outside the range of their data sheet."""
     for name, row in case.rows().items():
         if not row.is_physical(values[name]):
             text = f"{name} = {values[name]:.4g} is not physical"
@@ -113,7 +113,7 @@ def unphysical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
 
 
 def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield which of the values that act are typical: marked as such, or left out of the case."""
+    """Note which of the values that act are typical: marked as such, or left out of the case."""
     used = typical_values_used(case)
     typical = {name: value for name, value in used.items() if values[name] == value}
     for part in case.parts.all:
@@ -135,7 +135,7 @@ def idle_models(case: Case) -> list[str]:
 
 
 def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str]:
-    """Yield how long a simulated speed holds for which a breaker has opened under power."""
+    """Note for how long a simulated speed holds after a breaker has opened under power."""
     opened = [step.at for step in inputs.steps if step.signal == BREAKER]
     power = parameters.get(f"{NETWORK}P", 0.0)
     governed = any(name.startswith(GOVERNOR) for name in parameters)
@@ -153,7 +153,7 @@ def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str
 def simulation_notes(
     case: Case, simulator: Simulator, values: Mapping[str, float], response: Response
 ) -> Iterator[str]:
-    """Yield what a reader of a simulated response must know: its values, and whether it holds.
+    """Note all that bears on a simulated response: its values, and its validity.
 
     ``values`` are those of the case, and of what the test has of its own.
     """
@@ -171,7 +171,7 @@ def simulation_notes(
 
 
 def rest_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
-    """Yield where the steady part of a record contradicts the case, and what is left out of it."""
+    """Note contradictions of the steady part of a record with the case, and what is left out."""
     yield from switching_notes(setup)
     test = setup.test
     if test.steady is not None and test.begin is None:

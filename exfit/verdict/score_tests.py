@@ -58,7 +58,7 @@ class Held:
     std_error: float = 0.0
 
     def better(self, change: float) -> str:
-        """Return which change would match better."""
+        """Word the change that would match better."""
         if self.unit == "s":
             return f"{1e3 * abs(change):.2g} ms {'later' if change > 0.0 else 'earlier'}"
         if self.unit:
@@ -77,18 +77,18 @@ class Contradiction(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """What the record contradicts, and how much."""
+        """The value that the record contradicts, with chi-square."""
         return f"the record contradicts {self.held.words} (chi-square {digits(self.chi_square)})"
 
     @property
     def cause(self) -> Cause:
-        """What would match better, and what to do."""
+        """The change that would match better, with a remedy."""
         better = self.held.better(self.change)
         return Cause(f"{self.held.words}: {better} would match better", self.held.remedy)
 
     @property
     def likelihood(self) -> float:
-        """How likely it is that this value is wrong: by the record, and beforehand."""
+        """Log-likelihood that this value is wrong: by the record, and beforehand."""
         return 0.5 * self.chi_square - self.held.rare
 
 

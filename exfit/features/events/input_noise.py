@@ -62,7 +62,7 @@ NOT_WEIGHTED = (
 
 
 class RestNoise(NamedTuple):
-    """What noise of the samples (R,) at ``rest`` does to all errors (M,) by what they decide.
+    """Effect of noise of the samples (R,) at ``rest`` on all errors (M,), by what they decide.
 
     That is the level at which the simulation starts and, for an angle, how fast it turns:
     ``moved`` (M, R) is without what the samples do themselves.
@@ -115,7 +115,7 @@ def carried_noise(setup: ExperimentSetup, values: Values) -> CarriedNoise:
 
 
 def responses_to_samples(experiment: Experiment, values: Values, signal: str) -> Array:
-    """Return by how much each sample (D,) of a recorded input moves each error: (M, D).
+    """Response of each error to each sample (D,) of a recorded input: (M, D).
 
     Pulses at some samples show it, and between two of them the response is that of both, each as
     much later or earlier.
@@ -180,7 +180,7 @@ def _delayed(response: Array, by: int) -> Array:
 
 
 def rest_noise(setup: ExperimentSetup, values: Values) -> dict[str, RestNoise]:
-    """Return what noise at rest does by the levels of the signals, beside what it does itself."""
+    """Effect of noise at rest by the levels of the signals, beside what it does itself."""
     experiment, steady = setup.experiment, setup.test.steady
     if steady is None:
         return {}
@@ -255,7 +255,7 @@ def weighted_search(
 
 
 def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
-    """Say why errors cannot be weighted by the noise of driving signals, None if they can."""
+    """Reason why errors cannot be weighted by the noise of driving signals, None if they can."""
     if residuals.robust is not None:
         return "with a robust loss"
     for setup in setups:
@@ -344,7 +344,7 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
 
 
 def added_gradient(residuals: Residuals, theta: Array) -> Array:
-    """Return what as much noise of the driving signals again adds to the gradient (N,), on average.
+    """Gradient (N,) that as much noise of the driving signals again adds, on average.
 
     Half of that of either sign: only what is of second order is left.
     """
@@ -391,7 +391,7 @@ def with_minima_of(problem: FitProblem, found: SearchResult) -> SearchResult:
 
 
 def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str]:
-    """Yield what was done about the noise of the driving signals, and how large it is.
+    """Note the treatment of the noise of the driving signals, and its size.
 
     ``bias`` (N,) is what it did to the parameters, in standard errors.
     """

@@ -75,7 +75,7 @@ STILL_UNLIKE = 0.2  # of the sizes of both: a better one is not right
 
 
 def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield what the records of grid events themselves show to be wrong."""
+    """Suspect the records of grid events of faults that they show themselves."""
     if not evidence.case.kind.finds_rest:
         return
     for record in evidence.records:
@@ -87,7 +87,7 @@ def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def record_causes(record: Record, steady: float) -> tuple[Cause, ...]:
-    """Return what is wrong with the record of an event that begins after ``steady`` (s).
+    """Find faults in the record of an event that begins after ``steady`` (s).
 
     It is seen without a response: levels at which no unit runs, held and single samples, angles
     that jump while the power does not.
@@ -187,7 +187,7 @@ def _held(record: Record, steady: float) -> Iterator[Cause]:
 
 
 def _longest_hold(time: Array, samples: Array) -> tuple[float, float] | None:
-    """Return from when to when (s) a signal (M,) is held before a jump, None where it is not."""
+    """Interval (s) in which a signal (M,) is held before a jump, None where it is not."""
     if len(samples) < 3:
         return None
     changes = np.abs(np.diff(samples))
@@ -212,7 +212,7 @@ def _longest_hold(time: Array, samples: Array) -> tuple[float, float] | None:
 
 
 def _is_staircase(time: Array, starts: NDArray[np.intp], coarse: bool) -> bool:
-    """Return whether a signal changes in even steps that are far apart, as a slow meter has it."""
+    """Test whether a signal changes in even steps that are far apart, as a slow meter has it."""
     apart = np.diff(time[starts])
     return coarse and len(apart) > 2 and float(np.ptp(apart)) < 0.5 * float(np.median(apart))
 
@@ -248,7 +248,7 @@ def _spiky(record: Record) -> Iterator[Cause]:
 
 
 def _others_bend(record: Record, name: str, at: float) -> bool:
-    """Return whether another signal bends beside an instant (s) as no noise does: a switching."""
+    """Test whether another signal bends beside an instant (s) as no noise does: a switching."""
     row = int(np.searchsorted(record.time, at))
     near = slice(max(row - BESIDE_SPIKE, 1), row + BESIDE_SPIKE + 1)
     for other, samples in record.signals.items():
@@ -290,7 +290,7 @@ def swing_causes(comparison: Comparison, steady: float) -> Iterator[Cause]:
 
 
 def mismatch(comparison: Comparison, steady: float) -> float:
-    """Return how far the swings of p are off the response's, of the sizes of both; 1 at most."""
+    """Difference of the swings of p from the response's, of the sizes of both; 1 at most."""
     overlay = comparison.overlays["p"]
     known = np.isfinite(overlay.error)
     t = comparison.time[known]
@@ -340,7 +340,6 @@ def _swing_cause(name: str, time: Array, overlay: Overlay, steady: float) -> Ite
 
 
 def _remedy(ratio: float) -> str:
-    """Return what to check where swings are so many times as far as the response's."""
     if ratio < 0.1 or ratio > 10.0:
         return (
             "check the unit of the angle, which is by 57.3 too large where degrees are taken for "
@@ -368,7 +367,7 @@ def _correlation(a: Array, b: Array) -> float:
 
 
 def _delay(time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
-    """Return by how much (s) a signal is later than another where they are most alike, and how."""
+    """Delay (s) of a signal after another where they are most alike, and that correlation."""
     step = float(np.median(np.diff(time)))
     most = min(round(1.0 / step), len(time) // 4)
     correlations = []
@@ -389,7 +388,7 @@ def _delay(time: Array, measured: Array, simulated: Array) -> tuple[float, float
 
 
 def event_causes(case: Case, recording: Recording) -> tuple[Cause, ...]:
-    """Find what is wrong with the record of an event: its clock, its levels, its swings.
+    """Find faults of the record of an event: its clock, its levels, its swings.
 
     Each of these hides what comes after it.
     """
@@ -427,7 +426,7 @@ def _compared(case: Case, recording: Recording) -> Comparison | None:
 def _other_angle(
     case: Case, recording: Recording, record: Record, steady: float, before: float
 ) -> tuple[Cause, ...]:
-    """Return what was taken for the angle where with another one the power matches far better."""
+    """Try other angles, and name one with which the power matches far better."""
     for factor, (words, remedy) in WRONG_ANGLES.items():
         signals = {**record.signals, "angle": factor * record.signals["angle"]}
         turned = replace(record, signals=MappingProxyType(signals))

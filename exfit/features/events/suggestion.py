@@ -70,7 +70,7 @@ def _phasors(pmu: PmuContent, bases: Mapping[str, Base]) -> Section:
 
 
 def _about(phasor: InspectedPhasor, what: str) -> str:
-    """Say what to check of a phasor."""
+    """List facts to check of a phasor."""
     facts = [what]
     if phasor.rivals:
         facts.append(f"or is it {', '.join(phasor.rivals)}?")

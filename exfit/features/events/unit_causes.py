@@ -65,7 +65,7 @@ def of_case(evidence: Evidence, other: Case) -> Residuals:
 
 
 def other_swing(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the other form of the equation of the speed would match."""
+    """Suspect the form of the equation of the speed."""
     own = getattr(evidence.case.plant, "swing", "power")
     form = "torque" if own == "power" else "power"
     cause = Cause(
@@ -77,7 +77,7 @@ def other_swing(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the unit has a governor, by the one of two simple ones that matches better."""
+    """Suspect a missing governor, by the one of two simple ones that matches better."""
     if evidence.case.parts.governor is not None:
         return
     trials = {
@@ -112,7 +112,7 @@ def _governed(
 
 
 def of_stand_in(evidence: Evidence, cost: float) -> float:
-    """Return how much likelier a control is than its simple stand-in, at the cost with that.
+    """Gain in likelihood of a control over its simple stand-in, at the cost with that.
 
     Where the stand-in explains most, what it leaves may be that the unit's own is of another kind.
     """
@@ -124,7 +124,7 @@ def of_stand_in(evidence: Evidence, cost: float) -> float:
 
 
 def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the unit has a stabiliser, by a simple one of speed or power that would match."""
+    """Suspect a missing stabiliser, by a simple one of speed or power that would match."""
     case = evidence.case
     recorded = any("vs" in recording.record.channels for recording in case.recordings)
     if case.parts.stabiliser is not None or recorded:
@@ -156,7 +156,7 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the governor or the stabiliser of the case was out of service."""
+    """Suspect the governor or the stabiliser of the case of being out of service."""
     parts = evidence.case.parts
     if parts.governor is not None:
         yield from _idle(evidence, parts.governor, GOVERNOR, without_governor)
@@ -178,7 +178,7 @@ def _idle(
 
 
 def other_motion(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that another inertia or damping of the machine would match."""
+    """Suspect the inertia or the damping of the machine."""
     fixed = evidence.residuals.fixed
     inertia, damping = fixed.get(INERTIA), fixed.get(DAMPING)
     freed = []
@@ -192,7 +192,7 @@ def other_motion(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def other_transformer(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that another transformer would match, or powers recorded on its other side."""
+    """Suspect the transformer, or the side of it on which powers are recorded."""
     case, reactance = evidence.case, evidence.residuals.fixed.get(REACTANCE)
     if reactance is None:
         return
@@ -223,7 +223,7 @@ def other_transformer(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def _other_number(evidence: Evidence, freed: FreeParameter, check: str) -> Iterator[Suspicion]:
-    """Yield that another number in place of a fixed one would match."""
+    """Suspect a fixed number, if another one would match."""
     given = evidence.residuals.fixed[freed.name]
 
     def cause(trial: Trial) -> Cause:

@@ -72,7 +72,7 @@ def with_found_lines(
 def _candidates(
     setups: Sequence[ExperimentSetup], residuals: Residuals, theta: Array, notes: dict[Place, str]
 ) -> Iterator[tuple[Place, Line]]:
-    """Yield the lines that are no chance of white noise; ``notes`` say why others are none."""
+    """Find lines that are no chance of white noise; ``notes`` say why others are none."""
     errors, slopes = residuals.errors(theta)
     blocks = iter(slices(residuals.sizes))
     for setup, experiment in zip(setups, residuals.experiments, strict=True):

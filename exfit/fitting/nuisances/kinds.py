@@ -45,7 +45,7 @@ OF_SYSTEM: Mapping[NuisanceKind, str] = {"vt0": VT0, "driving": DRIVING_SCALE}
 
 @dataclass(frozen=True)
 class Nuisance:
-    """What a fit finds about a record, under ``name``: it is no parameter of the unit.
+    """Free parameter of a record, under ``name``: it is none of the unit.
 
     ``step`` is the index in the inputs of a step whose instant or size it is, ``signal`` the
     channel whose scale, offset or periodic disturbance it is. The instant of an only step is a
@@ -67,9 +67,9 @@ class Nuisance:
 
     @property
     def meaning(self) -> str:
-        """What it is, in words."""
+        """Meaning in words."""
         return NUISANCES[self.kind][1]
 
     def rescales(self, signal: str) -> bool:
-        """Return whether it is the scale or the offset of the channel of a signal."""
+        """Test whether it is the scale or the offset of the channel of a signal."""
         return self.signal == signal and self.kind in ("scale", "offset")

@@ -18,7 +18,7 @@ OPENING = "breaker.opens"  # the name of the instant, as its place in a test
 
 
 def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> bool:
-    """Return whether the instant of a step can be found by shifting the whole response.
+    """Test whether the instant of a step can be found by shifting the whole response.
 
     That leaves the simulation as it is, and with it the steps at which limits are met; a smooth
     step that moves over the grid meets them now a step earlier, now later, and so gives the cost a
@@ -32,7 +32,7 @@ def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> boo
 
 
 def finds_level(test: BumpTest, file: RecordFile) -> bool:
-    """Return whether a fit finds the voltage before the test though the case does not ask for it.
+    """Test whether a fit finds the voltage before the test though the case does not ask for it.
 
     Where a breaker opens vt jumps from that level, and the jump is what shows X''d: the noise of
     the level's mean is noise of the jump, which the intervals must include.
@@ -41,12 +41,12 @@ def finds_level(test: BumpTest, file: RecordFile) -> bool:
 
 
 def prefix_of(recording: Recording) -> str:
-    """Return how the names of all begin that a fit finds about a record."""
+    """Beginning of the names of a record's nuisances."""
     return prefix_from(recording.name)
 
 
 def prefix_from(name: str) -> str:
-    """Return how the names of all begin that a fit finds about a record of a name."""
+    """Beginning of the names of the nuisances of a record of this name."""
     return "" if name == SINGLE else f"{name}."
 
 
@@ -81,7 +81,7 @@ def nuisance_parameters(
     alone: bool = True,
     scaled: Collection[str] = (),
 ) -> tuple[tuple[Nuisance, ...], tuple[FreeParameter, ...]]:
-    """Return what a fit finds about a record; the names begin with ``prefix``.
+    """List the nuisances of a record; the names begin with ``prefix``.
 
     ``alone`` says that nothing but the steps moves the unit; ``scaled`` are the channels that drive
     it, whose scale is a parameter of the system.

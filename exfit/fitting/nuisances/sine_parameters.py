@@ -22,7 +22,7 @@ MOST_OF_LINE = 4.0  # times the amplitude of a line that was found: how large it
 
 
 class Bounded(NamedTuple):
-    """What is found of a disturbance: its start and its bounds."""
+    """Start and bounds of a parameter of a disturbance."""
 
     start: float
     low: float

@@ -71,7 +71,7 @@ def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:
 
 
 def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | None:
-    """Return until when a record is at rest, s: until the earliest instant that it may show."""
+    """Find the end of the rest, s: the earliest instant that it may show."""
     delay = _lowest(file.delay)
     events = (event for signal in REFERENCES for event in test.events(signal))
     opening = () if test.breaker is None else (test.breaker.opens,)
@@ -86,7 +86,7 @@ def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | N
 
 
 def _bounded_opening(place: str, opens: float | Unknown, record: Record) -> float | Unknown:
-    """Return when the breaker opens, where it says auto between the samples of a jump.
+    """Find the opening of the breaker, where it says auto between the samples of a jump.
 
     There nothing that is compared jumps with the instant: the cost is smooth in it. The jump is
     that of vt or, where a recorder has averaged that, of another signal.
@@ -111,7 +111,6 @@ def _bounded_opening(place: str, opens: float | Unknown, record: Record) -> floa
 
 
 def _lowest(value: float | Unknown) -> float:
-    """Return the least that a value may be."""
     if isinstance(value, Unknown):
         return -inf if value.min is None else value.min
     return value

@@ -73,7 +73,7 @@ def _refuse_short_rest(until: float, record: Record) -> None:
 
 
 def _showing_rest(record: Record) -> Iterator[tuple[str, Array, Array]]:
-    """Yield the signals that rest before an event, with their time; of an angle, its turning."""
+    """Yield signals with their time from which the rest shows; of an angle, its turning."""
     for signal in RESTING:
         if signal in record.signals:
             samples = record.signals[signal]
@@ -94,7 +94,7 @@ def _jumps(switchings: Sequence[Switching], signal: str) -> tuple[tuple[int, int
 def angle_of_event(
     test: BumpTest, record: Record, switchings: Sequence[Switching] = ()
 ) -> SplinedInput:
-    """Return how the angle of the recorded voltage deviates from its even course before the event.
+    """Deviation of the angle of the recorded voltage from its even course before the event.
 
     It is recorded, or the integral of the recorded frequency, less the mean of that at rest.
     """
@@ -111,7 +111,7 @@ def angle_of_event(
 def event_inputs(
     test: BumpTest, record: Record, switchings: Sequence[Switching] = ()
 ) -> dict[str, RecordedInput | SplinedInput]:
-    """Return the inputs that a record of an event drives: vt and its angle."""
+    """Inputs of the unit by a record of an event: vt and its angle."""
     moved = deviation(test, record, "vt")
     voltage = SplinedInput(record.time, moved, _jumps(switchings, "vt"))
     return {"vt": voltage, "angle": angle_of_event(test, record, switchings)}

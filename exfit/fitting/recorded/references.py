@@ -60,7 +60,7 @@ class _Sampled:
     filter: Filter | None
 
     def moves_from(self) -> float:
-        """Return when it is not at rest any more, s; raises RecordError where it never is."""
+        """Find the end of its rest, s; raises RecordError where it never moves."""
         try:
             return float(self.time[rest_end(self.samples)])
         except ValueError as fault:
@@ -134,7 +134,7 @@ def references_of(
 
 
 def is_table(record: Record) -> bool:
-    """Return whether a file is a table of few rows and not the samples of a recorder."""
+    """Test whether a file is a table of few rows and not the samples of a recorder."""
     spacing = float(median(np.diff(record.time)))
     return spacing > LONGEST_JUMP and len(record.time) <= MOST_ROWS
 
@@ -145,7 +145,7 @@ def _rows(record: Record, signal: str) -> tuple[tuple[float, float], ...]:
 
 
 def span_of(test: BumpTest, record: Record) -> Span:
-    """Return when the simulation along a record begins, and the record ends, s."""
+    """Start of the simulation along a record, and end of the record, s."""
     begin = float(record.time[0]) if test.begin is None else test.begin
     return begin, float(record.time[-1])
 
@@ -179,7 +179,7 @@ def _sampled(
 def _steady_until(
     test: BumpTest, file: RecordFile | None, sampled: Mapping[str, _Sampled]
 ) -> float:
-    """Return until when all that a test moves is at rest, s, as the record shows it."""
+    """End of the rest of all that a test moves, s, as the record shows it."""
     if test.steady_until is not None:
         return test.steady_until
     delay = 0.0 if file is None else _least(file.delay)

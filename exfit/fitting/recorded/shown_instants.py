@@ -152,7 +152,7 @@ def _costs(
 
 
 def _left_of(setup: ExperimentSetup, response: Array, beginnings: Sequence[Beginning]) -> float:
-    """Return what a response (M, channels) of any size, and its integrals, leave of beginnings."""
+    """Remainder of beginnings after a response (M, channels) of any size, and its integrals."""
     total = 0.0
     for place, inside, samples, noise in beginnings:
         channel = setup.channels[place]
@@ -174,7 +174,7 @@ def integral(time: Array, samples: Array) -> Array:
 
 
 def vertex(at: Array, costs: Array, best: int) -> float:
-    """Return where the parabola through the least of evenly spaced costs (K,) is lowest."""
+    """Place of the lowest point of a parabola through the least of evenly spaced costs (K,)."""
     if 0 < best < len(at) - 1:
         before, least, after = costs[best - 1 : best + 2]
         bend = float(before - 2.0 * least + after)

@@ -38,7 +38,7 @@ class Switching(NamedTuple):
 
     @property
     def is_large(self) -> bool:
-        """Return whether its instant matters."""
+        """Flag of a jump whose instant matters."""
         return abs(self.change) > WORTH_FINDING * LEAST_JUMPS[self.signal]
 
     @property
@@ -73,7 +73,7 @@ def _driving(record: Record) -> Iterator[tuple[str, Array]]:
 
 
 def groups_of(switchings: Sequence[Switching]) -> list[Group]:
-    """Return what happens between the same samples together, in order of time."""
+    """Group jumps between the same samples, in order of time."""
     groups: list[Group] = []
     for switching in sorted(switchings, key=lambda each: each.jump):
         first = switching.jump[0]
@@ -183,7 +183,7 @@ def _number(number: int) -> str:
 
 
 def _size(own: SplinedInput, before: int, after: int, at: float) -> float:
-    """Return by how much an input jumps at an instant, by lines through what is on each side."""
+    """Jump of an input at an instant, by lines through the samples on each side."""
     sides = slice(max(before - BESIDE + 1, 0), before + 1), slice(after, after + BESIDE)
     levels = [np.polyfit(own.time[side] - at, own.samples[side], 1)[1] for side in sides]
     return float(levels[1] - levels[0])

@@ -41,7 +41,7 @@ UNSEEN = 1e-9  # of the largest singular value: rounding
 def recorder_averages(
     case: Case, residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
 ) -> RecorderAverages | None:
-    """Return what averages would change at the minimum theta (N,); None where that is nothing.
+    """Estimate the effect of averages at the minimum theta (N,); None where there is none.
 
     Over the time between samples, or over a usual window that the record shows to be likelier. None
     also where the record excludes them, and where the case says whether the recorder averages.
@@ -170,7 +170,7 @@ def _compared(
     variance: float,
     uncertainty: UncertaintyAnalysis,
 ) -> RecorderAverages:
-    """Return what a fit with averages finds, from the minimum theta (N,) without them."""
+    """Compare the minimum theta (N,) without averages with that of a fit with them."""
     end, errors = descent_near(averaged, theta), residuals(theta)
     cost, values = 0.5 * float(errors @ errors), own_values(averaged, end.x)
     of_records = {n.name for each in residuals.experiments for n in each.nuisances}

@@ -47,7 +47,7 @@ UNFINISHED = "has no interval: its profile was interrupted"
 
 
 class Determination(NamedTuple):
-    """How well the records determine the best point of a search.
+    """Uncertainty of the best point of a search, and a lower minimum if profiles led to one.
 
     ``uncertainty`` is None where that is not known; ``lower`` is a point (N,) with a lower cost,
     where profiles led to one: what is said of the best point then holds for no minimum.
@@ -65,7 +65,7 @@ def determination(
     profiled: bool,
     progress: Watch,
 ) -> Determination:
-    """Return how well the records determine the best point of a search.
+    """Determine intervals of the best point of a search, by profiles or by linear theory.
 
     ``profiled``: with the intervals of profiles where linear theory does not serve, if the search
     ended at a minimum by itself.
@@ -114,7 +114,7 @@ def by_linear_theory_alone(
 def uncertainty_of_solution(
     problem: FitProblem, theta: Array, of_record: tuple[str, ...]
 ) -> UncertaintyAnalysis | None:
-    """Return how well the records determine the solution theta (N,), in scaled parameters.
+    """Analyse the uncertainty of the solution theta (N,), in scaled parameters.
 
     None where the derivatives there are not finite. ``of_record`` names what belongs to a record.
     """
@@ -240,7 +240,7 @@ def interval_or_bounds(own: Uncertainty, parameter: FreeParameter) -> tuple[floa
 def of_profiles(
     own: Uncertainty, parameter: FreeParameter, profiles: Sequence[estimate.CostProfile]
 ) -> Uncertainty:
-    """Return what is known of a parameter by the hull of its profiles."""
+    """Combine the profiles of a parameter to its uncertainty, by their hull."""
     hull = limits_of(profiles)
     low, high = (None if isinf(limit) else parameter.value(limit) for limit in hull)
     below, above = reasons(parameter, profiles)

@@ -93,7 +93,7 @@ def intervals_near(samples: Array, instant: float) -> Iterator[tuple[float, floa
 
 
 def decided_by_few_samples(problem: FitProblem, x: Array) -> dict[str, str]:
-    """Return why an instant has no interval, by its name: one or two samples decide it."""
+    """Name instants that one or two samples decide, each with the reason for no interval."""
     instants = [*free_instants(problem)]
     if not instants:
         return {}

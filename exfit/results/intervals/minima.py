@@ -86,7 +86,7 @@ def minima_notes(
     minima: Minima | None,
     uncertainty: UncertaintyAnalysis | None,
 ) -> Iterator[str]:
-    """Yield what must be known of the other minima beside the result of a search.
+    """Note other minima beside the result of a search.
 
     Those within the intervals of the ``uncertainty`` are no news.
     """
@@ -121,7 +121,7 @@ def _of_others(
     minima: Sequence[Minimum],
     std_errors: Values,
 ) -> Iterator[str]:
-    """Yield where the start of the case led, if elsewhere, and what the records do not refute."""
+    """Note the end of the descent from the start, if elsewhere, and minima not refuted."""
     here = own_values(residuals, search.best.x)
     valleys: dict[object, list[tuple[bool, Minimum]]] = {}
     for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
@@ -151,7 +151,7 @@ def _above(minima: Sequence[Minimum]) -> float:
 def valley_in_words(
     others: Sequence[Minimum], cost: float, above: float, here: Values, residuals: Residuals
 ) -> str:
-    """Return what moves along the flat valley of the result, in which other minima lie.
+    """Word the parameters that move along the flat valley of the result.
 
     ``above`` is the largest chi-square of them and the result.
     """
@@ -173,7 +173,7 @@ def valley_in_words(
 
 
 def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
-    """Return how another minimum lies to the result, and what the records say of it."""
+    """Word another minimum: its height, whether it is refuted, its values."""
     verdict = "which the record refutes"
     if not minimum.refuted:
         verdict = (
@@ -190,7 +190,7 @@ def times(cost: float, other: float) -> str:
 
 
 def differences(there: Values, here: Values) -> str:
-    """Return which values of a minimum are others than here: those that differ most."""
+    """Word the values of a minimum that differ most from those here."""
     pairs = {name: (value, here[name]) for name, value in there.items()}
     return ", ".join(
         f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in most_different(pairs)
@@ -211,7 +211,7 @@ def most_different(pairs: Mapping[str, tuple[float, float]]) -> list[str]:
 def valleys(
     residuals: Residuals, minima: Sequence[Array], first: int, allowed: float
 ) -> list[int | None]:
-    """Return in which valley each minimum (N,) lies, that of the ``first`` one being valley 0.
+    """Number the valley of each minimum (N,), that of the ``first`` one being valley 0.
 
     None for one whose cost exceeds the ``allowed`` one, beyond which the records refute a point.
     """
@@ -237,7 +237,7 @@ def valleys(
 
 
 def is_way(residuals: Residuals, one: Array, other: Array, allowed: float) -> bool:
-    """Return whether a way leads from one point (N,) to another on which no cost is too high.
+    """Look for a way from one point (N,) to another on which no cost is too high.
 
     The parameter that differs most goes from one to the other in even steps, and the others follow.
     Where they would have to jump there is none.

@@ -85,12 +85,12 @@ def profiles_about(
 
 
 def allowed(solution: FoundMinimum, other: FoundMinimum, rise: float) -> bool:
-    """Return whether another minimum lies below the rise at which a parameter's interval ends."""
+    """Test whether another minimum lies below the rise at which a parameter's interval ends."""
     return other.cost - solution.cost < rise
 
 
 def beyond(value: float, profiles: Iterable[estimate.CostProfile]) -> bool:
-    """Return whether a value lies in the interval of no profile so far."""
+    """Test whether a value lies in the interval of no profile so far."""
     low, high = limits_of(profiles)
     return not low <= value <= high
 
@@ -98,19 +98,19 @@ def beyond(value: float, profiles: Iterable[estimate.CostProfile]) -> bool:
 def beside(
     solution: FoundMinimum, profiles: Mapping[int, Sequence[estimate.CostProfile]]
 ) -> estimate.LowerMinimum:
-    """Return what a profile about another minimum need not find again."""
+    """Interval that a profile about another minimum need not find again."""
     return estimate.LowerMinimum(
         solution.cost, {index: limits_of(each) for index, each in profiles.items()}
     )
 
 
 def complete(profile: estimate.CostProfile) -> bool:
-    """Return whether both sides of a profile came to their ends."""
+    """Test whether both sides of a profile came to their ends."""
     return estimate.ProfileEnd.INTERRUPTED not in profile.ends
 
 
 def limits_of(profiles: Iterable[estimate.CostProfile]) -> tuple[float, float]:
-    """Return the interval that all profiles of a parameter lie in, infinite where one is open."""
+    """Interval that encloses those of all profiles of a parameter, infinite where one is open."""
     low, high = inf, -inf
     for profile in profiles:
         below, above = (end is estimate.ProfileEnd.KNOWN for end in profile.ends)
@@ -120,7 +120,7 @@ def limits_of(profiles: Iterable[estimate.CostProfile]) -> tuple[float, float]:
 
 
 def reasons(parameter: FreeParameter, profiles: Sequence[estimate.CostProfile]) -> tuple[str, str]:
-    """Return why profiles leave the lower and the upper limit open; "" for one that they set."""
+    """Reasons for which profiles leave the lower and upper limit open; "" for one that they set."""
     bounds = (f"its min {parameter.low:.4g}", f"its max {parameter.high:.4g}")
     each = [
         [reason(profile.ends[side], bound) for profile in profiles]
@@ -131,7 +131,7 @@ def reasons(parameter: FreeParameter, profiles: Sequence[estimate.CostProfile]) 
 
 
 def reason(end: estimate.ProfileEnd, bound: str) -> str:
-    """Return in words why a side of a profile has no limit, "" where it has one."""
+    """Word the reason for which a side of a profile has no limit, "" where it has one."""
     words = {
         estimate.ProfileEnd.BOUND: f"the record does not exclude {bound}",
         estimate.ProfileEnd.FAILED: "there is no response beyond",

@@ -40,7 +40,7 @@ class ChannelSamples(NamedTuple):
     rows: Rows
 
     def overlaps(self, other: "ChannelSamples") -> bool:
-        """Return whether some of these samples are among others."""
+        """Test whether some of these samples are among others."""
         alike = (self.test, self.channel) == (other.test, other.channel)
         return alike and bool(np.isin(self.rows, other.rows).any())
 
@@ -144,7 +144,6 @@ def _without(problem: FitProblem, left_out: Sequence[ChannelSamples]) -> FitProb
 
 
 def _note(problem: FitProblem, samples: ChannelSamples) -> str:
-    """Return what is left out, in words."""
     experiment = problem.residuals.experiments[samples.test]
     signal = experiment.channels[samples.channel].signal
     times = experiment.simulator.times[samples.rows]

@@ -19,7 +19,7 @@ IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
 def influence_of_typical_values(
     case: Case, residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
 ) -> dict[str, TypicalValue]:
-    """Return what each typical value that is not 0 would move, if it were DEVIATION larger.
+    """Estimate the effect of each typical value that is not 0, were it DEVIATION larger.
 
     To first order, by `shifts_by_values`: nothing where a derivative is not finite.
     """

@@ -25,14 +25,14 @@ TINY = float(np.finfo(float).tiny)  # where the errors given leave nothing of a 
 
 
 class ErrorsOfValues(NamedTuple):
-    """What the standard errors of given values move; ``without`` has those without derivatives."""
+    """Standard errors of given values, with effects; ``without`` has those without derivatives."""
 
     given: Mapping[str, GivenError]
     without: tuple[str, ...] = ()
 
 
 def errors_of_values(case: Case, problem: FitProblem, theta: Array) -> ErrorsOfValues:
-    """Return what the standard errors of given values move at the minimum theta (N,).
+    """Estimate the effect of the standard errors of given values at the minimum theta (N,).
 
     Values that move nothing are left out.
     """
@@ -145,7 +145,7 @@ def widened_by(
     size: float,
     names: Sequence[str],
 ) -> Uncertainty:
-    """Return what is known of a parameter, widened by a shift for the errors of values.
+    """Widen the uncertainty of a parameter by a shift for the errors of values.
 
     ``size`` is what counts as 100 %; ``names`` are those of the values.
     """
@@ -161,7 +161,7 @@ def widened_by(
 def _widened(
     own: Uncertainty, parameter: FreeParameter, scaled: float, shift: float, determined: bool
 ) -> Uncertainty:
-    """Return what is known of a parameter, widened by a shift in its own unit.
+    """Widen the uncertainty of a parameter by a shift in its own unit.
 
     It keeps its interval only where it is still ``determined``.
     """
@@ -187,7 +187,7 @@ def _widened(
 def shifts_by_values(
     residuals: Residuals, theta: Array, deviations: Mapping[str, float], bounds_hold: bool = True
 ) -> Array | None:
-    """Return how far each free parameter moves with each of K values, (N, K), in its own unit.
+    """Shift of each free parameter with each of K values, (N, K), in its own unit.
 
     ``deviations`` are those of the values by name. At the minimum theta (N,) the gradient stays
     zero, so that to first order the parameters move by -(J'J)^-1 J' dr/dv times the deviation of v:
@@ -209,7 +209,7 @@ def shifts_by_values(
 def first_order_shifts(
     own: Array, of_values: Array, moving: NDArray[np.bool_], bounds_hold: bool
 ) -> Array:
-    """Return by how much changes of the residuals (M, K) move each parameter, (N, K).
+    """Shift of each parameter with changes of the residuals (M, K), (N, K).
 
     ``own`` (M, N) is the Jacobian by the parameters, ``moving`` (N,) those that lie on no bound.
     """

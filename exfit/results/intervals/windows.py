@@ -106,7 +106,7 @@ def estimates_of_windows(
 def hull_of(
     estimates: Sequence[WindowEstimate], interval: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Return what holds an interval, those by the steps at 95 %, and the values by their halves."""
+    """Enclose an interval, those by the steps at 95 %, and the values by their halves."""
     ends = [each.value for each in estimates]
     for each in estimates:
         if each.kind == "step":
@@ -144,7 +144,7 @@ def windows_of(setup: ExperimentSetup) -> Iterator[Window]:
 
 
 def p_value_of(estimates: Sequence[WindowEstimate]) -> float:
-    """Return the probability that estimates of one value lie so far apart.
+    """Probability that estimates of one value lie so far apart.
 
     The halves of the windows are tested apart from the windows, of which they are parts: the
     smaller of two probabilities counts twice.
@@ -208,7 +208,7 @@ def _estimates(
 
 
 def _of_part(fit: WindowFit, moved: Array, rows: NDArray[np.bool_]) -> tuple[float, Array]:
-    """Return by how much T'd0 by a part of the errors differs, and how noise moves it (K,).
+    """Change of T'd0 by a part of the errors, and its errors by noise (K,).
 
     The saturation is that of the whole window, with its own errors by the noise ``moved`` (K, N).
     """
@@ -299,7 +299,7 @@ def _fitted(setup: ExperimentSetup, residuals: Residuals, values: Values) -> Win
 
 
 def _draws(setup: ExperimentSetup, values: Values) -> Array | None:
-    """Return what noise as strong as that of the record does to the errors (K, M).
+    """Draw errors (K, M) by noise as strong as that of the record.
 
     None where the response to it diverges.
     """

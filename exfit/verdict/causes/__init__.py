@@ -72,7 +72,7 @@ FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not wor
 
 
 def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
-    """Return what may be wrong with a fit, its test or its record, the likeliest first.
+    """List likely faults of a fit, its test or its record, the likeliest first.
 
     ``matched``: a minimum whose residuals are noise, of which only what is at rest is looked at.
     Where an interruption or its pace ends the search for them, they are those found by then.
@@ -101,7 +101,7 @@ def _of_features(plug: str) -> Mapping[str, Recogniser]:
 def _credible(
     evidence: Evidence, found: Mapping[Recogniser, Sequence[Suspicion]]
 ) -> list[Suspicion]:
-    """Return what was found; of averages in a grid event only what explains more than all others.
+    """List all suspicions; averages in a grid event only if they explain more than all others.
 
     One device measures what drives the unit and what is compared, over the same windows.
     """
@@ -125,7 +125,7 @@ def likely(suspicions: Sequence[Suspicion]) -> list[Suspicion]:
 def _found(
     evidence: Evidence, recognisers: Mapping[str, Recogniser]
 ) -> dict[Recogniser, list[Suspicion]]:
-    """Return what each recogniser finds, until an interruption or the pace ends it."""
+    """Run each recogniser, until an interruption or the pace ends it."""
     pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
     try:
         for done, recognise in enumerate(recognisers.values()):

@@ -35,7 +35,7 @@ FAR_FROM_FREE_MACHINE = 0.25  # of a level at rest: what data of the machine may
 
 
 def case_warnings(case: Case) -> Iterator[str]:
-    """Yield what the case alone shows: steps of no test, and records that validate nothing."""
+    """Warn of steps of no test, and of records that validate nothing, by the case alone."""
     for recording in (*case.recordings, *case.validations):
         if case.seen_from(recording).kind.per_unit:
             yield from _large_steps(recording)
@@ -51,7 +51,7 @@ def _large_steps(recording: Recording) -> Iterator[str]:
 
 
 def _overlap(fitted: Recording, validation: Recording) -> Iterator[str]:
-    """Yield that a validation sees samples of a fitted record."""
+    """Warn of a validation that sees samples of a fitted record."""
     if fitted.record.file != validation.record.file:
         return
     (begin, end), (first, last) = _window(fitted.record), _window(validation.record)
@@ -76,7 +76,7 @@ def _in_words(begin: float, end: float) -> str:
 
 
 def causes_before_fit(case: Case, recording: Recording) -> Iterator[Cause]:
-    """Yield what features see to be wrong with a record that drives a unit; it is read for that.
+    """Ask features for faults of a record that drives a unit, which is read for that.
 
     Raises RecordError where it cannot be read.
     """
@@ -86,7 +86,7 @@ def causes_before_fit(case: Case, recording: Recording) -> Iterator[Cause]:
 
 
 def event_warnings(case: Case) -> Iterator[str]:
-    """Yield what is wrong with the records of grid events that are fitted; they are read for that.
+    """Warn of faults in the records of grid events that are fitted; they are read for that.
 
     Raises RecordError where one cannot be read.
     """
@@ -97,7 +97,7 @@ def event_warnings(case: Case) -> Iterator[str]:
 
 
 def record_warnings(case: Case, setups: Sequence[ExperimentSetup], values: Values) -> Iterator[str]:
-    """Yield what the records of a case show beside the response to the start values.
+    """Warn of records that differ from the response to the start values.
 
     The setups have sub-steps enough for that. A level at rest does not depend on the exciter: where
     it is another, the base, the polarity or the data of the machine are.
@@ -116,7 +116,7 @@ def record_warnings(case: Case, setups: Sequence[ExperimentSetup], values: Value
 def _beside_response(
     setup: ExperimentSetup, values: Values, steady: float, free_machine: bool
 ) -> Iterator[str]:
-    """Yield the channels that rest or move otherwise than the response, or are not at rest."""
+    """Warn of channels that rest or move unlike the response, or are not at rest."""
     comparison = compare_with_record(setup, setup.name, values)
     given = _not_rescaled(setup, comparison.overlays)
     before = comparison.time < steady
@@ -144,7 +144,7 @@ def _not_rescaled(setup: ExperimentSetup, overlays: Mapping[str, Overlay]) -> di
 
 
 def _against(signal: str, overlay: Overlay, before: Mask) -> str:
-    """Return how a channel is negative at rest, or moves the other way than the response, or ""."""
+    """Warn of a channel that is negative at rest or moves against the response; else ""."""
     known = np.isfinite(overlay.error)
     before, after = before & known, ~before & known
     if not (before.any() and after.any()):

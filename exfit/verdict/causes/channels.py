@@ -34,7 +34,7 @@ RARE = 5.0  # log-likelihood: vt has a wrong base less often than other things a
 
 
 def wrong_scale(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the channels that another factor would match: base, unit, connection or polarity."""
+    """Suspect the scale of channels: base, unit, connection or polarity."""
     for number, experiment in enumerate(evidence.residuals.experiments):
         for channel in experiment.channels:
             if not is_found(experiment, channel, "scale"):
@@ -83,23 +83,23 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
 
 
 def is_wrong_base(signal: str, factor: float) -> bool:
-    """Return whether a base may be wrong by a factor: it is none that is hardly more than 1."""
+    """Test whether a factor may be that of a wrong base: one that is hardly more than 1 is none."""
     return abs(factor - 1.0) >= (LEAST_CHANGE if signal == "vt" else LEAST_ERROR_OF_BASE)
 
 
 def factor_between(levels: tuple[float, float]) -> float:
-    """Return by which factor a measured level comes to the simulated one; 1 where one is zero."""
+    """Ratio of the simulated level to the measured one; 1 where one of them is zero."""
     measured, simulated = levels
     return simulated / measured if measured and simulated else 1.0
 
 
 def nearer_to_rated(levels: tuple[float, float] | None, trial: Trial) -> bool:
-    """Return whether another base brings vt before the step nearer to 1 pu, as units are tested."""
+    """Test whether another base brings vt before the step nearer to 1 pu, as units are tested."""
     return levels is not None and abs(trial.values["cause.vt0"] - 1.0) < abs(levels[0] - 1.0)
 
 
 def _voltage(evidence: Evidence, number: int) -> Opened:
-    """Return what leaves the voltage before the first step open."""
+    """Leave the voltage before the first step open."""
     vt0 = evidence.residuals.experiments[number].own.get(VT0, 1.0)
     return Opened(Nuisance("cause.vt0", "vt0"), vt0, vt0 - FARTHEST_VOLTAGE, vt0 + FARTHEST_VOLTAGE)
 
@@ -132,13 +132,13 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def check_zero(channel: Channel, more: float = 0.0) -> str:
-    """Return what to do about the offset of a channel, which ``more`` of it would match."""
+    """Word the remedy for the offset of a channel, which ``more`` of it would match."""
     line = offset_found(channel.signal, channel.offset + more, FARTHEST_OFFSET)
     return f"check the zero of the recorder, or let the fit find it: {line}"
 
 
 def is_found(experiment: Experiment, channel: Channel, kind: str) -> bool:
-    """Return whether a fit finds this about a channel already."""
+    """Test whether a fit finds this about a channel already."""
     return any(
         nuisance.kind == kind and nuisance.signal == channel.signal
         for nuisance in experiment.nuisances
@@ -146,7 +146,7 @@ def is_found(experiment: Experiment, channel: Channel, kind: str) -> bool:
 
 
 def levels_at_rest(record: FittedRecord, signal: str) -> tuple[float, float] | None:
-    """Return where a signal rests before the first step, measured and simulated; None if unseen."""
+    """Levels of a signal before the first step, measured and simulated; None if unseen."""
     overlay: Overlay | None = record.comparison.overlays.get(signal)
     if overlay is None or record.steady_until is None:
         return None
@@ -196,7 +196,7 @@ def clipped_channel(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def clipped_samples(measured: Array, kept: Mask) -> Mask | None:
-    """Return which samples (M,) stay at an extreme value, None where it is not clipped."""
+    """Mask of the samples (M,) that stay at an extreme value; None where it is not clipped."""
     values, counts = np.unique(measured[kept], return_counts=True)
     if len(values) < FEWEST_CLIPPED:
         return None

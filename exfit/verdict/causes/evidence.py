@@ -84,7 +84,7 @@ class Pace:
 
     @property
     def sentence(self) -> str:
-        """What was not tried and why, "" where all was."""
+        """Causes that were not tried, with the reason; "" where all were."""
         if not self.untried:
             return ""
         why = "interrupted" if self.interrupted else f"beyond estimate.causes, {self.seconds:.3g} s"
@@ -101,7 +101,7 @@ class FittedRecord:
 
     @property
     def begins_at_rest(self) -> bool:
-        """Whether the simulation starts where the record does, from rest."""
+        """Flag of a simulation that starts with its record, from rest."""
         return self.setup.test.begin is None
 
     @property
@@ -118,7 +118,7 @@ class FittedRecord:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a fit came to, as the recognisers of causes get it.
+    """A fit with its records, as the recognisers of causes get it.
 
     ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
     ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
@@ -145,7 +145,7 @@ class Evidence:
 
     @property
     def weighted_by_noise(self) -> bool:
-        """Whether the noise of what drives the simulations weighs the errors."""
+        """Flag of errors that are weighted by the noise of inputs."""
         return any(each.whitening is not None for each in self.residuals.experiments)
 
     @property
@@ -155,12 +155,12 @@ class Evidence:
 
     @property
     def cost(self) -> float:
-        """What the fit made small, where it ended."""
+        """Cost of the fit, where it ended."""
         return self.solution.cost
 
     @cached_property
     def noise_cost(self) -> float:
-        """The cost that the noise of the records alone would have, as they scatter.
+        """Cost of the noise of the records alone, as they scatter.
 
         Errors that are weighted by the noise of what drives them are as large as that foretells.
         """
@@ -173,7 +173,7 @@ class Evidence:
         return 0.5 * sum(squares)
 
     def name_of(self, number: int) -> str:
-        """Return how a sentence names a record of several, "" where there is only one."""
+        """Name a record of several as a sentence does; "" where there is only one."""
         return f" of {self.records[number].setup.name}" if len(self.records) > 1 else ""
 
     @property

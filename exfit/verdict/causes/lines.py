@@ -13,7 +13,7 @@ DIGITS = 3  # of a number in a line
 
 
 def freeing(case: Case, starts: Mapping[str, float]) -> str:
-    """Return how values of one part of a case are freed; "" where its section has no free ones."""
+    """Word the change of a case that frees values of a part; "" if its section has no free ones."""
     names = [*starts]
     part = next(
         part
@@ -34,34 +34,34 @@ def freeing(case: Case, starts: Mapping[str, float]) -> str:
 
 
 def step_found(size: float) -> str:
-    """Return the line that leaves the size of a step (pu) to the fit."""
+    """Write the line that leaves the size of a step (pu) to the fit."""
     return f"under vref: `step: {within(size, FACTOR_OF_STEP)}`"
 
 
 def delay_found(delay: float, farthest: float) -> str:
-    """Return the line that leaves the delay of a recorder (s) to the fit."""
+    """Write the line that leaves the delay of a recorder (s) to the fit."""
     return f"under record: `delay: {between(delay, delay - farthest, delay + farthest)}`"
 
 
 def offset_found(signal: str, offset: float, farthest: float) -> str:
-    """Return the line that leaves the offset of a channel (pu) to the fit."""
+    """Write the line that leaves the offset of a channel (pu) to the fit."""
     line = between(offset, offset - farthest, offset + farthest)
     return f"under record.channels.{signal}, beside its column: `offset: {line}`"
 
 
 def within(start: float, factor: float, limits: tuple[float, float] = (-inf, inf)) -> str:
-    """Return what a case has for a value that is fitted within a factor of its start."""
+    """Write the entry of a value that is fitted within a factor of its start."""
     low, high = sorted((start / factor, start * factor))
     return between(start, max(low, limits[0]), min(high, limits[1]))
 
 
 def parameter(start: float, limits: tuple[float, float]) -> str:
-    """Return what a case has for a free parameter: below 0 there is no log scale."""
+    """Write the entry of a free parameter: below 0 there is no log scale."""
     found = within(start, FACTOR, limits)
     return found if start > 0.0 else f"{found[:-1]}, scale: linear}}"
 
 
 def between(start: float, low: float, high: float) -> str:
-    """Return what a case has for a value that is fitted between bounds."""
+    """Write the entry of a value that is fitted between bounds."""
     numbers = (yaml_number(float(f"{number:.{DIGITS}g}")) for number in (start, low, high))
     return "{{start: {}, min: {}, max: {}}}".format(*numbers)

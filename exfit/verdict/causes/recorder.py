@@ -108,7 +108,7 @@ def _line(own: ChannelErrors, linear: LinearFit) -> float | None:
 
 
 def drift(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the channels that drift all along the record.
+    """Suspect channels that drift all along the record.
 
     One that a record does not show at rest may as well be slow parts of a response.
     """
@@ -133,7 +133,7 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def _folding(rate: float) -> str:
-    """Return that a ripple may look like a drift where a rate (Hz) of samples folds it to one."""
+    """Word the doubt that a rate (Hz) of samples folds a ripple to what looks like a drift."""
     folds = any(
         abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5 for mains in MAINS
     )
@@ -141,7 +141,7 @@ def _folding(rate: float) -> str:
 
 
 def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change: float) -> bool:
-    """Return whether a record drifts before its step, rather so than not at all.
+    """Test whether a record drifts before its step, rather so than not at all.
 
     ``errors`` (M,) are those of its channel, ``change`` is that of all the record, pu. It is so
     where the record does not begin at rest.
@@ -155,7 +155,7 @@ def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change
 
 
 def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the channels that have spikes, which count as errors of the model."""
+    """Suspect channels with spikes, which count as errors of the model."""
     if evidence.residuals.robust is not None:
         return
     for number, record in enumerate(evidence.records):
@@ -188,7 +188,7 @@ def _spikes(errors: Array) -> Places:
 
 
 def averaging(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the recorder shows averages, by the window that matches best.
+    """Suspect a recorder that averages, by the window that matches best.
 
     Where the fit finds the instant of the step, that makes up for the delay of averages.
     """
@@ -247,7 +247,7 @@ def _likeliest_window(evidence: Evidence, number: int) -> float | None:
 
 
 def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the times of a record are in another unit, by when it shows the first step."""
+    """Suspect another unit of the time, by the instant at which the record shows the first step."""
     for number, record in enumerate(evidence.records):
         overlay = record.comparison.overlays.get("vt")
         instants = record.setup.test.instants

@@ -24,7 +24,7 @@ def wrong_voltage(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def unsteady_record(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the signals that drift while the case calls the unit steady."""
+    """Suspect signals that drift while the case calls the unit steady."""
     for record in evidence.records:
         if record.steady_until is not None:
             setup = record.setup
@@ -33,7 +33,7 @@ def unsteady_record(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def wrong_levels(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the signals that start elsewhere than their record."""
+    """Suspect signals that start elsewhere than their record."""
     for record in evidence.records:
         if record.steady_until is not None:
             for cause in other_levels(record.comparison, record.steady_until):

@@ -38,7 +38,7 @@ LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
 
 def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the steps go the other way."""
+    """Suspect the sign of the steps."""
     for number, record in enumerate(evidence.records):
         experiment = evidence.residuals.experiments[number]
         way = moves_by(record)
@@ -57,7 +57,7 @@ def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def moves_by(record: FittedRecord) -> float | None:
-    """Return by how much vt of a record moves, where its response goes the other way."""
+    """Change of vt in a record, pu; None unless its response goes the other way."""
     measured = record.comparison.features.measured
     simulated = record.comparison.features.simulated
     if measured is None or simulated is None:
@@ -67,7 +67,7 @@ def moves_by(record: FittedRecord) -> float | None:
 
 
 def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that steps of a record have another size."""
+    """Suspect the size of the steps of a record."""
     for number, experiment in enumerate(evidence.residuals.experiments):
         free = {nuisance.step for nuisance in experiment.nuisances if nuisance.kind == "step"}
         opened = [
@@ -107,18 +107,18 @@ def _sizes(size: float) -> tuple[float, float]:
 
 
 def correct_step(sizes: Sequence[float]) -> str:
-    """Return what to do about steps of other sizes, those that would match."""
+    """Word the remedy for steps of other sizes, those that would match."""
     return f"correct step, or let the fit find it, {', '.join(map(step_found, sizes))}"
 
 
 def correct_instant(delay: float) -> str:
-    """Return what to do about a record that is late, by a delay (s) that would match."""
+    """Word the remedy for a record that is late, by a delay (s) that would match."""
     line = delay_found(delay, FARTHEST_DELAY)
     return f"correct at, or let the fit find it, under vref: `at: {{start: auto}}`; or {line}"
 
 
 def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that a record is earlier or later than the case says."""
+    """Suspect a record of being earlier or later than the case says."""
     for number, record in enumerate(evidence.records):
         experiment = evidence.residuals.experiments[number]
         if any(nuisance.kind in ("at", "shift", "delay") for nuisance in experiment.nuisances):
@@ -151,7 +151,7 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def _detected_delay(record: FittedRecord) -> float:
-    """Return how much later (s) the step shows in the record than in the response, 0 if unknown."""
+    """Delay (s) of the step in the record after that in the response, 0 if unknown."""
     overlays, time = record.comparison.overlays, record.comparison.time
     overlay = overlays.get("vt") or next(iter(overlays.values()))
     kept = np.isfinite(overlay.error)
@@ -161,7 +161,7 @@ def _detected_delay(record: FittedRecord) -> float:
 
 
 def further_step(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that a record holds a step of the reference that the case does not have."""
+    """Suspect a step of the reference in the record that the case does not have."""
     linear = linear_fit(evidence)
     if linear is None:
         return
@@ -199,7 +199,7 @@ def further_step(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def _spacing(experiment: Experiment) -> float:
-    """Return how far (s) the instants are apart at which a further step is tried."""
+    """Distance (s) of the instants at which a further step is tried."""
     times = experiment.simulator.times
     return float(times[-1] - times[0]) / INSTANTS
 
@@ -207,7 +207,7 @@ def _spacing(experiment: Experiment) -> float:
 def _likeliest_instant(
     evidence: Evidence, linear: LinearFit, number: int, rows: slice
 ) -> float | None:
-    """Return where a further step explains most, by the response to the first one, moved."""
+    """Find the instant of a further step that explains most, by the response to the first one."""
     experiment = evidence.residuals.experiments[number]
     first = experiment.simulator.inputs.steps[0]
     unit = replace(experiment, nuisances=(*experiment.nuisances, Nuisance("cause.unit", "step", 0)))

@@ -126,7 +126,7 @@ def tried(
     cause: Callable[[Trial], Cause | None],
     prior: Callable[[Trial], float] = lambda _: 0.0,
 ) -> Iterator[Suspicion]:
-    """Yield the cause that other residuals stand for, if the record is matched better by them."""
+    """Suspect the cause of other residuals, if the record is matched better by them."""
     trial = refitted(evidence, residuals)
     likely = None if trial is None else cause(trial)
     if trial is not None and likely is not None:
@@ -134,7 +134,7 @@ def tried(
 
 
 class Explained(NamedTuple):
-    """The cost that is left when columns are added to a linear model, and their coefficients."""
+    """Cost that remains when columns are added to a linear model, and their coefficients."""
 
     cost: float
     coefficients: Array
@@ -147,11 +147,11 @@ class LinearFit(NamedTuple):
     basis: Array
 
     def beyond(self, columns: Array) -> Array:
-        """Return what of columns (M, ...) the parameters cannot do."""
+        """Part of columns (M, ...) that is out of reach of the parameters."""
         return np.asarray(columns - self.basis @ (self.basis.T @ columns), dtype=np.float64)
 
     def with_columns(self, columns: Array) -> Explained:
-        """Return what is left when columns (M, C) are fitted too, beside the parameters."""
+        """Fit columns (M, C) too, beside the parameters."""
         own, errors = self.beyond(columns), self.beyond(self.errors)
         coefficients, *_ = np.linalg.lstsq(own, errors, rcond=DEPENDENT)
         left = errors - own @ coefficients
@@ -173,7 +173,7 @@ def linear_fit(evidence: Evidence) -> LinearFit | None:
 
 
 def moving(evidence: Evidence) -> Mask:
-    """Return which free parameters are not on a bound."""
+    """Mask of the free parameters that are not on a bound."""
     low, high = evidence.residuals.bounds
     return np.asarray((evidence.solution.x > low) & (evidence.solution.x < high))
 
@@ -186,6 +186,6 @@ def linear_model(errors: Array, slopes: Array) -> LinearFit:
 
 
 def blocks(evidence: Evidence) -> list[list[slice]]:
-    """Return where the errors of each channel of each record are among all of them."""
+    """Places of the errors of each channel of each record among all of them."""
     places = iter(slices(evidence.residuals.sizes))
     return [[next(places) for _ in each.channels] for each in evidence.residuals.experiments]

@@ -40,7 +40,7 @@ STRUCTURE = 0.01  # of the error beyond the noise: what leaves more is less like
 
 
 def machine_data(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that another time constant or saturation of the machine would match."""
+    """Suspect a time constant or the saturation of the machine."""
     fixed = evidence.residuals.fixed
     for names in ((TPD0,), SATURATION):
         given = [name for name in names if fixed.get(name, 0.0) > 0.0]
@@ -106,18 +106,18 @@ def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> It
 
 
 def of_machine(names: Sequence[str]) -> bool:
-    """Return whether values are data of the machine."""
+    """Test whether values are data of the machine."""
     return names[0].startswith(MACHINE)
 
 
 def remedy_of(case: Case, starts: Mapping[str, float]) -> str:
-    """Return what to do about values that may be wrong; a fit of them begins with ``starts``."""
+    """Word the remedy for values that may be wrong; a fit of them begins with ``starts``."""
     sources = "nameplate and test reports" if of_machine([*starts]) else "the data sheet"
     return ", ".join(filter(None, [f"check {sources}", freeing(case, starts)]))
 
 
 def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the limits that would match elsewhere: met too early, or never although the unit is."""
+    """Suspect limits: met too early, or never although those of the unit are."""
     fixed = evidence.residuals.fixed
     for number, record in enumerate(evidence.records):
         experiment = evidence.residuals.experiments[number]
@@ -159,7 +159,7 @@ def _other_limit(evidence: Evidence, extreme: Extreme) -> Iterator[Suspicion]:
 
 
 def narrow_bound(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the parameters that a bound holds although the record asks for more."""
+    """Suspect bounds that hold parameters although the record asks for more."""
     residuals = evidence.residuals
     sides = {
         parameter.name: side
@@ -192,7 +192,7 @@ def _widened(parameter: FreeParameter) -> FreeParameter:
 
 
 def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield that the iterations of a case were too few."""
+    """Suspect the iterations of a case of being too few."""
     if evidence.solution.stop in (Stop.ITERATIONS, Stop.EVALUATIONS):
         yield Suspicion(
             Cause(
