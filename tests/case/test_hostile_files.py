@@ -11,7 +11,7 @@ from exfit.case import peek
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme.case.programme import load_programme
-from exfit.features.start.table_of_tests import read_test_table
+from exfit.features.start.tables import read_test_table
 from exfit.util.text import MOST_TEXTS
 from exfit.workflows.given_values import read_parameters
 

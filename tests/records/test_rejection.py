@@ -14,8 +14,8 @@ from exfit.case.draft.case_draft import CaseDraft
 from exfit.case.draft.suggestion import bump_section
 from exfit.errors import ExfitError
 from exfit.features.start.starting_tests import starting_tests
-from exfit.features.start.table_of_tests import TableRow
-from exfit.features.start.table_of_tests import tests_of_table as named_tests
+from exfit.features.start.tables import TableRow
+from exfit.features.start.tables import tests_of_table as named_tests
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 

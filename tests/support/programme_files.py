@@ -8,7 +8,7 @@ import yaml
 from channel_records import response_of
 from places import CONFIGS
 
-from exfit.features.planner.psse.files import record_text
+from exfit.features.planner.psse import record_text
 from exfit.features.planner.records import alternatives
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator
 
-from exfit.case.checks.bump_test import place_faults
+from exfit.case.checks.bump_test import moves_of, place_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import driving_faults
-from exfit.case.checks.reference import moves_of
 from exfit.case.yaml import Fault
 from exfit.plants import BREAKER, EVENTS, SPEED, PlantKind
 from exfit.util.text import show

@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from exfit import registry
-from exfit.case.checks.as_found import as_found_faults
 from exfit.case.checks.breaker import breaker_faults, driving_signals
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
-from exfit.case.checks.model import parameter_faults
+from exfit.case.checks.model import as_found_faults, parameter_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import (
@@ -16,6 +15,7 @@ from exfit.case.checks.plant import (
     model_faults,
     plant_faults,
     plants_of_records_faults,
+    source_faults,
     stabiliser_faults,
 )
 from exfit.case.checks.record import (
@@ -25,13 +25,10 @@ from exfit.case.checks.record import (
     name_faults,
     noise_faults,
     record_faults,
-    weight_faults,
-)
-from exfit.case.checks.recorded_reference import (
     recorded_reference_faults,
     stabiliser_channel_faults,
+    weight_faults,
 )
-from exfit.case.checks.sources import source_faults
 from exfit.case.parts import ANY_PLANT, Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import LONGEST_WHOLE, Fault

@@ -1,15 +1,15 @@
-"""What contradicts itself in the parameters of a case: data sheets, bounds, priors, ties."""
+"""What contradicts itself in the parameters of a model: values, bounds, what was found before."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 from exfit.case.bounds import is_held, search_bounds
-from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.messages import PERCENT
-from exfit.case.parts import Part, Parts, helpers_of, places_of_ties, used_by_ties
+from exfit.case.parts import Part, Parts, helpers_of, kind_of, places_of_ties, used_by_ties
 from exfit.case.saturation import (
     CONSTANTS,
     has_saturation,
@@ -18,9 +18,29 @@ from exfit.case.saturation import (
 )
 from exfit.case.ties import TieError, Ties, is_tie
 from exfit.case.yaml import Fault
+from exfit.errors import ModelError
+from exfit.models import GOVERNORS, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
 from exfit.util.text import Place, near, show, show_value
+
+
+def bound_faults(section: ContentNode) -> Iterator[Fault]:
+    """Yield why ``start``, ``min`` and ``max`` of a section contradict each other."""
+    start, low, high = (section.at(key).number for key in ("start", "min", "max"))
+    if section.content.get("bounds") == "none":
+        given = [key for key in ("min", "max") if key in section]
+        yield from (section.at(key).fault("not allowed with bounds: none") for key in given)
+    elif low is not None and high is not None and low >= high:
+        yield section.at("min").fault(f"{show(low)} is not below max = {show(high)}")
+    elif start is not None and _outside(start, low, high):
+        limits = " ... ".join("?" if limit is None else show(limit) for limit in (low, high))
+        yield section.at("start").fault(f"{show(start)} lies outside its bounds {limits}")
+
+
+def _outside(start: float, low: float | None, high: float | None) -> bool:
+    """Return whether a start lies outside its bounds, as far as these are readable."""
+    return (low is not None and start < low) or (high is not None and start > high)
 
 
 def parameter_faults(content: ContentNode, parts: Parts, ties: Ties) -> Iterator[Fault]:
@@ -216,3 +236,41 @@ def _readable(part: Part, *given: Mapping[str, Any]) -> dict[str, float]:
     }
     values = part.resolved(*numbers)
     return {symbol: value for symbol, value in values.items() if symbol not in unreadable}
+
+
+def as_found_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
+    """Yield a model that is not in the catalogue, and parameters that no part has."""
+    section = content.at("as_found")
+    rows = {part.prefix + row.symbol: row for part in parts.all for row in part.sheet}
+    name = section.at("model")
+    if name.text:
+        try:
+            sheet = find(name.text.removesuffix(".py"), Path()).sheet
+        except ModelError as error:
+            yield name.fault(str(error))
+            return
+        if not kind_of(content.at("plant").content).has_exciter:
+            yield name.fault("not allowed with this plant: it has no exciter")
+        rows = {**_of_others(rows), **{row.symbol: row for row in sheet}}
+    for symbol, value in (*section.at("parameters").sections, *_unused(section, parts)):
+        if symbol not in rows:
+            yield value.fault(f"not a parameter of the model as found; {near(symbol, rows)}")
+        elif value.number is not None and (text := rows[symbol].range_fault(value.number)):
+            yield value.fault(text)
+
+
+def _unused(section: ContentNode, parts: Parts) -> list[tuple[str, ContentNode]]:
+    """Return what is unused but for what a governor's record alone has, as GGOV1's Trate."""
+    listed = {
+        part.prefix + name
+        for part in parts.all
+        if part.name in GOVERNORS
+        for record in GOVERNORS[part.name].records
+        for name in record.ignored
+    }
+    return [(name, node) for name, node in section.at("unused").sections if name not in listed]
+
+
+def _of_others(rows: dict[str, Parameter]) -> dict[str, Parameter]:
+    """Return the rows of all parts but the exciter."""
+    return {name: row for name, row in rows.items() if "." in name}

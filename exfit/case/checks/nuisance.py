@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from exfit.case.checks.bounds import bound_faults
+from exfit.case.checks.model import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import BREAKER, REFERENCES, PlantKind

@@ -1,13 +1,12 @@
-"""What contradicts itself in a record and its channels."""
+"""What contradicts itself in a record: its file, its channels, what of it drives the simulation."""
 
 from collections.abc import Collection, Iterator, Sequence
 
 from exfit.case.checks.bump_test import instants_of
 from exfit.case.checks.node import ContentNode
-from exfit.case.checks.phasors import phasors_faults
 from exfit.case.yaml import Fault
-from exfit.plants import LIMITER_KINDS, PlantKind
-from exfit.records.units import base_of_own, needs_base
+from exfit.plants import LIMITER_KINDS, REFERENCES, PlantKind
+from exfit.records.units import alike, base_of_own, needs_base, quantity_of
 from exfit.signals import OF_EVENT, SIGNALS
 from exfit.util.file_names import taken_names
 from exfit.util.text import show
@@ -227,3 +226,148 @@ def name_faults(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
         if name.text is not None and name.text.casefold().partition(".")[0] in PREFIXES_OF_PARTS:
             text = f"{name.text!r} is taken: names of a part of the plant begin with it"
             yield name.fault(text)
+
+
+COLUMNS_OF_A_PHASOR = (1, 3)
+PER_UNIT = "pu"
+
+
+def phasors_faults(record: ContentNode) -> Iterator[Fault]:
+    """Yield what contradicts itself in the phasors of a record, or is missing there."""
+    phasors = record.at("phasors")
+    if "phasors" in record:
+        for quantity in ("voltage", "current"):
+            if quantity in phasors:
+                yield from _phasor_faults(phasors.at(quantity), quantity)
+        yield from _rating_faults(phasors)
+    yield from _column_faults(record)
+
+
+def _phasor_faults(phasor: ContentNode, quantity: str) -> Iterator[Fault]:
+    counts = [_count(phasor.at(key)) for key in ("magnitude", "angle")]
+    if None in counts:
+        return
+    if counts[0] != counts[1]:
+        text = f"has {counts[1]} columns, magnitude has {counts[0]}"
+        yield phasor.at("angle").fault(text)
+    elif counts[0] not in COLUMNS_OF_A_PHASOR:
+        yield phasor.at("magnitude").fault("must be one column, or those of the three phases")
+    unit = phasor.at("unit").text
+    if unit is None or alike(unit, PER_UNIT):
+        return
+    if quantity_of(unit) != quantity:
+        yield phasor.at("unit").fault(f"{unit!r} is not a unit of {quantity}")
+    elif quantity == "voltage" and "connection" not in phasor:
+        text = (
+            "is missing: phase-to-ground or phase-to-phase, which differ by sqrt(3); PMUs mostly "
+            "send phase-to-ground"
+        )
+        yield phasor.at("connection").fault(text)
+
+
+def _rating_faults(phasors: ContentNode) -> Iterator[Fault]:
+    """Yield the ratings that are missing."""
+    voltage, current = (phasors.at(key, "unit").text for key in ("voltage", "current"))
+    scaled = [unit for unit in (voltage, current) if unit and not alike(unit, PER_UNIT)]
+    if scaled and "kV" not in phasors:
+        yield phasors.at("kV").fault("is missing: the rated voltage of the unit, line to line")
+    if current and not alike(current, PER_UNIT) and "MVA" not in phasors:
+        yield phasors.at("MVA").fault("is missing: the rated power of the unit")
+
+
+def _column_faults(record: ContentNode) -> Iterator[Fault]:
+    """Yield the channels of computed columns that the phasors do not give."""
+    from exfit.records.phasors import OF_POWER, PREFIX, SIGNALS_OF_PHASORS
+
+    for _, channel in record.at("channels").sections:
+        name = channel.text if channel.text is not None else channel.at("column").text
+        if name is None or not name.startswith(PREFIX):
+            continue
+        place = channel if channel.text is not None else channel.at("column")
+        signal = name.removeprefix(PREFIX)
+        if "phasors" not in record:
+            yield place.fault(f"{name}: record.phasors is missing, of which it is computed")
+        elif signal not in SIGNALS_OF_PHASORS:
+            names = ", ".join(PREFIX + signal for signal in SIGNALS_OF_PHASORS)
+            yield place.fault(f"{name} is not computed of phasors, only {names}")
+        elif signal in OF_POWER and "current" not in record.at("phasors"):
+            yield place.fault(f"{name} needs record.phasors.current, which is missing")
+
+
+def _count(columns: ContentNode) -> int | None:
+    if columns.text is not None:
+        return 1
+    return len(columns.entries) or None
+
+
+RECORDED = "recorded"  # in place of steps: the channel of the record
+
+
+def recorded_reference_faults(
+    test: ContentNode, record: ContentNode, kind: PlantKind, has_record: bool
+) -> Iterator[Fault]:
+    """Yield the faults of what a test takes from a channel of its record, or from a file."""
+    for signal in REFERENCES:
+        given, channel = test.at(signal), record.at("channels", signal)
+        if given.text == RECORDED:
+            yield from _recorded_faults(test, signal, channel, kind, has_record)
+            if "resample" in record:
+                text = f"not allowed with test.{signal}: {RECORDED}: its filter smears the jumps"
+                yield record.at("resample").fault(text)
+        elif channel.value is not None and signal in kind.recorded_inputs:
+            yield channel.fault(_not_used(signal, given))
+        elif channel.value is not None and given.value is not None and signal in kind.driving:
+            text = f"the record's channel {signal} gives the signal as well: leave one of them out"
+            yield given.fault(text)
+        if signal in kind.recorded_inputs:
+            yield from _driving_faults(channel)
+        if "file" in given:
+            if kind.plays_back:
+                text = f"not allowed with plant {kind.name}: give the record a channel {signal}"
+                yield given.fault(text)
+            yield from channel_faults(signal, given, kind.per_unit)
+
+
+def stabiliser_channel_faults(
+    channels: ContentNode, stabiliser: ContentNode, kind: PlantKind
+) -> Iterator[Fault]:
+    """Yield the recorded output of a stabiliser beside the stabiliser itself."""
+    if kind.plays_back and "vs" in channels and stabiliser.content:
+        text = "not allowed with a stabiliser, whose output it is: leave one of them out"
+        yield channels.at("vs").fault(text)
+
+
+def _not_used(signal: str, given: ContentNode) -> str:
+    """Return what to do about a channel that drives nothing."""
+    if given.value is None:
+        return f"drives nothing: give test.{signal}: {RECORDED}"
+    return (
+        f"test.{signal} gives the signal as well: give {RECORDED} there, or leave this channel out"
+    )
+
+
+def _recorded_faults(
+    test: ContentNode, signal: str, channel: ContentNode, kind: PlantKind, has_record: bool
+) -> Iterator[Fault]:
+    given = test.at(signal)
+    if kind.plays_back:
+        text = f"not allowed with plant {kind.name}: record.channels.{signal} drives it without"
+        yield given.fault(text)
+    elif not has_record:
+        yield given.fault(f"{RECORDED} needs a record")
+    elif channel.value is None:
+        yield channel.fault(f"is missing: test.{signal} is {RECORDED}")
+    if "begin" in test and not kind.plays_back:
+        text = f"not allowed with {signal}: {RECORDED}: the record shows it from its start only"
+        yield test.at("begin").fault(text)
+
+
+def _driving_faults(channel: ContentNode) -> Iterator[Fault]:
+    """Yield the keys of a channel that are of use only where it is compared."""
+    for key in ("weight", "noise", "outliers", "averaged"):
+        if key in channel:
+            text = "has no effect: the signal drives the simulation and is not compared"
+            yield channel.at(key).fault(text)
+    for key in ("scale", "offset"):
+        if channel.at(key).is_section:
+            yield channel.at(key).fault("must be a number: the signal drives the simulation")

@@ -4,14 +4,8 @@ The descriptions reach editors through the JSON Schema, and the documentation of
 """
 
 from exfit.case.schema.columns import Filter, MedianSection, Time, TimeColumn
-from exfit.case.schema.document import CaseDocument
+from exfit.case.schema.document import AsFoundSection, CaseDocument, CriteriaSection, ReportRequest
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
-from exfit.case.schema.phasors import (
-    CurrentPhasor,
-    PhasorsSection,
-    StatusSection,
-    VoltagePhasor,
-)
 from exfit.case.schema.plants import (
     ExternalPlant,
     FmuPlant,
@@ -26,12 +20,15 @@ from exfit.case.schema.plants import (
 from exfit.case.schema.records import (
     SINGLE,
     ChannelSection,
+    CurrentPhasor,
     PhasesSection,
+    PhasorsSection,
     RecordFile,
     Recording,
     SineSection,
+    StatusSection,
+    VoltagePhasor,
 )
-from exfit.case.schema.report import AsFoundSection, CriteriaSection, ReportRequest
 from exfit.case.schema.tests import (
     MOST_ROWS,
     AngleStep,

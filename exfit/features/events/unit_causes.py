@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from exfit.case.case import Case
-from exfit.case.other_equipment import (
+from exfit.features.events.other_equipment import (
     with_governor,
     with_plant_keys,
     with_stabiliser,

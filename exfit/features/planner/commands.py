@@ -10,7 +10,7 @@ from exfit.cli.records import bases_option, sheet_option, steps_option, time_opt
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
 from exfit.features.planner.files_of_many import OfRecords, export_every_unit, import_every_unit
-from exfit.features.planner.play_in_command import export_play_in
+from exfit.features.planner.play_in import export_play_in
 
 MOST_BUSES = 999_999
 BUSES = click.IntRange(1, MOST_BUSES)

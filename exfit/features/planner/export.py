@@ -10,7 +10,7 @@ from exfit import __version__
 from exfit.case.peek import limiter_places, section_of, stabiliser_inputs, unused_values
 from exfit.errors import ExfitError, FileError
 from exfit.features.planner.file_format import MOST_BUSES, WIDTH, FileFormat, is_machine_id
-from exfit.features.planner.psse.files import PSSE_FILES
+from exfit.features.planner.psse import PSSE_FILES
 from exfit.features.planner.records import (
     PSSE,
     RATING,

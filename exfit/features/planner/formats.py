@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from exfit.features.planner.file_format import FileFormat
-from exfit.features.planner.pslf.files import PSLF_FILES
-from exfit.features.planner.psse.files import PSSE_FILES
+from exfit.features.planner.pslf import PSLF_FILES
+from exfit.features.planner.psse import PSSE_FILES
 
 FORMATS = {files.suffix.removeprefix("."): files for files in (PSSE_FILES, PSLF_FILES)}
 

@@ -16,7 +16,7 @@ from exfit.features.planner.unit import Unit
 from exfit.features.planner.units import DynamicsUnits, RefusedUnit, read_units
 from exfit.features.start.made_case import MadeCase, case_of_plan, case_of_records
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
-from exfit.features.start.table_of_cases import CaseOfTable, case_name_of, read_case_table
+from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
 
 WRITTEN, RECORDED, REFUSED, NO_MODEL = "written", "written with records", "refused", "no model"
 

@@ -15,7 +15,7 @@ from exfit.features.planner.units import DynamicsUnits, RefusedUnit, read_units
 from exfit.features.start.made_case import case_of_plan
 from exfit.features.start.record_files import UnitKey, unit_named
 from exfit.features.start.starting_unit import UnitData, unit_with
-from exfit.features.start.table_of_cases import CaseOfTable, read_case_table
+from exfit.features.start.tables import CaseOfTable, read_case_table
 from exfit.util.files import write
 from exfit.util.text import dotted
 

@@ -174,7 +174,7 @@ def _tests(
 ) -> "tuple[StartingTest, ...]":
     """Return the tests of a record, or those that a table names."""
     from exfit.features.start.starting_tests import starting_tests
-    from exfit.features.start.table_of_tests import read_test_table, tests_of_table
+    from exfit.features.start.tables import read_test_table, tests_of_table
 
     if table is None:
         if file is None:

@@ -16,8 +16,7 @@ from exfit.features.start.starting_tests import (
     starting_tests,
 )
 from exfit.features.start.starting_unit import UnitData
-from exfit.features.start.table_of_cases import CaseOfTable
-from exfit.features.start.table_of_tests import TableRow, tests_of_table
+from exfit.features.start.tables import CaseOfTable, TableRow, tests_of_table
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import tests_of
 

@@ -20,7 +20,7 @@ from exfit.features.planner.export import export
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.fitted_file import FittedUnit, fitted_file, number_text
 from exfit.features.planner.import_case import imported_case
-from exfit.features.planner.psse.files import record_text
+from exfit.features.planner.psse import record_text
 from exfit.features.planner.records import (
     PSLF,
     PSSE,

@@ -2,8 +2,8 @@
 
 import pytest
 
-from exfit.features.planner.pslf.files import heads
-from exfit.features.planner.psse.free_format import sound_records
+from exfit.features.planner.pslf import heads
+from exfit.features.planner.psse import sound_records
 from exfit.features.planner.records import (
     PSLF,
     PSSE,

@@ -17,8 +17,7 @@ from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.import_case import import_unit, imported_case
-from exfit.features.planner.psse.files import record_text
-from exfit.features.planner.psse.free_format import sound_records
+from exfit.features.planner.psse import record_text, sound_records
 from exfit.features.planner.records import (
     SIGNALS,
     Definition,

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from exfit.errors import ExfitError
-from exfit.features.start.table_of_cases import case_name_of, read_case_table
+from exfit.features.start.tables import case_name_of, read_case_table
 
 
 def planned(folder, text, dyr=None, name="table.csv"):

@@ -5,7 +5,7 @@ import pytest
 from tiers import few_of
 
 from exfit.errors import RecordError
-from exfit.features.planner.play_in_file import play_in_record, play_in_text
+from exfit.features.planner.play_in import play_in_record, play_in_text
 from exfit.records.formats import open_table
 
 TIME = np.arange(0.0, 2.0, 1.0 / 60.0)

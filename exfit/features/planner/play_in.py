@@ -1,0 +1,98 @@
+"""Play-in files of PSS/E (.plb): what drove the fit of a grid event, and its model PLBVFU1."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.cli.options import refuse_existing
+from exfit.cli.streams import echo
+from exfit.errors import CaseError, ExfitError
+from exfit.fitting.build import build_experiment
+from exfit.fitting.setup import ExperimentSetup
+from exfit.simulation.inputs import SplinedInput
+
+DIGITS = 9  # significant, of every number
+
+
+def play_in_text(rows: Iterable[tuple[float, float, float]]) -> str:
+    """Return rows of time (s), voltage (pu) and frequency (Hz) as a play-in file."""
+    return "".join(", ".join(f"{value:.{DIGITS}g}" for value in row) + "\n" for row in rows)
+
+
+def play_in_record(bus: int, machine_id: str, name: str, f0: float) -> str:
+    """Return the dynamics record that plays a file ``name``.plb at a bus, with ``f0`` in Hz.
+
+    Its values are two flags, of voltage and frequency, the file, what both are divided by, and two
+    lags, s.
+    """
+    head = f"{bus} 'USRMDL' {machine_id} 'PLBVFU1' 1 1 3 4 3 6"
+    return f"{head} 1 1 '{name}' 1.0 {f0:g} 0.0 0.0 /"
+
+
+Array = NDArray[np.float64]
+
+TURN = 2.0 * np.pi
+
+
+class PlayIn(NamedTuple):
+    """What drives a unit in a grid event: voltage (M,), pu, and frequency (M,), Hz, at times, s.
+
+    ``f0`` is the rated frequency.
+    """
+
+    time: Array
+    vt: Array
+    frequency: Array
+    f0: float
+
+
+def played_in(case: Case) -> dict[str, PlayIn]:
+    """Return what the record of each grid event of a case plays into the unit, by its name.
+
+    Raises CaseError for a case of another plant, ExfitError for a record that cannot be used.
+    """
+    if not case.kind.finds_rest:
+        raise CaseError([f"{case.path}: plant {case.kind.name} is not driven by a grid event"])
+    f0 = case.plant.given["f0"]
+    setups = (build_experiment(case, own, case.values()) for own in case.recordings)
+    return {setup.name: play_in_of(setup, f0) for setup in setups}
+
+
+def play_in_of(setup: ExperimentSetup, f0: float) -> PlayIn:
+    """Return what of a record of an event drives a unit: the rest before it is at ``f0``, Hz."""
+    time, angle = setup.record.time, setup.experiment.simulator.inputs.recorded["angle"]
+    assert isinstance(angle, SplinedInput)
+    turning = angle.slope(time) / TURN
+    return PlayIn(time - time[0], setup.record.signals["vt"], f0 + turning, f0)
+
+
+BUS, MACHINE_ID = 1, "1"  # of the generator that plays, which no case has
+
+
+def export_play_in(source: Path, output: Path, force: bool) -> None:
+    """Write what the records of a fit of grid events played into the unit, a file for each."""
+    from exfit.features.planner.play_in import play_in_record, play_in_text, played_in
+    from exfit.results.io import load_result, result_file
+    from exfit.util.files import write
+    from exfit.workflows import load_case
+
+    if output.suffix.lower() != ".plb":
+        raise ExfitError(f"{output}: a play-in file is called NAME.plb")
+    records = played_in(load_case(load_result(result_file(source)).case))
+    files = {
+        name: output if len(records) == 1 else output.with_stem(f"{output.stem}-{name}")
+        for name in records
+    }
+    for file in files.values():
+        refuse_existing(file, force)
+    for name, file in files.items():
+        own = records[name]
+        rows = zip(own.time.tolist(), own.vt.tolist(), own.frequency.tolist(), strict=True)
+        write(file, play_in_text(rows))
+        record = play_in_record(BUS, MACHINE_ID, file.stem, own.f0)
+        echo(f"written to {file}; voltage in pu, frequency in Hz")
+        echo(f"record of PSS/E, as public files have it, at a bus of your own: {record}")

@@ -1,1 +1,0 @@
-"""PSLF dynamics files (.dyd): their lines."""

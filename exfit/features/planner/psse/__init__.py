@@ -1,1 +1,0 @@
-"""PSS/E dynamics files (.dyr): their free format."""
