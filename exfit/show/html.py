@@ -75,9 +75,10 @@ def _table(table: Table) -> str:
         else "<td></td>"
         for column in table.columns
     )
+    title = table.title[:1].upper() + table.title[1:]
     lines = [
         f"<table{_class(many, few)}>",
-        *([f"<caption>{_text(table.title)}</caption>"] if table.title else []),
+        *([f"<caption>{_text(title)}</caption>"] if title else []),
         f"<thead><tr>{''.join(heads)}</tr></thead>",
         "<tbody>",
         *(_row(table, cells) for cells in table.rows),
@@ -92,12 +93,14 @@ def _heading(column: TableColumn) -> str:
 
 def _row(table: Table, cells: tuple[Cell, ...]) -> str:
     """Write a row; one that begins with a doubt is shaded."""
+    whole = all(cell.mark == "doubt" for cell in cells)
     shown = []
     for k, (column, cell) in enumerate(zip(table.columns, cells, strict=True)):
         if k < table.leading:
-            shown.append(f'<th scope="row">{_lines(cell.text)}</th>')
+            style = _class("n" if column.number else "")
+            shown.append(f'<th scope="row"{style}>{_lines(cell.text)}</th>')
             continue
-        doubt = cell.mark == "doubt"
+        doubt = cell.mark == "doubt" and not whole
         long = any(len(word) > LONG_WORD for word in cell.text.split())
         number = "why" if doubt else "n" if column.number else ""
         text = "text" if column.folds else ""

@@ -3,7 +3,7 @@
 from pages import Page
 from payloads import MARKUP, Structure
 
-from exfit.show.blocks import Cell, Facts, Heading, Note, Table, Verbatim, columns
+from exfit.show.blocks import Cell, Facts, Heading, Note, Table, Verbatim, columns, row
 from exfit.show.html import html
 
 
@@ -38,8 +38,14 @@ def test_warnings_that_follow_each_other_are_one_list():
 
 
 def test_a_row_that_begins_with_a_doubt_is_shaded_and_lines_below_the_first_are_small():
-    table = Table(columns("a", "b"), ((Cell("x\nmeaning", "doubt"), Cell("why", "doubt")),), "t")
-    page = Page(html([table]))
+    cells = (Cell("x\nmeaning", "doubt"), Cell("1"), Cell("why", "doubt"))
+    page = Page(html([Table(columns("a", "b", "c"), (cells,), "t")]))
     assert ("tr", {"class": "vague"}) in page.tags
     assert ("td", {"class": "why"}) in page.tags
-    assert page.tables["t"] == [["a", "b"], ["x meaning", "why"]]
+    assert page.tables["T"] == [["a", "b", "c"], ["x meaning", "1", "why"]]
+    whole = Page(html([Table(columns("a", "b"), (row("x", "y", mark="doubt"),), "t")]))
+    assert [attrs for tag, attrs in whole.tags if tag in ("tr", "td")] == [
+        {},
+        {"class": "vague"},
+        {},
+    ]

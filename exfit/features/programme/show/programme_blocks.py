@@ -35,7 +35,7 @@ def programme(result: ProgrammeResult) -> Iterator[Block]:
     if result.fit is not None:
         yield from fits.whole(result.fit)
     if result.values:
-        yield _values(result.values)
+        yield values_table(result.values)
     for test in result.tests:
         if not test.holds and isinstance(test.result, FitResult):
             yield from remarks(f"{test.name}: {test.verdict}:", [test.reason], "bad")
@@ -70,7 +70,7 @@ def _at_rest(test: FinishedTest) -> Iterator[Block]:
         yield from v_curve(test.result)
 
 
-def _values(values: Sequence[EnteredValue]) -> Table:
+def values_table(values: Sequence[EnteredValue]) -> Table:
     """Make the table of values that tests gave, each beside the one of the file."""
     rows = []
     for value in values:
@@ -87,6 +87,7 @@ def _values(values: Sequence[EnteredValue]) -> Table:
                 value.source,
                 value.test,
                 given,
+                mark="doubt" if value.excluded else "",
             )
         )
     heads = (
@@ -103,17 +104,21 @@ def _values(values: Sequence[EnteredValue]) -> Table:
 def saturation(result: SaturationResult) -> Iterator[Block]:
     """Yield the numbers of the curve that is used, those of each form, and what limits them."""
     no_interval = result.verdict.in_place_of_interval
-    quantities = (
+    quantities = [*_quantities(result)]
+    rows = [
         row(
             name,
             value.rounded(value.value),
             no_interval or interval(value.interval, value.rounded),
             unit,
         )
-        for name, value, unit in _quantities(result)
-    )
+        for name, value, unit in quantities
+    ]
     heads = ("value", "95 %")
-    yield Table(columns("", *heads, "unit", numbers=heads), tuple(quantities))
+    title = f"saturation curve, form {result.form}"
+    yield Table(columns("", *heads, "unit", numbers=heads), tuple(rows), title)
+    if not no_interval:
+        yield from remarks("-", (f"{n}: {value.why}" for n, value, _ in quantities if value.why))
     rows = []
     for curve in result.curves:
         values = (curve.ifd_base, curve.S10, curve.S12)
@@ -121,7 +126,7 @@ def saturation(result: SaturationResult) -> Iterator[Block]:
         words = ["used"] * (curve.form == result.form) + ["refuted"] * curve.refuted
         rows.append(row(curve.form, *cells, f"{curve.rms:.2g}", ", ".join(words)))
     forms = (f"base ({result.unit})", "S(1.0)", "S(1.2)", "rms (pu)")
-    yield Table(columns("form", *forms, "", numbers=forms), tuple(rows))
+    yield Table(columns("form", *forms, "", numbers=forms), tuple(rows), "forms of the curve")
     yield from notes(result.notes)
 
 
@@ -135,6 +140,7 @@ def _quantities(result: SaturationResult) -> Iterator[tuple[str, MeasuredValue, 
         yield "resistance of the field", result.resistance, f"{result.efd_unit}/{result.unit}"
     yield "S(1.0)", curve.S10, "pu"
     yield "S(1.2)", curve.S12, "pu"
+    yield "field current beside a line through zero", curve.offset, "pu"
     if curve.hysteresis is not None:
         yield "hysteresis, rising less falling", curve.hysteresis, "pu"
     if result.residual is not None:
@@ -144,6 +150,12 @@ def _quantities(result: SaturationResult) -> Iterator[tuple[str, MeasuredValue, 
 def v_curve(result: VCurve) -> Iterator[Block]:
     """Yield the verdict, each point with its field by record and model, and what was fitted."""
     yield paragraph(f"verdict: {result.verdict.sentence}")
+    for signal, reading in result.readings.items():
+        fitted = ", fitted" if reading.base_fitted else ""
+        yield paragraph(
+            f"{signal}: residuals {reading.rms:.2g} pu rms, limit {reading.limit:.2g} pu; 1 pu is "
+            f"{reading.base:.5g} {reading.unit}{fitted}"
+        )
     yield points_table(result)
     if result.parameters:
         yield parameters_table(result)
@@ -170,7 +182,8 @@ def points_table(result: VCurve) -> Table:
             cells.append(f"{100.0 * reading.residuals[k] / reading.measured[k]:+.2f} %")
         worst = any(reading.worst == k for reading in result.readings.values())
         rows.append(row(str(k + 1), *cells, "largest" if worst else ""))
-    return Table(columns(*heads, "", numbers=heads), tuple(rows))
+    title = f"points on load, {result.machine}"
+    return Table(columns(*heads, "", numbers=heads), tuple(rows), title)
 
 
 def parameters_table(result: VCurve) -> Table:
@@ -185,6 +198,7 @@ def parameters_table(result: VCurve) -> Table:
             parameter.rounded(parameter.value),
             no_interval or interval(parameter.interval, parameter.rounded),
             parameter.unit,
+            parameter.meaning,
             *([marks[name]] if remark else []),
             mark="" if parameter.determined and parameter.physical else "doubt",
         )
@@ -192,4 +206,6 @@ def parameters_table(result: VCurve) -> Table:
     ]
     heads = ("start", "fitted", "95 % interval")
     last = [""] if remark else []
-    return Table(columns("parameter", *heads, "unit", *last, numbers=heads), tuple(rows))
+    meaning = TableColumn("meaning", folds=True, expendable=1)
+    heading = (*columns("parameter", *heads, "unit", numbers=heads), meaning, *columns(*last))
+    return Table(heading, tuple(rows), "fitted to the points on load")

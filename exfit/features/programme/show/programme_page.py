@@ -1,12 +1,13 @@
 """The report of a programme: the form, the tests of its machine, the fit of its bump tests."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
-from exfit.features.programme.show.at_rest_page import saturation_view, v_curve_view
+from exfit.features.programme.result import FinishedTest, ProgrammeResult
+from exfit.features.programme.show.at_rest_page import saturation_chart, v_curve_chart
+from exfit.features.programme.show.programme_blocks import saturation, v_curve, values_table
 from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.features.report.page import Page, fit_page
@@ -19,23 +20,14 @@ from exfit.features.report.sections.signatures import signatures
 from exfit.features.report.sections.unit_and_test import unit_without_bumps
 from exfit.features.report.verdict import Headline
 from exfit.results.model import FitResult
+from exfit.show.blocks import Block, Cell, Table, TableColumn, columns, remarks, row
 
 Sections = Iterator[tuple[ReportSection, Any]]
 
 
-@dataclass(frozen=True)
-class ProgrammeView:
-    """The tests of a programme with what each came to, and the values that they gave."""
-
-    tests: tuple[FinishedTest, ...]
-    failed: tuple[tuple[str, str], ...]
-    values: tuple[EnteredValue, ...]
-    warnings: tuple[str, ...]
-
-
 def programme_page(result: ProgrammeResult, folder: Path) -> Page:
     """Build the page of a programme."""
-    sections = [_overview(result)]
+    sections = [_section("programme", "Test programme", tuple(_overview(result)), "blocks")]
     for number, test in enumerate(result.tests, 1):
         if test.result is not result.fit:
             sections += _of_test(test, f"test-{number}")
@@ -57,20 +49,38 @@ def _headline(result: ProgrammeResult) -> Headline:
     return Headline(f"{word}.", f"{words}.", result.holds, ())
 
 
-def _overview(result: ProgrammeResult) -> tuple[ReportSection, Any]:
-    view = ProgrammeView(result.tests, tuple(result.failed.items()), result.values, result.warnings)
-    return ReportSection("programme", "Test programme", lambda _: view, "programme"), view
+def _overview(result: ProgrammeResult) -> Iterator[Block]:
+    """Yield what each test came to, and the values that tests gave to those after them."""
+    rows: list[tuple[Cell, ...]] = [
+        row(
+            "\n".join([test.name, *([", ".join(test.tests)] if len(test.tests) > 1 else [])]),
+            test.kind,
+            test.verdict,
+            test.reason,
+            mark="" if test.holds else "doubt",
+        )
+        for test in result.tests
+    ]
+    rows += [row(name, "", "failed", why, mark="doubt") for name, why in result.failed.items()]
+    heads = (*columns("test", "kind", "verdict"), TableColumn("why", folds=True))
+    yield Table(heads, tuple(rows), "Tests in the order in which one feeds the next")
+    if result.values:
+        yield values_table(result.values)
+    yield from remarks("", result.warnings, "", "warning")
 
 
 def _of_test(test: FinishedTest, key: str) -> Sections:
     """Yield the sections of a test that is not among the bump tests."""
     result = test.result
     if isinstance(result, SaturationResult):
-        heading = f"Saturation test {test.name}"
-        yield _section(key, heading, saturation_view(result, key), "saturation_test")
+        blocks = (*saturation(result), saturation_chart(result, key))
+        yield _section(key, f"Saturation test {test.name}", blocks, "blocks")
     elif isinstance(result, VCurve):
-        heading = f"Points on load {test.name}"
-        yield _section(key, heading, v_curve_view(result, key), "v_curve_test")
+        charts = (
+            v_curve_chart(result, reading, f"{key}-{signal}")
+            for signal, reading in result.readings.items()
+        )
+        yield _section(key, f"Points on load {test.name}", (*v_curve(result), *charts), "blocks")
     else:
         yield from _of_machine_fit(test.name, result, key)
 
