@@ -1,14 +1,22 @@
 """The global search: the descent from the start of a case, then others from further starts."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import nan
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
+from exfit.estimate import (
+    Descent,
+    LocalMinimum,
+    MultistartResult,
+    Result,
+    SolverIteration,
+    Stop,
+    spread,
+)
 from exfit.fitting.descents import (
     Announce,
     Descents,
@@ -24,12 +32,76 @@ from exfit.fitting.descents import (
     stopped,
     taken_for_validation,
 )
-from exfit.util.strategies import FROM_FURTHER_STARTS
-
-if TYPE_CHECKING:
-    from exfit.fitting.further_starts import Way
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.residuals import SideBySide, SimulationCounter
+from exfit.util.strategies import DEFAULT_STRATEGY, FROM_FURTHER_STARTS
 
 Array = NDArray[np.float64]
+Way = Literal["strategy", "linear", "direct"]
+
+DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
+MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did
+MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
+TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
+
+
+@dataclass(frozen=True)
+class FurtherStarts:
+    """The points (S, N) from which a search goes, and the legs that the descents from them take.
+
+    ``ways`` says what each descent begins with: "linear" the linear phase, "direct" the model
+    itself. ``why_direct`` is the reason where the linear phase has no meaning.
+    """
+
+    points: Array
+    legs: tuple[Descent, ...]
+    ways: tuple[Way, ...]
+    why_direct: str
+
+    @property
+    def merged(self) -> float | None:
+        """Within how many standard errors the ends of linear phases go on as one."""
+        return None if self.why_direct else MERGED
+
+    @property
+    def first_legs(self) -> tuple[int, ...]:
+        """The leg that each descent begins with."""
+        linear = not self.why_direct
+        return tuple(int(linear and way == "direct") for way in self.ways)
+
+
+def further_starts(
+    problem: FitProblem, count: int, counter: SimulationCounter | None
+) -> FurtherStarts:
+    """Return ``count`` starts: that of the case by way of the linear phase, others over the bounds.
+
+    ``counter`` counts the simulations of their descents.
+    """
+    from exfit.fitting.forms.legs import legs_of  # which a local search does not need
+
+    residuals = problem.residuals.counted_by(counter)
+    legs = legs_of(residuals, last_leg(problem, counter))
+    direct: tuple[Way, ...] = ("direct",)
+    if legs.no_linear_phase:
+        points = spread(residuals.bounds, count)
+        return FurtherStarts(points, legs.direct, direct * count, legs.no_linear_phase)
+    by_linear: tuple[Way, ...] = ("linear",)
+    ways = (by_linear * (DIRECT - 1) + direct) * count
+    points = spread(residuals.bounds, count, residuals.start)
+    return FurtherStarts(points, legs.linear, ways[:count], "")
+
+
+def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> Descent:
+    """Return the descent of a further start on the case's own grid."""
+    return Descent(
+        functions=SideBySide(problem.compressed.counted_by(counter)),
+        bounds=problem.residuals.bounds,
+        method=DEFAULT_STRATEGY,
+        max_iterations=MOST_ITERATIONS,
+        ftol=TO_DISTINGUISH,
+        x_scale=problem.residuals.units,
+    )
+
 
 PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
 AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
@@ -51,7 +123,7 @@ class SearchResult(NamedTuple):
     history: tuple[SolverIteration, ...]
     own: Result
     place: int | None = None
-    ways: "tuple[Way, ...]" = ()
+    ways: tuple[Way, ...] = ()
     notes: tuple[str, ...] = ()
     for_validation: bool = False
 
@@ -74,7 +146,7 @@ class FurtherDescents(NamedTuple):
     """
 
     minima: MultistartResult
-    ways: "tuple[Way, ...]"
+    ways: tuple[Way, ...]
     why_direct: str
 
 
@@ -258,7 +330,7 @@ def after_search(
     return replace(line, phase=phase, step_norm=0.0, damping=nan, inner=0, capped=None)
 
 
-def ways_of(further: FurtherDescents, descents: Descents) -> "tuple[Way, ...]":
+def ways_of(further: FurtherDescents, descents: Descents) -> tuple[Way, ...]:
     """List the beginnings of all descents, those from the start of the case first."""
     own: tuple[Way, ...] = ("strategy",)
     return own * len(descents.ends) + further.ways
@@ -267,7 +339,7 @@ def ways_of(further: FurtherDescents, descents: Descents) -> "tuple[Way, ...]":
 def interrupted(
     descents: Descents,
     minima: MultistartResult,
-    ways: "tuple[Way, ...]",
+    ways: tuple[Way, ...],
     best: Result,
     announce: Announce,
 ) -> SearchResult:

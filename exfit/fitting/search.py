@@ -19,6 +19,7 @@ from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
     continued,
+    further_starts,
     global_search,
     judged_again,
     local_search,
@@ -228,8 +229,6 @@ class CaseSearches:
 
     def further(self, earlier: Sequence[estimate.Result]) -> FurtherDescents:
         """Return the minima from further starts and of earlier descents."""
-        from exfit.fitting.further_starts import further_starts
-
         counter = SimulationCounter()  # the sub-steps are those of a coarse grid
         starts = further_starts(self.problem, self.options.starts, counter)
         minima = estimate.multistart(

@@ -1,6 +1,6 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
-from exfit.fitting.experiment import Experiment
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
@@ -82,10 +81,11 @@ def check(case: Case, program: Program | None = None) -> Check:
         signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))
         error = max(error, simulator.step_error(at, signals))
+    residuals = Residuals(experiments, free, fixed, case.ties)
     first = experiments[0].simulator
     at = experiments[0].parameters(values)
     return Check(
-        deviations=_deviations(case, Residuals(experiments, free, fixed, case.ties)),
+        deviations={} if case.has_no_equations else deviations(residuals),
         bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
         substeps=max(
             experiment.simulator.substeps(experiment.parameters(values))
@@ -100,16 +100,18 @@ def check(case: Case, program: Program | None = None) -> Check:
             *search_range_notes(case),
             *(() if program is None else program.own_value_notes()),
             *(note for setup in setups for note in setup.record.notes),
-            *dict.fromkeys(_rest_notes(experiments, values)),
+            *dict.fromkeys(
+                note
+                for experiment in experiments
+                for note in unstable_rest_notes(
+                    experiment.with_inputs(values), experiment.parameters(values)
+                )
+            ),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
         has_equations=not case.has_no_equations,
         from_program={} if program is None else program.deviations(setups, values),
     )
-
-
-def _deviations(case: Case, residuals: Residuals) -> dict[str, tuple[float, ...]]:
-    return {} if case.has_no_equations else deviations(residuals)
 
 
 def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
@@ -123,12 +125,6 @@ def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
         if not warnings:
             raise
         raise ExfitError("\n".join([*warnings, str(fault)])) from fault
-
-
-def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[str]:
-    for experiment in experiments:
-        simulator = experiment.with_inputs(values)
-        yield from unstable_rest_notes(simulator, experiment.parameters(values))
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

@@ -87,7 +87,11 @@ def as_found_of(
         comparisons = _comparisons(case, before, values, tests, program)
     except (CaseError, SimulationError) as fault:
         return replace(unit, why=str(fault))
-    kept = comparisons if unit.is_stated else [_without_samples(match) for match in comparisons]
+    kept = (
+        comparisons
+        if unit.is_stated
+        else [replace(match, time=np.zeros(0), overlays={}) for match in comparisons]
+    )
     return replace(unit, comparisons=tuple(kept))
 
 
@@ -140,7 +144,3 @@ def _comparisons(
             program.run(own, at)
         comparisons.append(compare_with_record(own.with_enough_substeps(at), setup.name, at))
     return comparisons
-
-
-def _without_samples(match: Comparison) -> Comparison:
-    return replace(match, time=np.zeros(0), overlays={})

@@ -107,59 +107,36 @@ def validate(
     steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
     or where there is nothing to validate on.
     """
-    given = GivenSteps(_numbers(step), _numbers(at))
+    given = GivenSteps(
+        *(tuple(each) if isinstance(each, Sequence) else (each,) for each in (step, at))
+    )
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
-    compared = _compared(*_with_values(case, values), record, given, program)
-    setups = [test.setup for test in compared.tests]
-    return compared._replace(other_program=other_program_of(case, program, setups))
-
-
-def _compared(
-    case: Case,
-    own: Values,
-    saw: tuple[Recording, ...],
-    record: Record | Path | str | None,
-    given: GivenSteps,
-    program: Program | None,
-) -> Validation:
-    """Return the comparisons, by a program where one is given; a fit ``saw`` some records."""
-    fitted = tuple(_fitted(case, recording, own, program) for recording in saw)
-    matches = [test.comparison for test in fitted]
+    saw: tuple[Recording, ...] = ()
+    if values is None:
+        case, own = model_as_found(case)
+    else:
+        own = values_of(case, changes_of(case, values))
+        saw = case.recordings if case.free() else ()
+    tests = [_fitted(case, recording, own, program) for recording in saw]
+    matches = [test.comparison for test in tests]
     if record is not None:
         case, test = _validated_by_hand(case, matches, own, record, given, program)
-        by_hand = (test.recording,)
-        case = replace(case, validations=by_hand) if saw else _with_records(case, by_hand)
-        return Validation(case, own, (*fitted, test))
-    recordings = (*(() if saw else case.recordings), *case.validations)
-    if not recordings:
-        raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
-    unseen = [
-        (each, by_program(program, build_experiment(case, each, own), own)) for each in recordings
-    ]
-    validated = (_validated(case, matches, *pair, own) for pair in unseen)
-    return Validation(case, own, (*fitted, *validated))
-
-
-def _with_values(
-    case: Case, values: "ValuesOrResult | None"
-) -> tuple[Case, Values, tuple[Recording, ...]]:
-    """Return the case whose model the values are of, all values, and what a fit saw of its records.
-
-    Without values it is the model as found.
-    """
-    if values is None:
-        return (*model_as_found(case), ())
-    saw = case.recordings if case.free() else ()
-    return case, values_of(case, changes_of(case, values)), saw
-
-
-def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
-    return tuple(given) if isinstance(given, Sequence) else (given,)
-
-
-def _with_records(case: Case, recordings: tuple[Recording, ...]) -> Case:
-    return replace(case, record=None, records=recordings, validations=())
+        case = replace(case, validations=(test.recording,))
+        if not saw:
+            case = replace(case, record=None, records=case.validations, validations=())
+        tests.append(test)
+    else:
+        recordings = (*(() if saw else case.recordings), *case.validations)
+        if not recordings:
+            raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
+        setups = [
+            by_program(program, build_experiment(case, each, own), own) for each in recordings
+        ]
+        pairs = zip(recordings, setups, strict=True)
+        tests += [_validated(case, matches, *pair, own) for pair in pairs]
+    described = other_program_of(case, program, [test.setup for test in tests])
+    return Validation(case, own, tuple(tests), described)
 
 
 def _fitted(
