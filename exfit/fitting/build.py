@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
-from exfit.engine.system import System
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, with_filter, without_masked
 from exfit.fitting.experiment import Channel, Experiment
@@ -46,13 +45,14 @@ Values = Mapping[str, float]
 
 
 def build_experiment(case: Case, recording: Recording, values: Values) -> ExperimentSetup:
-    """Return a test of a case with its record read; ``values`` are those it begins with.
+    """Read the record of a test of a case and build its experiment, which begins with ``values``.
 
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
     """
     view, file = case.seen_from(recording), recording.record
     system = system_of(view, recording)
-    driving = _driving_channels(view.kind, file, system)
+    driven = (*system.inputs, *view.kind.required_one_of)  # some in another form
+    driving = [signal for signal in file.channels if signal in driven]
     read = record_of(case, recording)
     whole = with_filter(with_even_clock(read) if view.kind.finds_rest else read, file.filter)
     switchings = switchings_of(view, whole)
@@ -100,24 +100,13 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         switchings=announced(file, switchings),
         whole=whole,
     )
-    return _with_given_starts(case, with_sines(case, recording, plain, values))
-
-
-def _driving_channels(kind: PlantKind, file: RecordFile, system: System) -> list[str]:
-    """Return the channels of a record that drive its simulation, some in another form."""
-    inputs = (*system.inputs, *kind.required_one_of)
-    return [signal for signal in file.channels if signal in inputs]
+    setup = with_sines(case, recording, plain, values)
+    return replace(setup, free=tuple(_with_given_start(case, each) for each in setup.free))
 
 
 def _played(kind: PlantKind, driving: Collection[str]) -> tuple[str, ...]:
     """Return the channels that drive a simulation in place of a plant, in the order of the kind."""
     return tuple(signal for signal in kind.driving if signal in driving and kind.plays_back)
-
-
-def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:
-    """Return a test with the starts that were given for what is found about its record."""
-    free = tuple(_with_given_start(case, parameter) for parameter in setup.free)
-    return replace(setup, free=free)
 
 
 def _with_given_start(case: Case, parameter: FreeParameter) -> FreeParameter:
@@ -160,26 +149,23 @@ def _driving(
 ) -> dict[str, RecordedInput | SplinedInput]:
     """Return the signals of a record that drive the simulation, but for recorded references.
 
-    One whose scale is found is without any: the system multiplies it.
+    One whose scale is found is divided by its start, by which it was read: the system multiplies.
     """
+
+    def start_of_scale(signal: str) -> float:
+        scale = getattr(file.channels[signal], "scale", 1.0)
+        start = start_value(scale) if isinstance(scale, Unknown) else None
+        return 1.0 if start is None else start
+
     event = event_inputs(test, record, switchings) if case.kind.finds_rest else {}
     if event:
         driving = [signal for signal in driving if signal in REFERENCES]
     elif not case.kind.plays_back:
         driving = [signal for signal in driving if signal not in REFERENCES]
     return {
-        signal: RecordedInput(
-            record.time, deviation(test, record, signal) / _start_of_scale(file, signal)
-        )
+        signal: RecordedInput(record.time, deviation(test, record, signal) / start_of_scale(signal))
         for signal in driving
     } | event
-
-
-def _start_of_scale(file: RecordFile, signal: str) -> float:
-    """Return the start of the scale of a channel where a fit finds it, by which it was read."""
-    scale = getattr(file.channels[signal], "scale", 1.0)
-    start = start_value(scale) if isinstance(scale, Unknown) else None
-    return 1.0 if start is None else start
 
 
 def _channels(

@@ -78,13 +78,17 @@ def with_steps_of_record(
     given_record, file = case.given_records.get(recording.name), recording.record
     record = given_record or read_section(file, case.folder, case.kind.per_unit)
     if case.kind.finds_rest:
-        return _event(case, recording, values, given)
+        if any(given):
+            text = f"step and at: not allowed with plant {case.kind.name}: the record drives it"
+            raise CaseError([f"{case.path}: {text}"])
+        test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))  # it has a rest, no steps
+        return SetupOfRecord(_built(case, recording, values, {**test, "vref": (), "vs": ()}))
     signal = _stepped(case, recording.test)
     inspection = None if given_record else _inspected(file, case.folder)
     if signal == "vref" and not any(given) and not case.kind.plays_back:
         recording = _with_own_reference(recording, inspection)
         if recording.test.vref == "recorded":
-            test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
+            test = dict.fromkeys(("vt0", "begin", "steady_until"))
             return SetupOfRecord(_built(case, recording, values, test), (OWN_REFERENCE,))
     steps = _lasting(record, _shown(record, inspection, given), given)
     if signal is None:
@@ -103,18 +107,6 @@ def with_steps_of_record(
         if _begins_there(setup, values, steps[0], sizes):
             return SetupOfRecord(setup, (EARLIER_STEPS,))
     return SetupOfRecord(setup_with(sizes, {}))
-
-
-def _event(case: Case, recording: Recording, values: Values, given: GivenSteps) -> SetupOfRecord:
-    """Return the setup of a grid event: it has its own rest, and no steps.
-
-    Raises CaseError where steps are given.
-    """
-    if any(given):
-        text = f"step and at: not allowed with plant {case.kind.name}: the record drives it"
-        raise CaseError([f"{case.path}: {text}"])
-    test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
-    return SetupOfRecord(_built(case, recording, values, {**test, "vref": (), "vs": ()}))
 
 
 def _stepped(case: Case, test: BumpTest) -> str | None:
@@ -165,7 +157,15 @@ def _shown(
 ) -> tuple[RecordedStep, ...]:
     """Return the steps at the instants given, or those that a file or else a record shows."""
     if given.instants:
-        _refuse_outside(record, given.instants)
+        first, last = float(record.time[0]), float(record.time[-1])
+        for at in given.instants:
+            if not first <= at < last:
+                span = f"{record.source}, {show(first)} ... {show(last)} s"
+                raise CaseError([f"at: {show(at)} s lies outside {span}"])
+        for before, at in pairwise(given.instants):
+            if at <= before:
+                text = f"{show(at)} s is not after {show(before)} s, the step before"
+                raise CaseError([f"at: {text}"])
         return tuple(RecordedStep(at, 0.0, (), {}, False) for at in given.instants)
     if inspection is not None:
         return inspection.steps
@@ -193,18 +193,6 @@ def _lasting(
     return lasting
 
 
-def _refuse_outside(record: Record, instants: Sequence[float]) -> None:
-    """Raise CaseError where steps are not in order of time, or lie outside a record."""
-    first, last = float(record.time[0]), float(record.time[-1])
-    for at in instants:
-        if not first <= at < last:
-            text = f"{show(at)} s lies outside {record.source}, {show(first)} ... {show(last)} s"
-            raise CaseError([f"at: {text}"])
-    for before, at in pairwise(instants):
-        if at <= before:
-            raise CaseError([f"at: {show(at)} s is not after {show(before)} s, the step before"])
-
-
 def _sizes(
     record: Record,
     steps: Sequence[RecordedStep],
@@ -217,7 +205,11 @@ def _sizes(
     show one.
     """
     if given.sizes:
-        _refuse_other_count(steps, given.sizes)
+        if len(given.sizes) != len(steps):
+            instants = ", ".join(f"{step.at:.4g}" for step in steps)
+            number = f"{len(steps)} step{'s' if len(steps) > 1 else ''}"
+            text = f"{len(given.sizes)} given for {number}, at {instants} s: give one for each"
+            raise CaseError([f"step: {text}"])
         return given.sizes
     for step in steps:
         if "vt" not in step.sizes:
@@ -232,15 +224,6 @@ def _sizes(
         _through_gain(size, change.sizes.get("vt", 0.0))
         for size, change in zip(sizes, changes, strict=True)
     )
-
-
-def _refuse_other_count(steps: Sequence[RecordedStep], sizes: Sequence[float]) -> None:
-    """Raise CaseError where a size is not given for each step."""
-    if len(sizes) != len(steps):
-        instants = ", ".join(f"{step.at:.4g}" for step in steps)
-        number = f"{len(steps)} step{'s' if len(steps) > 1 else ''}"
-        text = f"{len(sizes)} given for {number}, at {instants} s: give one for each"
-        raise CaseError([f"step: {text}"])
 
 
 def _through_gain(size: float, change: float) -> float:

@@ -1,6 +1,5 @@
 """The steps of a test as its record shows them, for a fit that finds their instants or sizes."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 from math import inf
 
@@ -40,7 +39,11 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
         steps = tuple(
             _bounded(f"{place}.vref[{k}]", step, record, limit) for k, step in enumerate(test.vref)
         )
-        _refuse_wrong_order(f"{place}.vref", steps)
+        instants = [start_value(step.at) or 0.0 for step in steps]
+        for k, (before, at) in enumerate(pairwise(instants), 1):
+            if at <= before:
+                text = f"{at:g} s is not after {before:.4g} s, where the record shows the step"
+                raise CaseError([f"{place}.vref[{k}].at: {text} before"])
         test = test.model_copy(update={"vref": steps})
     if test.breaker is not None:
         opens = _bounded_opening(f"{place}.breaker.opens", test.breaker.opens, record)
@@ -49,25 +52,13 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
     test = test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
     given = Unknown(start="auto") if finds_level(test, recording.record) else test.vt0
     if isinstance(given, Unknown) and given.start == "auto":
-        test = test.model_copy(update={"vt0": _level(f"{place}.vt0", given, test, record)})
+        from exfit.records.steps import bounds_about
+
+        level = initial_level(test, record, "vt")
+        bounds = bounds_about(level, LEVEL_WITHIN)
+        vt0 = _with_bounds(f"{place}.vt0", given, level, *bounds)
+        test = test.model_copy(update={"vt0": vt0})
     return test
-
-
-def _level(place: str, given: Unknown, test: BumpTest, record: Record) -> Unknown:
-    """Return the voltage at rest that a fit finds, with the numbers that its record gives."""
-    from exfit.records.steps import bounds_about
-
-    level = initial_level(test, record, "vt")
-    return _with_bounds(place, given, level, *bounds_about(level, LEVEL_WITHIN))
-
-
-def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:
-    """Raise CaseError where the record shows a step after the one that follows it."""
-    instants = [start_value(step.at) or 0.0 for step in steps]
-    for k, (before, at) in enumerate(pairwise(instants), 1):
-        if at <= before:
-            text = f"{at:g} s is not after {before:.4g} s, where the record shows the step before"
-            raise CaseError([f"{place}[{k}].at: {text}"])
 
 
 def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | None:
