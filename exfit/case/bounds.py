@@ -31,7 +31,7 @@ def search_bounds(low: float | None, high: float | None, row: Parameter | None) 
 
 
 def is_held(start: float | None, row: Parameter | None) -> bool:
-    """Return whether a free parameter is a time constant of 0, whose block is bypassed.
+    """Tell if a free parameter is a time constant of 0, whose block is bypassed.
 
     The response does not depend on it there, so that no fit can leave that value.
     """

@@ -323,7 +323,7 @@ class Case:
         }
 
     def sources(self, fitted: Iterable[str] = ()) -> dict[str, str]:
-        """Return where every value comes from, as the system names them: typical, nameplate ...
+        """Name the source of every value, as the system names them: typical, nameplate ...
 
         What the case does not give is typical. The source of a free parameter is that of its start,
         unless it is among those ``fitted``. What follows others is as certain as the least certain
@@ -370,7 +370,7 @@ class Case:
         return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
 
     def _sources_of(self, part: Part) -> dict[str, str]:
-        """Return where the values of a part come from, and those of the exciter's helpers."""
+        """Name the sources of the values of a part, and those of the exciter's helpers."""
         stated: Mapping[str, str] = _at(self, part.sources)
         given, own = {*self._fixed(part), *self._free(part)}, part.symbols
         sources = {

@@ -63,7 +63,7 @@ def form_faults(details: Iterable[Data], schema: Data) -> list[Fault]:
 
 
 def _only_counts_good_ones(detail: Data) -> bool:
-    """Return whether a list is too short only for its faulty entries, which are reported anyway."""
+    """Tell if a list is too short only for its faulty entries, which are reported anyway."""
     return detail["type"] == "too_short" and bool(
         len(detail["input"]) >= detail["ctx"]["min_length"]
     )

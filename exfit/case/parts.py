@@ -309,7 +309,7 @@ def network_part(given: Data, kind: PlantKind, place: Place = ("plant", "network
 
 
 def _places(section: str, fixed: str) -> tuple[Place, Place, Place]:
-    """Return where a section of the file gives what is fixed, what is free, and their sources."""
+    """Find the sections of the file for fixed values, free ones, and their sources."""
     return (section, fixed), (section, "free"), (section, "sources")
 
 
@@ -328,7 +328,7 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
 
 
 def _named(plant: Data, data: Data) -> Model:
-    """Return what stands for a model elsewhere: the parameters that a case names."""
+    """Make the stand-in of a model that is elsewhere: the parameters that a case names."""
     from exfit.plants.outside import model_of_names
 
     command = plant.get("command")

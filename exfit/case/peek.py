@@ -69,7 +69,7 @@ def keys_of(file: Path) -> frozenset[str]:
 
 
 def content_of(text: str, case: Path) -> Mapping[str, Any]:
-    """Return what the text of a case holds; nothing where it cannot be read as YAML."""
+    """Read the content of the text of a case; nothing where it is no YAML."""
     try:
         root, _ = read_yaml(text, case)
     except CaseError:
@@ -78,7 +78,7 @@ def content_of(text: str, case: Path) -> Mapping[str, Any]:
 
 
 def section_of(text: str, case: Path, key: str) -> Any:
-    """Return what the text of a case has under a key of its top; None where there is nothing."""
+    """Read the value of a top key in the text of a case; None where there is none."""
     return content_of(text, case).get(key)
 
 
@@ -101,7 +101,7 @@ def limiter_places(text: str, case: Path) -> dict[str, str]:
 
 
 def unused_values(text: str, case: Path) -> dict[str, float]:
-    """Return what the planner's program does without of the unit of a case, by the case's text."""
+    """Read, of the text of a case, the values that the planner's program does without."""
     unused = _section(content_of(text, case), ("as_found", "unused"))
     return {str(name): float(value) for name, value in unused.items()}
 

@@ -16,7 +16,7 @@ FORMS = {"exponential": "=AEX*exp(BEX*{0})/{0}", "exponential-se": "=AEX*exp(BEX
 
 
 def has_saturation(sheet: Sheet) -> bool:
-    """Return whether a model has the two points of a saturation curve."""
+    """Tell if a model has the two points of a saturation curve."""
     return {*POINTS} <= {row.symbol for row in sheet}
 
 
@@ -35,12 +35,12 @@ def saturation_ties(data: Mapping[str, Any], sheet: Sheet) -> Iterator[tuple[str
 
 
 def place_of_points(content: ContentNode) -> Place:
-    """Return where AEX and BEX are given, from which the points follow."""
+    """Find the place of AEX and BEX, from which the points follow."""
     return next((node.place for node in _given(content.at("parameters"))), ("parameters",))
 
 
 def saturation_faults(content: ContentNode) -> Iterator[Fault]:
-    """Yield what contradicts itself where AEX or BEX is given."""
+    """Check the values beside a given AEX or BEX."""
     parameters, form = content.at("parameters"), content.at("saturation").text or "quadratic"
     given = {str(node.place[-1]): node for node in _given(parameters)}
     if not given:

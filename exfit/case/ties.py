@@ -69,7 +69,7 @@ class Tie:
 
 
 def is_tie(value: object) -> bool:
-    """Return whether a value stands for the arithmetic of others."""
+    """Tell if a value stands for the arithmetic of others."""
     return isinstance(value, str) and value.startswith("=")
 
 

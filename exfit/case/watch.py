@@ -13,7 +13,7 @@ Stamps = Mapping[Path, Stamp]
 
 
 def stamps_of(case: Path, beside: Iterable[Path] = ()) -> Stamps:
-    """Return when each file of a case, and beside it, was changed, and how long it is.
+    """Note time of change and length of each file of a case, and beside it.
 
     None where there is none.
     """
@@ -21,7 +21,7 @@ def stamps_of(case: Path, beside: Iterable[Path] = ()) -> Stamps:
 
 
 def changed(before: Stamps) -> tuple[Path, ...]:
-    """Return which files have changed, once there are some and they change no more."""
+    """Wait for changed files, until they change no more; return these."""
     from watchfiles import watch
 
     others = _others(before)

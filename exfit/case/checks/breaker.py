@@ -52,7 +52,7 @@ def driving_signals(test: ContentNode, record: ContentNode, kind: PlantKind) -> 
 
 
 def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterator[Fault]:
-    """Yield why the instant of the opening cannot be found: the whole response is shifted by it."""
+    """Refuse an instant of the opening that cannot be found: it shifts the whole response."""
     opens = test.at(BREAKER, "opens")
     if not opens.is_section:
         return
@@ -65,7 +65,7 @@ def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterato
 
 
 def _switching_faults(test: ContentNode, opens: float) -> Iterator[Fault]:
-    """Yield what is switched in a network from which the machine is already parted."""
+    """Refuse switchings in a network from which the machine is already parted."""
     for name in ("E", "angle", "network"):
         for event in test.at(name).entries:
             at = event.at("at").number

@@ -87,7 +87,7 @@ def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
 
 
 def missing_without_record(test: ContentNode) -> Iterator[Fault]:
-    """Yield what a test lacks that no record is there to give."""
+    """Demand of a test what otherwise a record gives."""
     if "begin" in test:
         text = "only with a record; without one the time begins at 0"
         yield test.at("begin").fault(text)
@@ -99,7 +99,7 @@ def missing_without_record(test: ContentNode) -> Iterator[Fault]:
 
 
 def _playback_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:
-    """Yield what a test lacks, or has in vain, where a record drives the simulation."""
+    """Check the keys of a test in which a record drives the simulation."""
     if "begin" in test:
         text = f"not allowed with plant {kind.name}: the record drives the simulation"
         yield test.at("begin").fault(text)
@@ -118,7 +118,7 @@ def _rest_faults(test: ContentNode) -> Iterator[Fault]:
 
 
 def _voltage_faults(vt0: ContentNode) -> Iterator[Fault]:
-    """Yield why the voltage before the first step is none of a machine."""
+    """Refuse a voltage before the first step that no machine has."""
     lowest = vt0.at("min")
     if vt0.start is not None and vt0.start <= 0:
         yield vt0.fault(f"{show(vt0.start)} is not above 0")

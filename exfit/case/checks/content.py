@@ -74,7 +74,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
 
 
 def _faults_elsewhere(content: ContentNode, parts: Parts) -> Iterator[Fault]:
-    """Yield what contradicts itself in a plant that exfit does not simulate."""
+    """Check a plant that exfit does not simulate."""
     kind = content.at("plant", "type")
     faults = registry.parts("FAULTS").get(str(kind.value))
     if faults is None:
@@ -106,7 +106,7 @@ def _missing_test_faults(content: ContentNode, kind: PlantKind) -> Iterator[Faul
 
 
 def _validates_alone(content: ContentNode) -> bool:
-    """Return whether a case has records under validate, and none to fit."""
+    """Tell if a case has records under validate, and none to fit."""
     return "record" not in content and bool(content.at("validate").entries)
 
 
@@ -126,7 +126,7 @@ def _driving(recording: ContentNode, kind: PlantKind) -> tuple[str, ...]:
 def _recording_faults(
     recording: ContentNode, content: ContentNode, kind: PlantKind
 ) -> Iterator[Fault]:
-    """Yield what contradicts itself in a test and its record; a single one is the whole content."""
+    """Check a test together with its record; a single one is the whole content."""
     plant, kind = recording.at("plant"), _kind(recording, kind)
     network = plant.at("network") if plant.at("network").content else content.at("plant", "network")
     test, record = recording.at("test"), recording.at("record")

@@ -26,7 +26,7 @@ from exfit.util.text import Place, near, show, show_value
 
 
 def bound_faults(section: ContentNode) -> Iterator[Fault]:
-    """Yield why ``start``, ``min`` and ``max`` of a section contradict each other."""
+    """Check ``start``, ``min`` and ``max`` of a section against each other."""
     start, low, high = (section.at(key).number for key in ("start", "min", "max"))
     if section.content.get("bounds") == "none":
         given = [key for key in ("min", "max") if key in section]
@@ -39,7 +39,7 @@ def bound_faults(section: ContentNode) -> Iterator[Fault]:
 
 
 def _outside(start: float, low: float | None, high: float | None) -> bool:
-    """Return whether a start lies outside its bounds, as far as these are readable."""
+    """Tell if a start lies outside its bounds, as far as these are readable."""
     return (low is not None and start < low) or (high is not None and start > high)
 
 
@@ -82,7 +82,6 @@ def _tied_values(
 
 
 def _sections_of(content: ContentNode, part: Part) -> tuple[ContentNode, ContentNode]:
-    """Return what the file gives for one part: fixed and free."""
     free = ContentNode((), None) if part.free is None else content.at(*part.free)
     return content.at(*part.fixed), free
 
@@ -167,7 +166,7 @@ def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]
 
 
 def _scale_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
-    """Yield what the scale of a search lacks: a bound above 0, or a size by which to search."""
+    """Demand what the scale of a search needs: bounds above 0, or a size by which to search."""
     start, low, high = (section.at(key).number for key in ("start", "min", "max"))
     unbounded = section.content.get("bounds") == "none"
     lowest, highest = search_bounds(low, high, None if unbounded else row)
@@ -201,7 +200,7 @@ def _bypass_faults(time: ContentNode) -> Iterator[Fault]:
 
 
 def _prior_faults(prior: ContentNode) -> Iterator[Fault]:
-    """Yield why a share of the mean is no standard deviation."""
+    """Refuse a share of a mean that makes no standard deviation."""
     std = prior.at("std")
     if std.text is None or not re.search(PERCENT, std.text):
         return
@@ -260,7 +259,7 @@ def as_found_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
 
 
 def _unused(section: ContentNode, parts: Parts) -> list[tuple[str, ContentNode]]:
-    """Return what is unused but for what a governor's record alone has, as GGOV1's Trate."""
+    """List the unused values but for those that only a governor's record has, as GGOV1's Trate."""
     listed = {
         part.prefix + name
         for part in parts.all

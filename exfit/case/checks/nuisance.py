@@ -35,13 +35,13 @@ def nuisance_faults(
 
 
 def _scale_of(value: ContentNode, kind: PlantKind) -> bool:
-    """Return whether a value is the scale of a channel that a fit may find in a playback."""
+    """Tell if a value is the scale of a channel that a fit may find in a playback."""
     *_, signal, key = value.place
     return bool(kind.scaled) and key == "scale" and signal != LEVEL_OF
 
 
 def _of_event(value: ContentNode, kind: PlantKind) -> bool:
-    """Return whether a value is one of an event: the offset of its frequency, or a delay."""
+    """Tell if a value is one of an event: the offset of its frequency, or a delay."""
     return kind.finds_rest and value.place[-1] in ("frequency_offset", "delay")
 
 

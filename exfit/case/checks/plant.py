@@ -142,7 +142,7 @@ def _idle_faults(
 
 
 def _on_load(content: ContentNode, kind: PlantKind) -> bool:
-    """Return whether a unit is on load, in the plant of a case or of one of its records."""
+    """Tell if a unit is on load, in the plant of a case or of one of its records."""
     kinds = (kind, *map(kind_of, plants_of_records(content.content).values()))
     return any(kind.on_load for kind in kinds)
 
@@ -209,7 +209,7 @@ def source_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterat
 
 
 def _given(content: ContentNode, places: Iterable[Place]) -> dict[str, object]:
-    """Return what is given in several places, by name."""
+    """Collect by name the values that are given in several places."""
     return {name: value for place in places for name, value in content.at(*place).content.items()}
 
 

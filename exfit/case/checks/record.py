@@ -20,7 +20,7 @@ PREFIXES_OF_PARTS = ("machine", "network", "stabiliser", "governor", *LIMITER_KI
 
 
 def event_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
-    """Yield what only the record of a grid event may have, where the plant plays none."""
+    """Refuse keys of the record of a grid event where the plant plays none."""
     if kind.finds_rest:
         return
     for node in (record.at("switchings"), record.at("filter"), test.at("frequency_offset")):
@@ -29,7 +29,7 @@ def event_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Ite
 
 
 def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
-    """Yield what contradicts itself in a record, or between it and its test."""
+    """Check a record, and it against its test."""
     if "duration" in test:
         text = "only without a record; record.window cuts a record"
         yield test.at("duration").fault(text)
@@ -62,7 +62,7 @@ def _start_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
 
 
 def _window_faults(test: ContentNode, window: tuple[float, float] | None) -> Iterator[Fault]:
-    """Yield what lies outside the window of a record."""
+    """Refuse instants outside the window of a record."""
     if window is None or window[0] >= window[1]:
         return
     start, end = window
@@ -105,7 +105,7 @@ def channels_faults(
 
 
 def _either_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
-    """Yield that none of some signals is recorded of which a plant needs one, or that two are."""
+    """Demand exactly one of some signals."""
     driving = [signal for signal in kind.required_one_of if signal in channels]
     if kind.required_one_of and not driving:
         lacking = f"neither {' nor '.join(kind.required_one_of)}"
@@ -125,7 +125,7 @@ def level_faults(channels: ContentNode, network: ContentNode, kind: PlantKind) -
 
 
 def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
-    """Yield what contradicts itself in a channel, whose signal may have to be ``per_unit``."""
+    """Check a channel, whose signal may have to be ``per_unit``."""
     yield from _scale_faults(channel)
     yield from _unit_faults(channel, signal, per_unit)
     yield from _phase_faults(channel, signal)
@@ -233,7 +233,7 @@ PER_UNIT = "pu"
 
 
 def phasors_faults(record: ContentNode) -> Iterator[Fault]:
-    """Yield what contradicts itself in the phasors of a record, or is missing there."""
+    """Check the phasors of a record, and that none is missing."""
     phasors = record.at("phasors")
     if "phasors" in record:
         for quantity in ("voltage", "current"):
@@ -338,7 +338,7 @@ def stabiliser_channel_faults(
 
 
 def _not_used(signal: str, given: ContentNode) -> str:
-    """Return what to do about a channel that drives nothing."""
+    """Advise on a channel that drives nothing."""
     if given.value is None:
         return f"drives nothing: give test.{signal}: {RECORDED}"
     return (

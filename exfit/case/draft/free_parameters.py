@@ -44,7 +44,7 @@ def bounds_of(row: Parameter, start: float | None = None) -> tuple[float, float]
 
 
 def _acts(row: Parameter, search: SearchRange, values: Mapping[str, float]) -> bool:
-    """Return whether a parameter has an effect of its own with these values."""
+    """Tell if a parameter has an effect of its own with these values."""
     own = values[row.symbol]
     if own == 0.0 or (search.needs and values[search.needs] == 0.0):
         return False

@@ -21,7 +21,7 @@ class RecordSettings:
     memory: float | None = None
 
     def inspect(self, file: Path) -> Inspection:
-        """Return what a recorder's file holds; raises RecordError where it is none."""
+        """Inspect a recorder's file; raises RecordError where it is none."""
         table = open_table(file, self.sheet, self.memory)
         inspection = inspect(table, self.clock or None, self.unit)
         return replace(inspection, sheet=self.sheet, memory=self.memory)

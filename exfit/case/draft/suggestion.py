@@ -231,7 +231,7 @@ def _first_phase(inspection: Inspection, group: InspectedPhases) -> InspectedCha
 
 
 def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) -> str:
-    """Return what to check of a channel."""
+    """Name the points to check of a channel."""
     by, _, _ = channel.why.partition(";")
     why = f"{'' if channel.sure else 'a guess: '}{channel.signal} by {by}"
     if scale is not None:

@@ -253,7 +253,7 @@ class BumpTest(Section):
         return given if isinstance(given, tuple) else ()
 
     def reference(self, signal: str) -> Reference:
-        """Return how vref, vs or pref is given."""
+        """Give vref, vs or pref as the case has it."""
         given: Reference = getattr(self, signal)
         return given
 

@@ -138,7 +138,7 @@ def _translated(result: FitResult, translation: Translation) -> FitResult:
 
 
 def _of_fit(result: FitResult, program: str) -> Iterator[str]:
-    """Yield what of the fit itself the reader must know."""
+    """List remarks on the fit that the reader must know."""
     if not result.holds:
         yield f"the fit does not hold: {outcome_of(result)}: {explanation_of(result)}"
     weighty = [*by_weight(result.typical_values)]
@@ -152,7 +152,7 @@ def _of_fit(result: FitResult, program: str) -> Iterator[str]:
 
 
 def _of_speed(result: FitResult, written: Iterable[Written]) -> Iterator[str]:
-    """Yield that a fit took efd times the speed, which the record does not."""
+    """Warn of efd times the speed in the fit, which the record does not have."""
     if not _times_speed(result):
         return
     for record in (
@@ -204,7 +204,7 @@ def _place_flags(result: FitResult, record: DynamicsRecord) -> dict[str, float]:
 
 
 def _times_speed(result: FitResult) -> bool:
-    """Return whether a fit took efd times the speed."""
+    """Tell if a fit took efd times the speed."""
     return section_of(result.case_text, result.case, "efd_times_speed") is True
 
 
@@ -300,7 +300,7 @@ def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
 def _unused(
     result: FitResult, record: DynamicsRecord, prefix: str, values: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return what the planner's file has of a record beside the values of the case."""
+    """Collect the values of the planner's file that the case does without."""
     of_file = unused_values(result.case_text, result.case)
     symbols = [*dict(record.unused)]
     if prefix + SHARE not in result.parameters:
@@ -320,7 +320,7 @@ def _not_whole(definition: Definition, values: Mapping[str, float]) -> Iterator[
 
 
 def _warnings(entry: Written) -> Iterator[str]:
-    """Yield what a record cannot hold, leaves undefined, or takes from typical data."""
+    """Warn of values that a record cannot hold, leaves undefined, or takes from typical data."""
     record = entry.definition.record
     for row in entry.definition.model.sheet:
         value = entry.values[row.symbol]
@@ -338,7 +338,7 @@ def _warnings(entry: Written) -> Iterator[str]:
 
 
 def _matters(symbol: str, value: float) -> bool:
-    """Return whether a value does anything: a gain of 0 and a limit out of reach do not."""
+    """Tell if a value does anything: a gain of 0 and a limit out of reach do not."""
     if symbol.endswith("MAX"):
         return value < OUT_OF_REACH
     if symbol.endswith("MIN"):

@@ -57,7 +57,7 @@ def text_of(data: bytes, file: str) -> str:
 
 
 def encoding_of(data: bytes) -> str:
-    """Return how the text of a file is encoded."""
+    """Find the encoding of the text of a file."""
     encoding = BYTE_ORDER.get(data[:2], BYTE_ORDER.get(data[:3], "utf-8"))
     try:
         data.decode(encoding)

@@ -56,7 +56,7 @@ class FileFormat:
 
 
 def wrong_bus(field: Field) -> Iterator[str]:
-    """Yield why a field is not the number of a bus."""
+    """Refuse a field that is not the number of a bus."""
     bus = field.text
     whole = not field.quoted and bus.isascii() and bus.isdigit()
     if not whole or not 0 < int(bus[:LONGEST_BUS]) < MOST_BUSES:
@@ -65,11 +65,11 @@ def wrong_bus(field: Field) -> Iterator[str]:
 
 
 def wrong_id(machine_id: str) -> Iterator[str]:
-    """Yield why a text is not the id of a machine."""
+    """Refuse a text that is not the id of a machine."""
     if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
         yield f"{show_value(machine_id)} is not a machine id of one or two characters"
 
 
 def is_machine_id(text: str) -> bool:
-    """Return whether a record that exfit writes can have this id of a machine."""
+    """Tell if a record that exfit writes can have this id of a machine."""
     return 1 <= len(text) <= LONGEST_ID and text.isascii() and text.isalnum()

@@ -179,7 +179,7 @@ def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
 
 
 def _reasons(left: "Sequence[LeftUnit]") -> list[str]:
-    """Return why units are left as they were, a line each."""
+    """List the reasons for which units are left as they were."""
     return first_texts([f"{unit.name}: {unit.reason}" for unit in left])
 
 

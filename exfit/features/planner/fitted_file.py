@@ -119,7 +119,7 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
 
 
 def changes_table(changes: Iterable[ChangedValue]) -> str:
-    """Return what was changed as CSV."""
+    """Make a table of all changes as CSV."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(ChangedValue._fields)

@@ -87,7 +87,7 @@ class ImportedUnits:
 
 
 def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
-    """Return what there is to import: the units of a file, with records of a folder or a table.
+    """Plan an import: the units of a file, with records of a folder or a table.
 
     Raises DynamicsError where the file cannot be read, ExfitError where the folder or table cannot.
     """

@@ -51,7 +51,7 @@ class PlayIn(NamedTuple):
 
 
 def played_in(case: Case) -> dict[str, PlayIn]:
-    """Return what the record of each grid event of a case plays into the unit, by its name.
+    """Collect the inputs of the unit in each grid event of a case, by the record's name.
 
     Raises CaseError for a case of another plant, ExfitError for a record that cannot be used.
     """
@@ -63,7 +63,7 @@ def played_in(case: Case) -> dict[str, PlayIn]:
 
 
 def play_in_of(setup: ExperimentSetup, f0: float) -> PlayIn:
-    """Return what of a record of an event drives a unit: the rest before it is at ``f0``, Hz."""
+    """Take a unit's inputs from the record of an event; the rest before it is at ``f0``, Hz."""
     time, angle = setup.record.time, setup.experiment.simulator.inputs.recorded["angle"]
     assert isinstance(angle, SplinedInput)
     turning = angle.slope(time) / TURN

@@ -60,7 +60,7 @@ def _missing(
 
 
 def _label_fault(label: str, symbol: str, symbols: dict[str, str], given: dict[str, Field]) -> str:
-    """Return why a name is none of the record or one too many, "" where it is right."""
+    """Find fault with a name that the record has not, or has already; "" where it is right."""
     if not symbol:
         return f"no value is named {show_value(label)}; {near(_bare(label), symbols)}"
     return f"{label}: given twice" if symbol in given else ""
@@ -73,7 +73,6 @@ def _idle(definition: Definition, line: int) -> dict[str, Field]:
 
 
 def _name_in_file(definition: Definition, symbol: str) -> str:
-    """Return how a file names a value."""
     return dict(definition.record.spelled).get(symbol, symbol).lower()
 
 
@@ -151,7 +150,7 @@ def _records(text: str, faults: list[DynamicsFault]) -> Iterator[_LogicalLine]:
 
 
 def _line(line: str, place: int, start: int) -> _LogicalLine:
-    """Return what a line holds; ``start`` is where it starts in the text of the file."""
+    """Split a line into fields; ``start`` is its place in the text of the file."""
     fields: list[Field] = []
     before = None
     for match in FIELD.finditer(line):
@@ -197,7 +196,7 @@ def _heads_of(record: _LogicalLine, faults: list[DynamicsFault]) -> Iterator[Hea
 
 
 def _head_fault(record: _LogicalLine, name: str, definition: Definition | None) -> str:
-    """Return what is wrong with the fields before the ':' of a record, "" where nothing is.
+    """Find fault with the fields before the ':' of a record, "" where they are right.
 
     Other devices have other fields there; a line without a ':' is a word that begins a section.
     """

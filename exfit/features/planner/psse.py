@@ -65,7 +65,7 @@ def sound_records(text: str) -> FileRecords:
 
 
 def _line(line: str, number: int, start: int, after_comma: bool) -> _Line:
-    """Return what a line holds up to the '/', an empty field for each comma after a comma.
+    """Split a line up to the '/', with an empty field for each comma after a comma.
 
     ``start`` is where it starts in the text of the file.
     """

@@ -118,7 +118,7 @@ def contradictions(
 
 
 def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
-    """Return what the fields behind a record's id say; ``line`` is where the record begins."""
+    """Read the fields behind a record's id; ``line`` is where the record begins."""
     record, names = definition.record, definition.names
     if len(fields) != len(names):
         count = DynamicsFault(line, _wrong_count(definition, len(fields)))
@@ -233,7 +233,7 @@ def _whole(definition: Definition, field: Field) -> int:
 
 
 def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[DynamicsFault]:
-    """Yield what is no number, such as a repeat count: it may be why the count is wrong."""
+    """Name fields that are no numbers, such as a repeat count: one may spoil the count."""
     for field in fields:
         try:
             number(field)
@@ -249,7 +249,7 @@ def _inputs(definition: Definition, given: Mapping[str, float]) -> tuple[str, ..
 
 
 def _short(definition: Definition, line: int, fields: tuple[Field, ...]) -> Iterable[DynamicsFault]:
-    """Yield which values, that might do something, a file of PSLF does not have."""
+    """Name the values with an effect that a file of PSLF does not have."""
     record = definition.record
     named = zip(definition.names, fields, strict=True)
     missing = [name for name, field in named if not field.end and name in dict(record.absent)]

@@ -54,7 +54,7 @@ class CaseMaker:
         return ""
 
     def _is_other(self, text: str) -> bool:
-        """Return whether the file exists with another content."""
+        """Tell if the file exists with another content."""
         return self.file.exists() and self.file.read_bytes() != text.encode()
 
     def _unit(self) -> UnitData:
@@ -73,7 +73,7 @@ class CaseMaker:
 def cases_of_table(
     table: str | PathLike[str], folder: str | PathLike[str] = "fleet"
 ) -> dict[Path, Callable[[], str]]:
-    """Return what makes the cases of a table of records, by the files that they will be.
+    """Prepare the cases of a table of records, each made when called, by their files.
 
     They lie in the folder ``cases`` of that of a batch, which calls each when its turn comes. A
     planner's file is read once.

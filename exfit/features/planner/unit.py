@@ -144,7 +144,7 @@ def _on_its_base(
 
 
 def missing_kinds(heads: Iterable[Head]) -> list[str]:
-    """Return what a unit needs and none of its records is: machine, exciter."""
+    """List the kinds of record that a unit lacks: machine, exciter."""
     known = {head.definition.kind for head in heads if head.definition is not None}
     return [kind for kind in NEEDED if kind not in known]
 
@@ -247,7 +247,7 @@ def _missing(
 
 
 def classical_machines(heads: Iterable[Head]) -> Iterator[DynamicsFault]:
-    """Yield that a unit is a classical machine, which has nothing that a record could verify."""
+    """Name units that are classical machines, which have nothing that a record could verify."""
     for head in heads:
         if head.name.upper() in CLASSICAL:
             yield DynamicsFault(head.line, f"{head.name} is {CLASSICAL[head.name.upper()]}")
@@ -268,12 +268,12 @@ def names_of(kind: str, program: str) -> list[str]:
 
 
 def _looks_like(head: Head) -> str:
-    """Return what a record is by its name: PSS/E's machines are GENROU, GENSAL, GENCLS ..."""
+    """Guess the kind of a record by its name: PSS/E's machines are GENROU, GENSAL, GENCLS ..."""
     return "machine" if head.name.upper().startswith("GEN") else "exciter"
 
 
 def kind_left_out(name: str) -> str | None:
-    """Return what a record that is left out is by its name, None where that is not known."""
+    """Guess the kind of a record that is left out, None where its name does not show it."""
     return LIMITER if name.upper() in LIMITERS else OTHERS.get(name.upper())
 
 
@@ -292,7 +292,7 @@ def _left_out(head: Head, exciter: UnitPart) -> str:
 
 
 def _place(limiter: str, exciter: UnitPart) -> str:
-    """Return where a limiter acts by the flag of its exciter's record, "" where it is not known."""
+    """Find the place of a limiter by the flag of its exciter's record, "" where it is not known."""
     definition, flag = exciter.definition, limiter[:3]
     values = dict(zip(definition.names, exciter.fields, strict=True))
     if flag not in FLAGS or flag not in values:

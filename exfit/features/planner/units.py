@@ -85,7 +85,7 @@ def _refused(heads: Sequence[Head], faults: Sequence[DynamicsFault]) -> RefusedU
 
 
 def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[DynamicsFault]:
-    """Yield that a unit has no machine or exciter that exfit knows, and what may be meant."""
+    """Name the part that a unit lacks of machine and exciter, and what may be meant."""
     classical = [*classical_machines(heads)]
     if classical or not missing:
         yield from classical

@@ -23,7 +23,7 @@ class Cells(NamedTuple):
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a file is a table by its suffix: CSV or a workbook."""
+    """Tell by its suffix if a file is a table: CSV or a workbook."""
     return path.suffix.lower() in (".csv", *WORKBOOKS)
 
 

@@ -161,7 +161,7 @@ def new(
 
 
 def is_terminal() -> bool:
-    """Return whether someone sits at the keyboard who can be asked."""
+    """Tell if someone sits at the keyboard who can be asked."""
     return sys.stdin is not None and sys.stdin.isatty()
 
 

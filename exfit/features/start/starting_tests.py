@@ -120,7 +120,7 @@ def sizes_in_use(texts: Sequence[str], inspections: Sequence[Inspection]) -> lis
 
 
 def doubtful_bases(tests: Sequence[StartingTest]) -> list[str]:
-    """Return what is doubtful in the bases of tests: a voltage that rests far from them."""
+    """List doubts about the bases of tests: a voltage that rests far from them."""
     low, high = AT_REST
     doubts = []
     for test in tests:

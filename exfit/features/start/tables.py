@@ -108,7 +108,7 @@ def number_in(row: Cells, name: str, faults: list[str]) -> float | None:
 
 
 def checked(row: Cells, name: str, read: Callable[[str], Value], faults: list[str]) -> Value | None:
-    """Return what a cell holds, None where it is blank; add what is wrong with it."""
+    """Read a cell, None where it is blank; add its faults."""
     text = row.by_name.get(name, "")
     try:
         return read(text) if text else None
@@ -199,7 +199,7 @@ def case_name_of(bus: int, machine_id: str | None) -> str:
 
 
 def _identity(row: Cells) -> tuple[str, ...]:
-    """Return what rows of one case have in common: their name, or their unit, or their record."""
+    """Identify the case of a row: by its name, or its unit, or its record."""
     cells = row.by_name
     if cells.get("name"):
         return (cells["name"].casefold(),)
@@ -275,7 +275,7 @@ def _about_columns(rows: Sequence[Cells]) -> list[str]:
 
 
 def _of_unit(unit: Cells, dyr: Path | None, of_all: Path | None) -> Iterator[str]:
-    """Yield what of a unit is missing or contradicts the rest."""
+    """Check the data of a unit for gaps and contradictions."""
     cells, place = unit.by_name, unit.place
     if of_all is not None:
         for name in ("dyr", "model", "machine"):
@@ -342,7 +342,7 @@ def _base(row: Cells, base: Base | None, faults: list[str]) -> Base | None:
 
 
 def _settings(rows: Sequence[Cells], folder: Path, faults: list[str]) -> dict[Path, RecordSettings]:
-    """Return how each record of a unit is read."""
+    """Collect the settings by which each record of a unit is read."""
     by_file: dict[str, list[Cells]] = {}
     for row in rows:
         by_file.setdefault(row.by_name.get("file", ""), []).append(row)
