@@ -66,7 +66,7 @@ def _why_not(
     limit: float | None,
     given: bool,
 ) -> str:
-    """Return why a signal of a validation is not accepted, "" where it is.
+    """Give the reason to reject a signal of a validation, "" where it is accepted.
 
     ``given``: the case sets the limit. An error that is not a number is not accepted.
     """

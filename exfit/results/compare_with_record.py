@@ -83,7 +83,7 @@ def compare_with_record(
 def _played(
     setup: ExperimentSetup, overlays: Mapping[str, Overlay], samples: Array
 ) -> PlayedRecord:
-    """Return what drove a simulation, and how its samples (M, channels) depart from a record."""
+    """Collect what drove a simulation, and the errors of its samples (M, channels)."""
     time, steady = setup.record.time, setup.test.steady
     begins = float(time[0]) if steady is None else steady
     recorded = {signal: setup.record.signals[signal] for signal in setup.driving}
@@ -106,7 +106,7 @@ def _left_out(setup: ExperimentSetup, samples: Array) -> Iterator[tuple[str, Lef
 
 
 def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | None:
-    """Return how the reference moved (M,) from where vt rests; None where it moved by steps."""
+    """Sample the reference (M,) from where vt rests; None where it moved by steps."""
     simulator = setup.experiment.with_inputs(values)
     inputs = simulator.inputs
     ramps = any(step.ramp for step in inputs.steps if step.signal == "vref")
@@ -165,7 +165,7 @@ def _measured_features(
 def _found_by_record(
     setup: ExperimentSetup, channel: Channel, time: Array, values: Values, moves: Sequence[Values]
 ) -> FoundByRecord | None:
-    """Return how the response depends on what was found by the record, None on nothing."""
+    """Compute the dependence of the response on what the record gave; None on nothing."""
     if not moves:
         return None
     curve, errors = setup.experiment.undisturbed_slopes(channel.signal, values, moves)
@@ -189,7 +189,7 @@ def _simulated_features(
 
 
 def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[float, float] | None:
-    """Return when the reference first moves in the record, and until when it then stays, s."""
+    """Find the instants between which the reference stays after its first move, s."""
     inside = [change for change in _changes(setup, values) if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
         return None
@@ -199,7 +199,7 @@ def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[fl
 
 
 def _changes(setup: ExperimentSetup, values: Values) -> list[InputStep]:
-    """Return what a test changes, as the recorder shows it, in the order of time.
+    """List the changes of a test, as the recorder shows them, in the order of time.
 
     A recorded reference may move before it jumps, from the end of the steady part on.
     """

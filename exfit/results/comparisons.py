@@ -71,7 +71,7 @@ class Match:
 
 
 def match_of(overlay: Overlay) -> Match:
-    """Return how well the samples of an overlay match."""
+    """Compute the figures of the match of an overlay's samples."""
     return Match(overlay.rmse, overlay.max_error, overlay.fit_percent)
 
 

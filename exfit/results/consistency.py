@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def contradictions(result: FitResult) -> Iterator[str]:
-    """Yield what of a result contradicts the rest of it, each with its place."""
+    """Yield the contradictions within a result, each with its place."""
     if not result.comparisons:
         yield "records: empty"
     for place, match in _comparisons(result):
@@ -34,7 +34,7 @@ def contradictions(result: FitResult) -> Iterator[str]:
 
 
 def validation_contradictions(result: ValidationResult) -> Iterator[str]:
-    """Yield what of a validation contradicts the rest of it, each with its place."""
+    """Yield the contradictions within a validation, each with its place."""
     if not result.matches:
         yield "validation: empty"
     for place, match in _comparisons(result):

@@ -67,7 +67,7 @@ class CriteriaVerdict:
 
 
 def judged_by_criteria(result: Reported) -> CriteriaVerdict:
-    """Return how the responses of a fit, and of its validations, meet the criteria."""
+    """Judge the responses of a fit, and of its validations, by the criteria."""
     every = [(match, True) for match in result.comparisons]
     every += [(match, False) for match in result.validation]
     return CriteriaVerdict(
@@ -98,7 +98,7 @@ def _judged(match: Comparison, fitted: bool, criteria: Criteria) -> Iterator[Jud
 def _rmse(
     match: Comparison, fitted: bool, signal: str, change: float, limit: float
 ) -> JudgedCriterion:
-    """Return whether the rms of a signal's difference is within a limit, in % of its change."""
+    """Judge the rms of a signal's difference by a limit, in % of its change."""
     rmse = 100.0 * match.channels[signal].rmse / change
     label = f"rms of the difference, {signal}"
     unit = "% of the change"
@@ -106,7 +106,7 @@ def _rmse(
 
 
 def _change(match: Comparison, signal: str, measured: Features | None) -> float:
-    """Return by how much a signal changed in its record: the step, else its range (pu)."""
+    """Change of a signal in its record, pu: the step, else its range."""
     if measured is not None and signal == "vt":
         return abs(measured.final_value - measured.initial_value)
     samples = match.overlays.get(signal)

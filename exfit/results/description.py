@@ -175,7 +175,7 @@ def values_of_part(values: Mapping[str, float], prefix: str) -> dict[str, float]
 
 
 def source_in_words(name: str, sources: Mapping[str, str], ties: Mapping[str, str]) -> str:
-    """Return where the value of a parameter comes from, in words: fitted, typical, tied ..."""
+    """Word the source of a parameter's value: fitted, typical, tied ..."""
     word = sources.get(name, NOT_STATED)
     if name not in ties:
         return word

@@ -328,7 +328,7 @@ class FitResult:
         )
 
     def source_of(self, name: str) -> str:
-        """Return where the value of a parameter comes from, in words: fitted, typical, tied ..."""
+        """Word the source of a parameter's value: fitted, typical, tied ..."""
         return source_in_words(name, self.sources, self.ties)
 
     @property

@@ -78,7 +78,7 @@ class PlayedRecord:
 
 
 def left_out_of(whole: Array, compared: Array, simulated: Array) -> LeftOut | None:
-    """Return what masks leave out of a recorded signal (M,), None for nothing.
+    """Collect the samples of a recorded signal (M,) that masks leave out, None for nothing.
 
     A sample of what is compared comes with it on each side, so that lines meet.
     """
@@ -110,7 +110,7 @@ def driving_signals(
 
 
 def excursion(time: Array, begins: float, samples: Array) -> Excursion | None:
-    """Return how far a signal (M,) departs from its mean before ``begins`` (s); None of gaps."""
+    """Largest departure of a signal (M,) from its mean before ``begins`` (s); None of gaps."""
     rest = _mean_before(time, begins, samples)
     if not np.isfinite(samples).any():
         return None
@@ -120,7 +120,7 @@ def excursion(time: Array, begins: float, samples: Array) -> Excursion | None:
 
 
 def played_errors(time: Array, begins: float, measured: Array, simulated: Array) -> PlayedErrors:
-    """Return how simulated samples (M,) depart from measured ones; nan is left out of both."""
+    """Compute the errors of simulated samples (M,); nan is left out of both."""
     error = simulated - measured
     compared = np.isfinite(error)
     if not compared.any():

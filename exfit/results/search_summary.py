@@ -18,7 +18,7 @@ def search_summary(minima: Minima, cost: float) -> str:
 
 
 def _ends(minima: Minima, cost: float) -> Iterator[str]:
-    """Yield how many descents led to the minimum of the result, to others, nowhere."""
+    """Yield the counts of descents: to the minimum of the result, to others, to nowhere."""
     others = [minimum for minimum in minima.minima if minimum.cost != cost]
     here = sum(minimum.starts for minimum in minima.minima if minimum.cost == cost)
     yield f"{here} of {minima.starts} descents lead to this {'minimum' if here else 'point'}"
@@ -35,7 +35,7 @@ def _ends(minima: Minima, cost: float) -> Iterator[str]:
 
 
 def _elsewhere(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
-    """Yield how many descents led to each minimum beyond the valley that the records leave open."""
+    """Yield the counts of descents to each open minimum beyond the valley of the result."""
     for minimum in minima:
         if minimum.valley != 0 and not minimum.refuted:
             verdict = "" if minimum.refuted is None else " (not refuted)"
@@ -43,7 +43,7 @@ def _elsewhere(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
 
 
 def _refuted(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
-    """Yield how many descents led to minima that the records refute."""
+    """Yield the counts of descents to minima that the records refute."""
     refuted = [minimum for minimum in minima if minimum.refuted]
     if len(refuted) == 1:
         yield f"{refuted[0].starts} to one {_height(refuted[0], cost)} (refuted)"
@@ -53,11 +53,11 @@ def _refuted(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
 
 
 def _height(minimum: Minimum, cost: float) -> str:
-    """Return how high a minimum lies."""
+    """Word the height of a minimum."""
     return f"{multiple(minimum.cost / cost)} as high" if cost > 0.0 else f"at {minimum.cost:.3g}"
 
 
 def multiple(ratio: float) -> str:
-    """Return how many times as high a cost is, in as many digits as tell it from another one."""
+    """Write the ratio of two costs in as many digits as tell them apart."""
     digits = max(0, 3 - len(f"{ratio:.0f}")) if ratio >= NEAR else 3
     return f"{ratio:.{digits}f} times"

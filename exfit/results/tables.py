@@ -55,7 +55,7 @@ def whole_table(header: Sequence[str], columns: Sequence[Array]) -> str:
 
 
 def clock_digits(time: Array, digits: int) -> int:
-    """Return how many digits instants (M,) need to be as fine as so many digits from zero on."""
+    """Count the digits that instants (M,) need to be as fine as so many digits from zero on."""
     span = float(np.ptp(time))
     if span == 0.0:
         return digits
@@ -128,7 +128,7 @@ def yes_or_no(value: bool | None) -> str:
 
 
 def effects_table(effects: "Sequence[ParameterEffect]") -> str:
-    """Return what 1 % of each parameter does to the records as CSV, the strongest first."""
+    """Write the changes of the records for 1 % of each parameter as CSV, the strongest first."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     labels = [*effects[0].rms] if effects else []
@@ -189,7 +189,7 @@ def phase_end_file(result: "FitResult", end: "PhaseEnd") -> str:
 
 
 def _remark(result: "FitResult", name: str) -> str:
-    """Return what must be known beside a value and its source."""
+    """Word the remarks on a value beside its source."""
     parameter = result.parameters.get(name)
     if parameter is None:
         return result.ties.get(name, "")

@@ -43,7 +43,7 @@ def typical_values_used(case: Case) -> dict[str, float]:
 
 
 def moved_parameters(typical: TypicalValue, fitted: Mapping[str, float]) -> str:
-    """Return in words by how much a typical value would move what matters, given its values."""
+    """Word the shifts that a typical value would cause where they matter."""
     return first_of(
         [f"{name} by {_share(typical.shifts[name], fitted[name])}" for name in typical.matters_to]
     )

@@ -121,7 +121,7 @@ class ValidationResult:
         return values_of_part(self.values, prefix)
 
     def source_of(self, name: str) -> str:
-        """Return where the value of a parameter comes from, in words: maker, typical, tied ..."""
+        """Word the source of a parameter's value: maker, typical, tied ..."""
         return source_in_words(name, self.sources, self.ties)
 
 

@@ -29,14 +29,14 @@ class Across:
     edges: Sequence[float]
 
     def upright_at(self, column: int, row: int) -> float | None:
-        """Return where the upright line through the character at a place lies."""
+        """Find the upright line through the character at a place."""
         for line, x in self.uprights.items():
             if line.along == column and line.ends[0].at <= row <= line.ends[1].at:
                 return x
         return None
 
     def end(self, line: Wire, end: End) -> float:
-        """Return where an end of a line along a row lies."""
+        """Place an end of a line along a row."""
         if end.element is None:
             x = self.upright_at(end.at, line.along)
             return (self.edges[end.at] + self.edges[end.at + 1]) / 2.0 if x is None else x
@@ -48,7 +48,7 @@ class Across:
 
 
 def across(letters: Letters, parts: Parts) -> Across:
-    """Return where a diagram's parts and upright lines lie."""
+    """Place the parts and upright lines of a diagram."""
     edges = _edges(letters, parts)
     middles = {e: (edges[e.left] + edges[e.right]) / 2.0 for e in parts}
     uprights = {
@@ -74,7 +74,7 @@ def _edges(letters: Letters, parts: Parts) -> list[float]:
 
 
 def _widths(parts: Parts) -> dict[Element, float]:
-    """Return how wide the columns of each part must be, those of a block with its limits."""
+    """Measure the columns of each part, those of a block with its limits."""
     widths = {e: 2.0 * part.half_width for e, part in parts.items() if part.owner is None}
     for part in parts.values():
         if part.owner is not None:
@@ -85,7 +85,7 @@ def _widths(parts: Parts) -> dict[Element, float]:
 def _upright(
     line: Wire, parts: Parts, middles: Mapping[Element, float], edges: Sequence[float]
 ) -> float:
-    """Return where an upright line lies: in the middle of a circle or block that it ends at."""
+    """Place an upright line: in the middle of a circle or block that it ends at."""
     ends = [end.element for end in line.ends if end.element is not None]
     for element in ends:
         if parts[element].role == "circle":
@@ -98,7 +98,7 @@ def _upright(
 
 
 def _off_middle(line: Wire, circle: DiagramPart) -> float:
-    """Return how far from a circle's middle a line lies: two from one side keep apart."""
+    """Measure a line's distance from a circle's middle: two from one side keep apart."""
     side = next(k for k, end in enumerate(line.ends) if end.element is circle.element)
     columns = sorted(
         other.along for other, end in circle.lines if other.upright and other.ends[side] is end
@@ -109,7 +109,7 @@ def _off_middle(line: Wire, circle: DiagramPart) -> float:
 
 
 def _moved(part: DiagramPart, raw: Across) -> float:
-    """Return where a part lies: a text keeps to its box or its line."""
+    """Place a part: a text keeps to its box or its line."""
     element, x = part.element, raw.middles[part.element]
     if part.owner is not None:
         return raw.middles[part.owner]
@@ -127,7 +127,7 @@ def _moved(part: DiagramPart, raw: Across) -> float:
 
 
 def _beside_upright(part: DiagramPart, raw: Across) -> float:
-    """Return where a text without a line of its own lies: against an upright line beside it."""
+    """Place a text without a line of its own: against an upright line beside it."""
     element = part.element
     for columns in range(BESIDE):
         left = raw.upright_at(element.left - 1 - columns, element.top)

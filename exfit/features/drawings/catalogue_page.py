@@ -96,7 +96,7 @@ def _files(model: Model | Machine, diagram: str) -> Iterator[tuple[str, str | by
 
 
 def _section(model: Model | Machine, diagram: str, has_figure: bool) -> str:
-    """Return what the page says of a model."""
+    """Write the section of a model as HTML."""
     _, remarks = diagram_and_remarks(model.drawing)
     lines = [f"<h2>{escape(model.name)}: {escape(model.title)}</h2>"]
     if diagram:

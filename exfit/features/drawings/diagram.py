@@ -46,7 +46,7 @@ def _words(parts: Sequence[DiagramPart]) -> str:
 
 
 def _block(block: DiagramPart, parts: Sequence[DiagramPart]) -> str:
-    """Return what stands in a block, and its limits."""
+    """Word a block with its limits."""
     limits = [_letters(part) for part in parts if part.owner == block.element]
     return _letters(block) + (f" (limits: {', '.join(limits)})" if limits else "")
 

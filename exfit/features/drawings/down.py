@@ -29,7 +29,7 @@ class Obstacle:
     down: float
 
     def meets(self, other: "Obstacle") -> bool:
-        """Return whether one could stand above the other."""
+        """Tell whether one could stand above the other."""
         return self.left < other.right + GAP and other.left < self.right + GAP
 
 
@@ -53,7 +53,7 @@ def middle_of(part: DiagramPart, parts: Parts, rows: list[float]) -> float:
 
 
 def _needed(letters: Letters, places: Across) -> Iterator[tuple[int, int, float]]:
-    """Yield how far two rows must lie apart at least: the upper, the lower, how far."""
+    """Yield the least distances of rows: the upper, the lower, the distance."""
     obstacles = sorted(_obstacles(letters, places), key=lambda obstacle: obstacle.row)
     for k, upper in enumerate(obstacles):
         for lower in obstacles[k + 1 :]:

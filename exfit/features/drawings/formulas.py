@@ -78,7 +78,7 @@ def text(letters: str) -> Typeset:
 
 
 def formula(rows: tuple[str, ...]) -> tuple[Piece, ...]:
-    """Return what stands in a box: a fraction, a sum over two rows, two rows of words."""
+    """Typeset the rows of a box: a fraction, a sum over two rows, two rows of words."""
     upper, *lower = (re.sub(r"(?<=\S) ?\+ ?", " + ", row.strip("[]").strip()) for row in rows)
     if not lower:
         return tuple(_pieces(upper))

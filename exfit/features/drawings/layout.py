@@ -81,7 +81,7 @@ class _Grid:
     heights: Mapping[Element, float]
 
     def down(self, line: Wire, end: End) -> float:
-        """Return where an end of an upright line lies."""
+        """Place an end of an upright line."""
         if end.element is None:
             return self.rows[end.at]
         part = self.places.parts[end.element]
@@ -171,7 +171,7 @@ def _bars(placed: PlacedPart) -> Iterator[Stroke]:
 
 
 def _pieces(placed: PlacedPart) -> Iterator[tuple[formulas.Piece, float]]:
-    """Yield what is written in a part, with its middle."""
+    """Yield the words of a part, with its middle."""
     left = placed.x - formulas.width(placed.part.pieces) / 2.0
     for piece in placed.part.pieces:
         yield piece, left + piece.width / 2.0

@@ -49,7 +49,7 @@ class Element:
         return self.left + max(map(len, self.rows))
 
     def covers(self, row: int, column: int) -> bool:
-        """Return whether the character at a place is one of its."""
+        """Tell whether the character at a place is one of its."""
         inside = self.top <= row <= self.bottom
         return inside and 0 <= column - self.left < len(self.rows[row - self.top])
 
@@ -102,7 +102,7 @@ def diagram_and_remarks(drawing: str) -> tuple[str, list[str]]:
 
 
 def read(diagram: str) -> Letters:
-    """Return what a diagram consists of."""
+    """Read the elements and lines of a diagram."""
     drawn = diagram.split("\n")
     columns = max(map(len, drawn))
     rows = [row.ljust(columns) for row in drawn]
@@ -128,7 +128,7 @@ def read(diagram: str) -> Letters:
 
 
 def _matches(pattern: re.Pattern[str], rows: Sequence[str]) -> Iterator[tuple[int, int, str]]:
-    """Yield what a pattern matches: its row, its first column, its letters."""
+    """Yield the matches of a pattern: row, first column, letters."""
     for k, row in enumerate(rows):
         for match in pattern.finditer(row):
             yield k, match.start(), match[0]
@@ -203,7 +203,7 @@ def _line(
 def _touched(
     along: int, at: int, step: int, elements: Sequence[Element], upright: bool
 ) -> Element | None:
-    """Return what a line ends at: a text may stand a space off, a circle a column beside."""
+    """Find what ends a line: a text may stand a space off, a circle a column beside."""
     places = (
         [(at + step, along + beside) for beside in (0, -BESIDE, BESIDE)]
         if upright

@@ -77,7 +77,7 @@ def _part(element: Element, lines: Sequence[Wire]) -> DiagramPart:
 
 
 def _role(ends: Sequence[End]) -> Role:
-    """Return what a text is: a block is what an arrow leads to and a line leaves."""
+    """Find the role of a text: a block is one that an arrow leads to and a line leaves."""
     match len(ends), {end.arrow for end in ends}:
         case 0, _:
             return "remark"

@@ -91,18 +91,18 @@ class Axis:
     logarithmic: bool = False
 
     def places(self, values: Array) -> Array:
-        """Return how far from the low end values lie on the drawing."""
+        """Place values on the drawing: units from the low end of the axis."""
         placed = _log(values) if self.logarithmic else values
         with np.errstate(over="ignore"):
             return np.asarray((placed - self.low) / (self.high - self.low) * self.length)
 
     def place(self, value: float) -> float:
-        """Return how far from the low end a value lies on the drawing."""
+        """Place a value on the drawing: units from the low end of the axis."""
         return float(self.places(np.array([value]))[0])
 
 
 def drawing(chart: Chart) -> Drawing:
-    """Return where all of a chart lies."""
+    """Place all of a chart on its drawing."""
     inner = chart.width - LEFT - RIGHT
     lines = [series for panel in chart.panels for series in panel.series]
     x_range = chart.x_range or _span((series.x for series in lines), chart.logarithmic)
@@ -177,7 +177,7 @@ def _rule(rule: Rule, across: Axis, upward: Axis) -> Mark:
 
 
 def _label(rule: Rule, across: Axis, upward: Axis) -> Label:
-    """Return where a rule says what it is: above a level, at the foot of an upright one."""
+    """Place the label of a rule: above a level, at the foot of an upright one."""
     if not rule.upright:
         level = upward.length - upward.place(rule.at)
         return Label(across.length - 4.0, level - 4.0, rule.label, True)

@@ -62,7 +62,7 @@ def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str
 
 
 def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) -> Page:
-    """Return what the page of a fit shows, beside an ``other`` fit where there is one."""
+    """Build the page of a fit, beside an ``other`` fit where there is one."""
     sections = [(section, _content(section, result)) for section in SECTIONS]
     if other is not None:
         sections.insert(len(sections) - 1, (AGAINST, against(result, other)))
@@ -70,7 +70,7 @@ def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) ->
 
 
 def validation_page(result: ValidationResult, folder: Path) -> Page:
-    """Return what the page of a validation shows: nothing of a search, which there was none."""
+    """Build the page of a validation: nothing of a search."""
     every = ((section, _content(section, result)) for section in OF_VALIDATION)
     sections = [(section, content) for section, content in every if content]
     title = f"{result.model}: {result.name}"
@@ -120,7 +120,7 @@ def _numbered(page: str) -> str:
 
 
 def is_page(path: Path) -> bool:
-    """Return whether a file is a page that this module made."""
+    """Tell by its head a page that this module made from other files."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return GENERATOR in file.read(HEAD)
 
@@ -139,7 +139,7 @@ def _overlays(contents: Iterable[Any]) -> list[OverlayChart]:
 
 @cache
 def environment() -> "Environment":
-    """Return what renders the templates of pages: every text is escaped."""
+    """Make the environment of the templates of pages: every text is escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     shared = Environment(

@@ -32,7 +32,7 @@ def page_pdf(page: Page) -> bytes:
 
 
 def is_pdf(path: Path) -> bool:
-    """Return whether a file is a PDF that this module made."""
+    """Tell by its end a PDF that this module made from other files."""
     return path.read_bytes().endswith(MARK)
 
 

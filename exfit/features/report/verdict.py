@@ -28,7 +28,7 @@ class Headline:
 
 
 def headline(result: FitResult) -> Headline:
-    """Return what a fit comes to."""
+    """Word the outcome of a fit."""
     outcome, judged = outcome_of(result), judged_by_criteria(result)
     rmse = ", ".join(_rmse((*result.comparisons, *result.validation)))
     sentence = "; ".join([*filter(None, [explanation_of(result)]), *_validated(result)])
@@ -43,7 +43,7 @@ def headline(result: FitResult) -> Headline:
 
 
 def headline_of_validation(result: ValidationResult) -> Headline:
-    """Return what the comparison of given values with records comes to.
+    """Word the outcome of a comparison of given values with records.
 
     It is neither good nor bad where nothing limits an error: the criteria then judge alone.
     """
@@ -69,7 +69,7 @@ def _rmse(matches: Iterable[Comparison]) -> Iterator[str]:
 
 
 def _validated(result: Reported) -> Iterator[str]:
-    """Yield how the validations of a fit do that are accepted."""
+    """Yield the limits that accepted validations keep."""
     if not result.validation:
         yield "no record was kept for a validation"
     elif result.accepted:

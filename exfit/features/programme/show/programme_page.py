@@ -50,7 +50,7 @@ def _headline(result: ProgrammeResult) -> Headline:
 
 
 def _overview(result: ProgrammeResult) -> Iterator[Block]:
-    """Yield what each test came to, and the values that tests gave to those after them."""
+    """Yield the outcome of each test, and the values that tests gave to those after them."""
     rows: list[tuple[Cell, ...]] = [
         row(
             "\n".join([test.name, *([", ".join(test.tests)] if len(test.tests) > 1 else [])]),

@@ -51,7 +51,7 @@ def against(result: FitResult, other: FitResult) -> AgainstView:
 
 
 def _names(result: FitResult, other: FitResult) -> tuple[str, str]:
-    """Return what the two fits are called: by plant, unit and revision, else by their cases."""
+    """Name the two fits: by plant, unit and revision, else by their cases."""
     this, older = (
         ", ".join(
             text if fact is PLANT else f"{fact.key.lower()} {text}"

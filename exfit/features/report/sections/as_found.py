@@ -86,7 +86,7 @@ def as_found_of_validation(result: ValidationResult) -> AsFoundView | None:
 
 
 def _matches(before: Comparison, now: Comparison) -> Iterator[MatchBefore]:
-    """Yield how the signals of a record are matched that judge it."""
+    """Yield the errors before and now of the signals that judge a record."""
     for signal in now.judging:
         if signal in before.channels:
             errors = before.channels[signal].rmse, now.channels[signal].rmse
@@ -127,7 +127,7 @@ def _units(result: Reported) -> dict[str, str]:
 
 
 def _change(before: float | None, verified: float | None) -> str:
-    """Return what changed, in words."""
+    """Word the change of a value."""
     if before is None:
         return "new"
     if verified is None:

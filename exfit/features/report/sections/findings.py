@@ -8,7 +8,7 @@ from exfit.show.blocks import Block, Heading, Note, remarks
 
 
 def findings(result: Reported) -> Iterator[Block]:
-    """Yield what the records leave unresolved, and the notes on a fit or a validation."""
+    """Yield the unresolved findings, and the notes on a fit or a validation."""
     knowledge = result.knowledge if isinstance(result, FitResult) else None
     unresolved = () if knowledge is None else knowledge.sentences
     for title, texts in (("Unresolved", unresolved), ("Notes", result.notes)):

@@ -239,7 +239,7 @@ def _stabiliser(about: Facts, parts: tuple[PartDescription, ...]) -> str:
 
 
 def _excursions(result: Reported) -> Iterator[str]:
-    """Yield how far voltage and frequency departed from rest in each grid event."""
+    """Yield the departures of voltage and frequency from rest in each grid event."""
     for match in (*result.comparisons, *result.validation):
         if match.played is None or not match.is_event:
             continue
@@ -252,7 +252,7 @@ def _excursions(result: Reported) -> Iterator[str]:
 
 
 def _governor(answers: FormAnswers) -> Iterator[FormRow]:
-    """Yield what is asked of a governor where a grid event was played in, or the unit has one."""
+    """Yield the rows on a governor where a grid event was played in, or the unit has one."""
     part = _part(answers.parts, "governor")
     if not answers.excursions and part is None:
         return

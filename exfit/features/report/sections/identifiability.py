@@ -32,7 +32,7 @@ class IdentifiabilityView:
 
 
 def identifiability(result: FitResult) -> IdentifiabilityView | None:
-    """Return what the records determine; None where that is not known."""
+    """Collect sensitivities and correlations of a fit; None where they are not known."""
     uncertainty = result.knowledge
     if uncertainty is None:
         return None
@@ -51,7 +51,7 @@ def identifiability(result: FitResult) -> IdentifiabilityView | None:
 
 
 def sensitivity(key: str, channel: Sensitivity, labels: Mapping[str, str]) -> Chart:
-    """Return by how much 1 % more of each parameter moves a signal over time."""
+    """Draw the change of a signal over time for 1 % more of each parameter."""
     moved = {labels.get(name, name): PERCENT * each for name, each in channel.moved.items()}
     lines = tuple(
         Series(name, *envelope(channel.time, MILLI * samples, BINS // 2), line_style(k))

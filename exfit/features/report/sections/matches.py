@@ -108,7 +108,7 @@ def played(key: str, comparison: Comparison, bins: int = BINS) -> Chart | None:
 
 
 def _gaps(time: Array, left_out: LeftOut) -> tuple[Series, ...]:
-    """Return what of a signal is not compared: few samples."""
+    """Draw the few samples of a signal that are not compared."""
     return (
         Series("", time, left_out.measured, "measured faint", dots=True),
         Series("simulated, not compared", time, left_out.simulated, "simulated faint"),

@@ -25,7 +25,7 @@ def other_program(result: Reported) -> tuple[str, ...]:
 
 
 def has_no_equations(result: Reported) -> bool:
-    """Return whether a program without a twin simulated the records."""
+    """Tell whether a program without a twin simulated the records."""
     return result.other_program is not None and result.other_program.twin is None
 
 

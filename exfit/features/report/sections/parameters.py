@@ -75,7 +75,7 @@ def _fitted(name: str, parameter: FittedParameter) -> Row:
 
 
 def _typical_values(result: FitResult) -> Iterator[Block]:
-    """Yield which typical values would move a parameter if they were off, and which would not."""
+    """Yield the typical values that would move a parameter if they were off, then the others."""
     weighty = by_weight(result.typical_values)
     values = {name: parameter.value for name, parameter in result.parameters.items()}
     rows = tuple(
@@ -116,7 +116,7 @@ def _of_parts(result: Reported) -> Iterator[tuple[str, Iterable[Row]]]:
 
 
 def _helpers(result: Reported) -> Iterator[tuple[str, Iterable[Row]]]:
-    """Yield what is listed among the exciter's parameters and is none of them."""
+    """Yield the values listed among the exciter's parameters that are none of them."""
     own = {symbol for part in result.parts if not part.prefix for symbol in part.sheet}
     yield (
         "Helpers",

@@ -26,7 +26,7 @@ class Reproduction:
 
 
 def reproduction(result: FitResult) -> Reproduction:
-    """Return how the report of a fit is made again; the folder of the result is not in it."""
+    """List what makes the report of a fit again; the folder of the result is not in it."""
     of_programme = KEY in result.inputs
     return Reproduction(
         fit=("exfit", "run" if of_programme else "fit", str(result.case)),
@@ -39,7 +39,7 @@ def reproduction(result: FitResult) -> Reproduction:
 
 
 def reproduction_of_validation(result: ValidationResult) -> Reproduction:
-    """Return how the report of a validation is made again."""
+    """List what makes the report of a validation again."""
     return Reproduction(
         fit=("exfit", "validate", str(result.case)),
         options=result.options,

@@ -36,7 +36,7 @@ class SearchView:
 
 
 def search(result: FitResult) -> SearchView:
-    """Return how the parameters of a fit were found."""
+    """Collect facts, history, minima and charts of the search of a fit."""
     history = result.history
     trajectories = (
         trajectory(f"path-{k}", name, parameter, history)

@@ -115,7 +115,7 @@ def _bodes(key: str, of_tests: SmallSignalView) -> Iterator[Chart]:
 
 
 def _margins(margins: Margins | None) -> tuple[Rules, Rules]:
-    """Return where the gain margin and the phase margin are, nothing where there is none."""
+    """Mark the gain margin and the phase margin, each at its frequency, where there is one."""
     gain: Rules = ()
     phase: Rules = ()
     if margins is not None and margins.gain is not None and margins.gain_at is not None:

@@ -16,12 +16,12 @@ INTERRUPTED = "The result does not hold this: the fit was interrupted."
 
 
 def unit_and_test(result: Reported) -> Iterator[Block]:
-    """Yield which unit was tested, and how."""
+    """Yield the facts of the unit, and its tests with their records."""
     return _unit(result.about, result.tests, INTERRUPTED)
 
 
 def unit_without_bumps(result: ProgrammeResult) -> Iterator[Block]:
-    """Yield which unit was tested by a programme whose bump tests gave no fit."""
+    """Yield the unit and tests of a programme whose bump tests gave no fit."""
     fits = (test.result for test in result.tests if isinstance(test.result, FitResult))
     tests = tuple(test for fit in fits for test in fit.tests)
     return _unit(result.about, tests, "No test with a record in time was fitted.")
