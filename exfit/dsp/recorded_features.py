@@ -177,7 +177,8 @@ def _smoothing(
     """
     inside = response.before | response.after
     size = -(-int(np.count_nonzero(inside)) // MOST_SMOOTHED)
-    found = response.found or _nothing_found(len(response.time))
+    none = np.zeros((len(response.time), 0))
+    found = response.found or FoundByRecord(none, none, np.zeros(0))
     time, error, samples = (
         _block_means(values[inside], size)
         for values in (response.time, response.measured - response.simulated, found.samples)
@@ -216,10 +217,6 @@ def _smoothing(
 def _is_noise(left: Array) -> bool:
     """Check whether what is left scatters from sample to sample as it does altogether."""
     return float(np.std(left)) < LEFT_IS_NOISE * noise(left)
-
-
-def _nothing_found(count: int) -> FoundByRecord:
-    return FoundByRecord(np.zeros((count, 0)), np.zeros((count, 0)), np.zeros(0))
 
 
 def _candidates(time: Array, errors: tuple[Array, ...], free: Array) -> Iterator[Line]:

@@ -89,7 +89,10 @@ class InspectedChannel:
             yield f"never changes: {self.low:.6g} throughout"
             return
         if self.spikes:
-            yield self._spikes_in_words()
+            instants = ", ".join(f"{at:.6g}" for at in self.spikes_at)
+            more = ", ..." if self.spikes > len(self.spikes_at) else ""
+            count = "1 spike" if self.spikes == 1 else f"{self.spikes} spikes"
+            yield f"{count}, at {instants}{more} s"
         for start, end in self.stuck[:PLACES_LISTED]:
             yield f"does not change from {start:.6g} to {end:.6g} s"
         if self._is_implausible_voltage():
@@ -125,21 +128,15 @@ class InspectedChannel:
         """Whether it is negative at rest although its signal is positive there."""
         return self.signal in POSITIVE_AT_REST and self.level < -NEGATIVE * self.noise
 
-    def change_at(self, step: RecordedStep) -> float | None:
-        """Change that lasts at a step, pu or a share of the level at rest; None without one."""
-        base = 1.0 if self.seems_per_unit else self.level
-        return step.sizes[self.name] / base if self.name in step.sizes and base else None
-
-    def _spikes_in_words(self) -> str:
-        instants = ", ".join(f"{at:.6g}" for at in self.spikes_at)
-        more = ", ..." if self.spikes > len(self.spikes_at) else ""
-        count = "1 spike" if self.spikes == 1 else f"{self.spikes} spikes"
-        return f"{count}, at {instants}{more} s"
-
     def _is_implausible_voltage(self) -> bool:
         low, high = AT_REST_PU
         per_unit = self.signal == "vt" and self.unit in (None, "pu")
         return per_unit and (self.level > high or 0.0 < self.level < low)
+
+    def change_at(self, step: RecordedStep) -> float | None:
+        """Change that lasts at a step, pu or a share of the level at rest; None without one."""
+        base = 1.0 if self.seems_per_unit else self.level
+        return step.sizes[self.name] / base if self.name in step.sizes and base else None
 
 
 @dataclass(frozen=True)

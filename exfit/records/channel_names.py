@@ -97,7 +97,9 @@ def _whole(text: str) -> NameReading | None:
 def _by_words(words: tuple[str, ...], kinds: Mapping[str, str], unit: str | None) -> NameReading:
     own = _own(words)
     if own is not None and own.signal == "vs":
-        return _stabiliser(own, kinds)
+        if "stator" in kinds and own.why == _named("vs"):  # vs is that of the stator then
+            return NameReading(None, Clarity.NONE, own.why, ("vt", "vs"))
+        return own
     quantity = _quantity(kinds) or quantity_of(unit)
     if "speed" in kinds and "reference" not in kinds:
         return NameReading("speed", Clarity.OWN, _named(kinds["speed"]))
@@ -125,13 +127,6 @@ def _elsewhere(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
                 return NameReading(None, Clarity.NONE, why)
             return NameReading(row.symbol, Clarity.VAGUE, why, (doubt,))
     return NameReading(None, Clarity.NONE, "")
-
-
-def _stabiliser(own: NameReading, kinds: Mapping[str, str]) -> NameReading:
-    """Return the stabiliser's signal, which vs is not where the name speaks of the stator."""
-    if "stator" in kinds and own.why == _named("vs"):
-        return NameReading(None, Clarity.NONE, own.why, ("vt", "vs"))
-    return own
 
 
 def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:

@@ -71,7 +71,7 @@ class Inspection:
     memory: float | None = None
 
     def channel_of(self, signal: str) -> InspectedChannel | None:
-        """Return the channel that seems to be a signal, None without one."""
+        """Find the channel that seems to be a signal, None without one."""
         return next((channel for channel in self.channels if channel.signal == signal), None)
 
     @property
@@ -142,7 +142,7 @@ class Inspection:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Return the figures."""
+        """Give the figures as plain data."""
         sampling = self.sampling
         return {
             "file": str(self.path),
@@ -175,17 +175,18 @@ def inspect(
         RecordError: no column seems to be the time or it cannot be read, fewer than two samples,
             or no column of numbers beside it.
     """
-    place = _find_clock(table, clock, unit)
-    stamps = _stamps(table, place)
+    place, stamps = _clock_of(table, clock, unit)
     sampling, forward = sampling_of(stamps), increasing(stamps)
     columns, unreadable = _columns_of_numbers(table, place, stamps)
     rows = slice(None) if forward.all() else forward
     time, samples = stamps[rows], {name: column[rows] for name, column in columns.items()}
+
     units = {name: _unit(table, name) for name in samples}
     stated = {name: unit for name, (unit, _) in units.items() if unit}
     pmu = pmu_content(samples, stated, table.names)
     plain = samples if pmu is None else pmu.without_phasors(samples)
     groups = tuple(_phase_groups(time, plain, stated))
+
     signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
     found = steps_of_record(time, signals, *_recognised(plain, groups, stated))
     inspected = [
@@ -195,49 +196,47 @@ def inspect(
     channels = identified(inspected, found.steps, groups, {*samples} - {*plain})
     opening = breaker_opening(time, samples, channels)
     return Inspection(
-        table.path,
-        table.sha256,
-        place,
-        sampling,
-        tuple(table.place(row) for row in sampling.backward[:PLACES_LISTED]),
-        tuple(replace(channel, rejected_load=opening is not None) for channel in channels),
-        groups,
-        found.steps,
-        unreadable,
-        time,
-        samples,
-        opening,
-        pmu,
-        _flagged(table, pmu),
+        path=table.path,
+        sha256=table.sha256,
+        clock=place,
+        sampling=sampling,
+        backward_at=tuple(table.place(row) for row in sampling.backward[:PLACES_LISTED]),
+        channels=tuple(replace(channel, rejected_load=opening is not None) for channel in channels),
+        phases=groups,
+        steps=found.steps,
+        unreadable=unreadable,
+        time=time,
+        samples=samples,
+        opening=opening,
+        pmu=pmu,
+        flagged=_flagged(table, pmu),
     )
 
 
-def _find_clock(table: RecordTable, columns: Sequence[str] | None, unit: str | None) -> Clock:
-    """Return the clock of a file; raises RecordError where no column seems to hold the time."""
+def _clock_of(
+    table: RecordTable, columns: Sequence[str] | None, unit: str | None
+) -> tuple[Clock, Array]:
+    """Find the clock of a file and its time (M,) in s, which need not increase."""
     columns = tuple(columns or table.clock)
     if not columns:
         raise RecordError(
             f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
         )
-    return Clock(columns, unit)
-
-
-def _stamps(table: RecordTable, clock: Clock) -> Array:
-    """Return the time (M,) in s, which need not increase."""
-    stamps = table.instants(clock.columns, clock.unit)
+    clock = Clock(columns, unit)
+    stamps = table.instants(columns, unit)
     if len(stamps) < FEWEST_SAMPLES:
         raise RecordError(
             f"{table.path}: {len(stamps)} samples; at least {FEWEST_SAMPLES} are needed"
         )
     check_finite(stamps, clock.label, table.place)
     check_steps(stamps, clock.label, table.place)
-    return stamps
+    return clock, stamps
 
 
 def _columns_of_numbers(
     table: RecordTable, clock: Clock, stamps: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the columns of numbers as long as the time, and why the others are none.
+    """Read the columns of numbers as long as the time, and the faults of the others.
 
     Raises RecordError where there is none.
     """
@@ -262,7 +261,6 @@ def _columns_of_numbers(
 def _numbers(
     table: RecordTable, names: Sequence[str], clock: Clock, stamps: Array
 ) -> dict[str, Array]:
-    """Return columns of numbers; raises RecordError where they are none or unevenly long."""
     columns = table.numbers(names, frozenset(names))
     refuse_uneven(table.path, {clock.columns[0]: stamps, **columns})
     for name, column in columns.items():
@@ -274,7 +272,7 @@ def _numbers(
 
 
 def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
-    """Return the unit of a column and its source."""
+    """Find the unit of a column and its source."""
     stated = table.units.get(name)
     if stated is not None:
         return usual(stated), "file"
@@ -285,7 +283,7 @@ def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
 def _recognised(
     samples: Mapping[str, Array], groups: Sequence[InspectedPhases], units: Mapping[str, str]
 ) -> tuple[list[str], set[str]]:
-    """Return the channels of the reference, and all that are a signal of a test by their names."""
+    """Find the channels of the reference, and all signals of a test, by their names."""
     phases = {name for group in groups for name in group.columns}
     guesses = guess_signals([name for name in samples if name not in phases], units)
     references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
@@ -296,7 +294,7 @@ def _recognised(
 def _phase_groups(
     time: Array, samples: Mapping[str, Array], units: Mapping[str, str]
 ) -> Iterator[InspectedPhases]:
-    """Yield the three-phase voltages among the columns."""
+    """Find the three-phase voltages among the columns."""
     for group in three_phases(tuple(samples), units):
         waves = {mains_frequency(time, samples[name]) is not None for name in group}
         effective = effective_value(samples, group)
@@ -307,7 +305,7 @@ def _phase_groups(
 
 
 def effective_value(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
-    """Return the effective value (M,) of three phases, waveforms or effective values each."""
+    """Effective value (M,) of three phases, waveforms or effective values each."""
     return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
 
 

@@ -130,7 +130,9 @@ def read_record(
     table = file if phasors is None else PhasorTable(file, phasors)
     _check_units(table, channels, per_unit)
     time = _instants(table, clock)
-    columns = _columns(table, clock, channels, missing)
+    names = [name for channel in channels.values() for name in _column_names(channel)]
+    gappy = frozenset(names) - {*clock.columns} if missing else NONE
+    columns = table.numbers(dict.fromkeys(names), gappy)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
     rows = _rows_in_window(path, time, window)
     rows, notes = _without_repeats(table, clock, time, columns, rows, repeats)
@@ -169,20 +171,7 @@ def file_hash(path: Path) -> str:
 
 
 def _column_names(channel: ChannelLike | ThreePhases) -> tuple[str, ...]:
-    """Return the columns that a channel is read from."""
     return channel.columns if isinstance(channel, ThreePhases) else (channel.column,)
-
-
-def _columns(
-    table: RecordTable,
-    clock: Clock,
-    channels: Mapping[str, ChannelLike | ThreePhases],
-    missing: bool,
-) -> dict[str, Array]:
-    """Return the columns (M,) of all channels, nan where a sample may be missing and is."""
-    names = [name for channel in channels.values() for name in _column_names(channel)]
-    gappy = frozenset(names) - {*clock.columns} if missing else NONE
-    return table.numbers(dict.fromkeys(names), gappy)
 
 
 def _within_windows(voltages: Iterable[_PhaseVoltage], rows: Rows) -> Rows:
@@ -322,16 +311,13 @@ def _check_units(
                     what = f"in {unit} as the file says, not in {own}: give {signal} unit: {unit}"
                     raise column_error(table.path, column, what)
             elif signal in per_unit and unit_of(unit) and needs_base(unit):
-                scaling = f"give {signal} {_how_to_scale(unit)}"
-                what = f"in {unit} as the file says, and not per unit: {scaling}"
+                scaling = (
+                    f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
+                    if usual(unit) == PERCENT
+                    else f"unit: {unit} and base: what 1 pu is in {unit}"
+                )
+                what = f"in {unit} as the file says, and not per unit: give {signal} {scaling}"
                 raise column_error(table.path, column, what)
-
-
-def _how_to_scale(unit: str) -> str:
-    """Describe how a case makes numbers of a unit per unit."""
-    if usual(unit) == PERCENT:
-        return f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
-    return f"unit: {unit} and base: what 1 pu is in {unit}"
 
 
 def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Rows:

@@ -123,7 +123,9 @@ def _window(test: DetectedTest, before: float, after: float) -> tuple[float, flo
 
 def _settled(inspection: Inspection) -> list[float]:
     """Find when the response to each step has settled, s; where the next begins at most."""
-    time, response = _response(inspection)
+    present = present_samples(inspection.time, _voltage(inspection))
+    block = max(round(SMOOTHED_OVER / inspection.sampling.step), 1)
+    time, response = block_medians(*present, block)
     ends = [*(step.at for step in inspection.steps[1:]), float(inspection.time[-1])]
     return [
         _settled_at(time, response, step.at, min(end, step.at + LONGEST_RESPONSE))
@@ -146,14 +148,8 @@ def _settled_at(time: Array, response: Array, start: float, end: float) -> float
     return float(t[min(away[-1] + 1, len(t) - 1)]) if len(away) else start
 
 
-def _response(inspection: Inspection) -> tuple[Array, Array]:
-    """Return the instants and the smoothed voltage, or what else shows the steps, (M,) each."""
-    time, samples = present_samples(inspection.time, _voltage(inspection))
-    block = max(round(SMOOTHED_OVER / inspection.sampling.step), 1)
-    return block_medians(time, samples, block)
-
-
 def _voltage(inspection: Inspection) -> Array:
+    """Voltage (M,), or what else shows the steps."""
     channel = inspection.channel_of("vt")
     if channel is not None:
         return inspection.samples[channel.name]

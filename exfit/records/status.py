@@ -1,6 +1,6 @@
 """Flags of a PMU's frames: which rows of a file are no measurements."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,14 +55,8 @@ def bad_rows(table: RecordTable, status: Status) -> tuple[BadRow, ...]:
             if _plain(flag) not in good
         )
     _refuse_ambiguous(table, status, flags)
-    return tuple(_by_convention(flags))
-
-
-def _by_convention(flags: Sequence[str]) -> Iterator[BadRow]:
     why = {flag: _fault(flag) for flag in set(flags)}
-    for row, flag in enumerate(flags):
-        if why[flag]:
-            yield BadRow(row, flag, why[flag])
+    return tuple(BadRow(row, flag, why[flag]) for row, flag in enumerate(flags) if why[flag])
 
 
 def _refuse_ambiguous(table: RecordTable, status: Status, flags: Sequence[str]) -> None:

@@ -96,15 +96,10 @@ def steps_of_record(
         recognised: names of signals of a test.
     """
     own = {name: _steps_of_channel(time, y, name in references) for name, y in signals.items()}
-    if not any(channel.changes for channel in own.values()):
-        for name, channel in own.items():
-            change = _change_from_start(time, signals[name]) if channel.moves_from_start else None
-            if change is not None:
-                own[name] = replace(
-                    channel, changes=(change,), remark="", moves_from_start=False, responds=False
-                )
+    if not _some_step(own):
+        own = {name: _from_start(time, signals[name], channel) for name, channel in own.items()}
     heard = {name: channel for name, channel in own.items() if name in recognised}
-    if not any(channel.changes for channel in heard.values()):
+    if not _some_step(heard):
         heard = own
     combined = combined_steps({name: channel.changes for name, channel in heard.items()})
     responding = {name: signals[name] for name, channel in heard.items() if channel.responds}
@@ -113,6 +108,10 @@ def steps_of_record(
     noises = {name: channel.noise for name, channel in own.items()}
     steps = with_sizes(steps, moving, noises, time)
     return StepsOfRecord(steps, {name: _lasting(name, own[name], steps) for name in own})
+
+
+def _some_step(channels: Mapping[str, ChannelSteps]) -> bool:
+    return any(channel.changes for channel in channels.values())
 
 
 def _lasting(name: str, channel: ChannelSteps, steps: Sequence[RecordedStep]) -> ChannelSteps:
@@ -194,18 +193,20 @@ def _refined(time: Array, samples: Array, coarse: DetectedStep, block: int) -> D
     return replace(coarse, at=fine.at, error=fine.error) if same else coarse
 
 
-def _change_from_start(time: Array, samples: Array) -> DetectedStep | None:
-    """Find the change of a channel that moves from its first sample on and then settles."""
+def _from_start(time: Array, samples: Array, channel: ChannelSteps) -> ChannelSteps:
+    """Give a channel that moves from its first sample on, and then settles, this as its step."""
     y = samples[np.isfinite(samples)]
-    if len(y) < 2 * SAMPLES_AT_REST or mains_frequency(time, samples):
-        return None
+    wave = channel.moves_from_start and mains_frequency(time, samples)
+    if not channel.moves_from_start or wave or len(y) < 2 * SAMPLES_AT_REST:
+        return channel
     end = y[-max(round(END_SHARE * len(y)), SAMPLES_AT_REST) :]
     size = float(np.median(end) - y[0])
     settled = np.ptp(end) < END_SHARE * abs(size)
-    if not settled or abs(size) <= CHANGE_FROM_START * noise_of(y):
-        return None
+    if not settled or abs(size) <= CHANGE_FROM_START * channel.noise:
+        return channel
     error = float(time[1] - time[0])
-    return DetectedStep(float(time[0]), error, size, float(y[0]), from_start=True)
+    change = DetectedStep(float(time[0]), error, size, float(y[0]), from_start=True)
+    return ChannelSteps((change,), noise=channel.noise)
 
 
 # ---- the channels together

@@ -186,7 +186,9 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
                 beside[folder / name] = _temporary(folder)
                 _write_new(beside[folder / name], content.encode())
             for temporary in beside.values():
-                _settle(temporary)
+                with temporary.open("rb+") as file:
+                    # a rename that outlives a power failure has all of the file then
+                    os.fsync(file.fileno())
             faults = [
                 *_removed(folder / name for name in {*obsolete} - {*contents}),
                 *_replaced(beside),
@@ -273,12 +275,6 @@ def _write_and_rename(path: Path, data: bytes) -> None:
 def _write_new(path: Path, data: bytes) -> None:
     with path.open("xb") as file:
         file.write(data)
-
-
-def _settle(path: Path) -> None:
-    """Have a file on the disk itself: a rename that outlives a power failure has all of it then."""
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
 
 
 def _removed(paths: Iterable[Path]) -> list[str]:

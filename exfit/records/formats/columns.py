@@ -62,7 +62,12 @@ class Columns:
         names = [*names]
         self.refuse_larger(names)
         places = positions(self.path, self.names, names)
-        columns = {name: self._numbers(name, at, name in gappy) for name, at in places.items()}
+        columns = {}
+        for name, at in places.items():
+            column = self.fetch(at) if name in gappy else self._whole(name, at)
+            if column.dtype.kind != "f":
+                raise column_error(self.path, name, "timestamps, not numbers")
+            columns[name] = np.asarray(column, np.float64)
         refuse_uneven(self.path, columns)
         return columns
 
@@ -89,12 +94,6 @@ class Columns:
     def place(self, row: int) -> str:
         """Return the place of a sample, counted from 0, as messages name it."""
         return self.where(row)
-
-    def _numbers(self, name: str, at: int, gappy: bool) -> Array:
-        column = self.fetch(at) if gappy else self._whole(name, at)
-        if column.dtype.kind != "f":
-            raise column_error(self.path, name, "timestamps, not numbers")
-        return np.asarray(column, np.float64)
 
     def _whole(self, name: str, at: int) -> NDArray[Any]:
         """Return a column that lacks no sample."""

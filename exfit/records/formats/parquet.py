@@ -47,7 +47,9 @@ def read(path: Path) -> Contents:
     return Contents(
         sha256=sha256,
         names=schema.names,
-        units=_units(schema),
+        units=stated(
+            {field.name: _unit_of(field.metadata or {}) or unit_in(field.name) for field in schema}
+        ),
         lengths=[rows] * len(schema.names),
         fetch=lambda at: _fetch(path, opened, schema.field(at)),
         counted="row",
@@ -62,14 +64,7 @@ def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
         return file.schema_arrow, max(file.metadata.num_rows, rows)
 
 
-def _units(schema: "pa.Schema") -> dict[str, str]:
-    return stated(
-        {field.name: _unit_of(field.metadata or {}) or unit_in(field.name) for field in schema}
-    )
-
-
 def _unit_of(metadata: Mapping[bytes, bytes]) -> str | None:
-    """Return the unit in the metadata of a column."""
     return next(
         (metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), None
     )

@@ -91,18 +91,15 @@ def _one_file(path: Path, memory: float | None) -> ComtradeFiles:
         raise RecordError(f"{path}: the data are before the configuration")
     data = whole[dat.end() :]
     if dat[3] is not None:
-        data = _cut(path, data, int(dat[3]))
+        size = int(dat[3])
+        if len(data) < size:
+            raise RecordError(f"{path}: {len(data)} of {size} bytes of data: it is cut off")
+        data = data[:size]
     text = _decoded(path, whole[cfg.end() : min(ends)])
     first_line = whole.count(b"\n", 0, cfg.end()) + 1
     return ComtradeFiles(
         path, path, text, first_line, path, data, hashlib.sha256(whole).hexdigest(), limit
     )
-
-
-def _cut(path: Path, data: bytes, size: int) -> bytes:
-    if len(data) < size:
-        raise RecordError(f"{path}: {len(data)} of {size} bytes of data: it is cut off")
-    return data[:size]
 
 
 def _decoded(path: Path, text: bytes) -> str:
