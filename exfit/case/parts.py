@@ -314,14 +314,16 @@ def _places(section: str, fixed: str) -> tuple[Place, Place, Place]:
 
 
 def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Model | None:
-    from exfit.models.speed_multiplier import times_speed
-
     name = data.get("model")
     if not isinstance(name, str) or not name:
         return None
     try:
         model = find(name, folder, sha256)
-        return times_speed(model) if data.get("efd_times_speed") is True else model
+        if data.get("efd_times_speed") is not True:
+            return model
+        from exfit.models.speed_multiplier import times_speed
+
+        return times_speed(model)
     except ModelError as error:
         faults.append(Fault(("model",), str(error)))
         return None

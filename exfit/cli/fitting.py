@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from exfit.cli.live_fit import fit_again_and_again, fit_live
 from exfit.cli.options import (
     NOT_CONVERGED,
     Given,
@@ -17,7 +16,6 @@ from exfit.cli.options import (
     print_json,
     set_option,
 )
-from exfit.cli.several_fits import fit_several
 from exfit.cli.streams import echo
 from exfit.registry import parts
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
@@ -84,6 +82,8 @@ def fit(
     --parameters changes, and shows the former values beside the new ones; a case with a fault
     waits for the next change. Ctrl-C ends that with exit code 0.
     """
+    from exfit.cli.live_fit import fit_again_and_again, fit_live
+    from exfit.cli.several_fits import fit_several
     from exfit.show import run_folder
 
     given = Given(parameters, changes)

@@ -69,10 +69,10 @@ def with_filter(record: Record, filter: Filter | None) -> Record:
 
     Raises RecordError where it cannot be filtered.
     """
-    from exfit.dsp.filtering import Filtering
-
     if filter is None:
         return record
+    from exfit.dsp.filtering import Filtering
+
     signals = {}
     for signal, samples in record.signals.items():
         there = np.isfinite(samples)

@@ -7,6 +7,7 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, start_value
 from exfit.errors import RecordError
 from exfit.plants import DRIVING_SCALE, VT0
+from exfit.plants.parts import initial
 from exfit.records.record import Record
 from exfit.util.text import show
 
@@ -17,8 +18,6 @@ POSSIBLE_VOLTAGES = (0.1, 2.0)  # pu: voltages beyond are those of another unit 
 
 def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     """Parameters that a record gives: the levels of its signals at the start."""
-    from exfit.plants.playback import initial
-
     kind, vt0 = case.kind, initial_voltage(test, record)
     if kind.per_unit and (kind.has_machine or not kind.levels):
         _refuse_impossible(vt0, record)

@@ -193,10 +193,10 @@ def clock_of(time: Time) -> Clock:
 
 def phasors_of(section: PhasorsSection | None) -> "Phasors | None":
     """Return the phasors of a record, None without any."""
-    from exfit.records.phasors import Phasors
-
     if section is None:
         return None
+    from exfit.records.phasors import Phasors
+
     current = None if section.current is None else _phasor(section.current)
     return Phasors(_phasor(section.voltage), current, section.kV, section.MVA)
 
@@ -210,10 +210,10 @@ def _phasor(section: VoltagePhasor | CurrentPhasor) -> "Phasor":
 
 def status_of(section: StatusSection | None) -> "Status | None":
     """Return the flags of a record, None without any."""
-    from exfit.records.status import Status
-
     if section is None:
         return None
+    from exfit.records.status import Status
+
     return Status(section.column, tuple(map(str, section.accept)))
 
 

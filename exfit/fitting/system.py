@@ -156,7 +156,8 @@ def _record_files(case: Case) -> dict[str, RecordFile]:
 @cache
 def driven_by(exciter: Model, saturation: SaturationForm) -> frozenset[str]:
     """Return the signals of its plant that reach an exciter."""
-    from exfit.plants.playback import DRIVING, initial, playback
+    from exfit.plants.parts import initial
+    from exfit.plants.playback import DRIVING, playback
 
     used = parameters_used(playback(exciter, saturation, DRIVING), ("efd",))
     return frozenset(signal for signal in DRIVING if initial(signal) in used)

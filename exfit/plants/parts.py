@@ -47,6 +47,11 @@ class Names(SimpleNamespace):
         raise ModelError(f"the model uses {name}, which its file does not declare")
 
 
+def initial(signal: str) -> str:
+    """Return the parameter that holds a recorded signal's level at the start."""
+    return f"{signal}0"
+
+
 def exciter_inputs(**given: Signal) -> Names:
     """Inputs of an exciter, per unit: one that is not given does not act.
 

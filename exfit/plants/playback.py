@@ -20,6 +20,7 @@ from exfit.plants.parts import (
     SaturationForm,
     exciter_inputs,
     exciter_parameters,
+    initial,
     motion,
     refuse_taken,
     rest_of,
@@ -33,11 +34,6 @@ EFD0, VREF0 = "efd0", "vref0"
 DRIVING = ("vt", "ifd", "p", "q", "speed")  # what may drive an exciter
 NEWTON_STEPS = 6  # to the efd that a reference holds; each costs two rests
 DIFFERENCE = 1e-6  # pu of efd, for its slope
-
-
-def initial(signal: str) -> str:
-    """Name the parameter of a recorded signal's level at the start."""
-    return f"{signal}0"
 
 
 def held_by(vref: Signal, efd: Signal, reference: Callable[[Signal], Signal]) -> Signal:

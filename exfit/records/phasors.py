@@ -14,14 +14,10 @@ from exfit.errors import RecordError
 from exfit.records.angles import AngleError, in_radians, unwrapped
 from exfit.records.formats.table import NONE, Array, RecordTable, column_error
 from exfit.records.units import alike, scale_between
-from exfit.signals import OF_CURRENT_PHASOR
+from exfit.signals import OF_CURRENT_PHASOR, OF_PHASORS, OF_VOLTAGE_PHASOR, PHASOR_COLUMNS
 
 Complex = NDArray[np.complex128]
 
-PREFIX = "phasors."
-OF_VOLTAGE = ("vt", "angle")
-OF_POWER = OF_CURRENT_PHASOR
-SIGNALS_OF_PHASORS = (*OF_VOLTAGE, *OF_POWER)
 TURN = np.exp(2j * np.pi / 3.0)  # by which phase a leads phase b
 
 
@@ -55,8 +51,8 @@ class Phasors(NamedTuple):
     @property
     def names(self) -> tuple[str, ...]:
         """The columns that are computed."""
-        signals = OF_VOLTAGE if self.current is None else SIGNALS_OF_PHASORS
-        return tuple(PREFIX + signal for signal in signals)
+        signals = OF_VOLTAGE_PHASOR if self.current is None else OF_PHASORS
+        return tuple(PHASOR_COLUMNS + signal for signal in signals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +122,14 @@ class PhasorTable:
             gappy = frozenset([angle]) if may_lack else NONE
             signals["angle"] = in_radians(self.table.numbers([angle], gappy)[angle], unit)
         current = self.phasors.current
-        if current is not None and any(name.removeprefix(PREFIX) in OF_POWER for name in names):
+        if current is not None and any(
+            name.removeprefix(PHASOR_COLUMNS) in OF_CURRENT_PHASOR for name in names
+        ):
             amperes = self._positive_sequence(current, may_lack)
             power = voltage * np.conj(amperes)
             of_power = (power.real, power.imag, np.abs(amperes))
-            signals |= dict(zip(OF_POWER, of_power, strict=True))
-        return {name: np.asarray(signals[name.removeprefix(PREFIX)]) for name in names}
+            signals |= dict(zip(OF_CURRENT_PHASOR, of_power, strict=True))
+        return {name: np.asarray(signals[name.removeprefix(PHASOR_COLUMNS)]) for name in names}
 
     def _positive_sequence(self, phasor: Phasor, may_lack: bool) -> Complex:
         """Return the positive sequence (M,) of a phasor, per unit of the ratings."""

@@ -27,7 +27,7 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import driving_after_opening
 from exfit.inference.confidence import Interval
 from exfit.plants import NETWORK, REFERENCES
-from exfit.plants.playback import initial
+from exfit.plants.parts import initial
 from exfit.records.reading import file_hash
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison

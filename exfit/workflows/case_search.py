@@ -23,7 +23,6 @@ from exfit.fitting.channel_weights import (
 from exfit.fitting.descents import Announce, Judge
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
-from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
@@ -126,6 +125,8 @@ def lines(state: SearchState) -> SearchState:
     Before that search nothing tells them from a response. Raises KeyboardInterrupt where an
     interruption ends it.
     """
+    from exfit.fitting.nuisances.found_lines import with_found_lines
+
     if not any(setup.automatic_sines for setup in state.setups):
         return state
     first = in_turn((*WEIGHTED, samples_at_steps), replace(state, announce=_ignore))

@@ -12,7 +12,6 @@ from exfit.case.saturation import MEANINGS
 from exfit.case.schema import SINGLE
 from exfit.fitting.channel_weights import balanced, weight_notes
 from exfit.fitting.descents import descent_near
-from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.parameters import FreeParameter, scaled_values
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.program import Program
@@ -273,6 +272,8 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
     periodic disturbance that stands out of what is left then. The test has sub-steps enough, and
     bounds within which the record allows the instants. Raises KeyboardInterrupt at an interruption.
     """
+    from exfit.fitting.nuisances.found_lines import with_found_lines
+
     fine, held = setup.with_enough_substeps(values), frozenset[str]()
     if not case.has_no_equations:  # whose every response is a run
         fine, held = with_shown_instants(fine, values), instants_of(fine)

@@ -15,7 +15,8 @@ from exfit.models.speed_multiplier import times_speed
 from exfit.plants import NETWORK
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.open_circuit import open_circuit
-from exfit.plants.playback import initial, playback
+from exfit.plants.parts import initial
+from exfit.plants.playback import playback
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 

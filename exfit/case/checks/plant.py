@@ -72,8 +72,6 @@ def stabiliser_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> It
 
 def governor_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
     """Yield a governor that does not act, or does not hold the power at the start."""
-    from exfit.plants.controls import rests_at
-
     section = content.at("governor")
     tests = (content, *content.at("records").entries, *content.at("validate").entries)
     if not section.content:
@@ -85,6 +83,8 @@ def governor_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iter
     yield from _idle_faults(section, content, kind, "governor")
     if parts.governor is None:
         return
+    from exfit.plants.controls import rests_at
+
     values = _start_values(section, parts.governor)
     plants = (content.at("plant"), *(test.at("plant") for test in tests[1:]))
     for power in dict.fromkeys(plant.at("network", "P").number for plant in plants):

@@ -7,7 +7,7 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import LIMITER_KINDS, REFERENCES, PlantKind
 from exfit.records.units import alike, base_of_own, needs_base, quantity_of
-from exfit.signals import OF_EVENT, SIGNALS
+from exfit.signals import OF_CURRENT_PHASOR, OF_EVENT, OF_PHASORS, PHASOR_COLUMNS, SIGNALS
 from exfit.util.file_names import taken_names
 from exfit.util.text import show
 
@@ -277,20 +277,18 @@ def _rating_faults(phasors: ContentNode) -> Iterator[Fault]:
 
 def _column_faults(record: ContentNode) -> Iterator[Fault]:
     """Yield the channels of computed columns that the phasors do not give."""
-    from exfit.records.phasors import OF_POWER, PREFIX, SIGNALS_OF_PHASORS
-
     for _, channel in record.at("channels").sections:
         name = channel.text if channel.text is not None else channel.at("column").text
-        if name is None or not name.startswith(PREFIX):
+        if name is None or not name.startswith(PHASOR_COLUMNS):
             continue
         place = channel if channel.text is not None else channel.at("column")
-        signal = name.removeprefix(PREFIX)
+        signal = name.removeprefix(PHASOR_COLUMNS)
         if "phasors" not in record:
             yield place.fault(f"{name}: record.phasors is missing, of which it is computed")
-        elif signal not in SIGNALS_OF_PHASORS:
-            names = ", ".join(PREFIX + signal for signal in SIGNALS_OF_PHASORS)
+        elif signal not in OF_PHASORS:
+            names = ", ".join(PHASOR_COLUMNS + signal for signal in OF_PHASORS)
             yield place.fault(f"{name} is not computed of phasors, only {names}")
-        elif signal in OF_POWER and "current" not in record.at("phasors"):
+        elif signal in OF_CURRENT_PHASOR and "current" not in record.at("phasors"):
             yield place.fault(f"{name} needs record.phasors.current, which is missing")
 
 

@@ -16,6 +16,7 @@ from exfit.plants.parts import (
     NETWORK,
     VT0,
     Names,
+    initial,
     motion,
     named_parameters,
     refuse_taken,
@@ -23,7 +24,6 @@ from exfit.plants.parts import (
     values_named,
 )
 from exfit.plants.plant import REFERENCES, Equipment, PlantKind, PowerAt, present
-from exfit.plants.playback import initial
 from exfit.plants.unit import (
     ROTOR,
     Controls,

@@ -33,7 +33,7 @@ from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.whitening import CarriedNoise, whitening
 from exfit.inference.wording import digits, listed
-from exfit.plants.playback import initial
+from exfit.plants.parts import initial
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
 

@@ -9,10 +9,9 @@ from exfit.case.draft.suggestion import channel_entry, record_of, rounded
 from exfit.case.open_values import QUESTION
 from exfit.records.angles import unit_by_range
 from exfit.records.inspection import Inspection
-from exfit.records.phasors import OF_POWER, PREFIX
 from exfit.records.pmu_recognition import InspectedPhasor, PmuContent
 from exfit.records.units import quantity_of, scale_between
-from exfit.signals import COMPARED_IN_EVENT, SIGNALS
+from exfit.signals import COMPARED_IN_EVENT, OF_CURRENT_PHASOR, PHASOR_COLUMNS, SIGNALS
 
 RATED_FREQUENCIES = (50.0, 60.0)  # Hz
 NEAR_RATED = 1.0  # Hz: a grid is closer to its rated frequency
@@ -113,7 +112,7 @@ def _connection(voltage: InspectedPhasor, kv: Base | None) -> Section:
 
 def _driving(inspection: Inspection, pmu: PmuContent) -> Section:
     """Suggest the channels that drive the unit, of phasors."""
-    section: Section = {"vt": f"{PREFIX}vt", "angle": f"{PREFIX}angle"}
+    section: Section = {"vt": f"{PHASOR_COLUMNS}vt", "angle": f"{PHASOR_COLUMNS}angle"}
     if pmu.frequency is not None:
         named = (each.unit for each in inspection.channels if each.name == pmu.frequency)
         entry = {"column": pmu.frequency, "unit": next(named, None) or QUESTION}
@@ -147,14 +146,14 @@ def _compared(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
     for signal in COMPARED_IN_EVENT:
         channel = inspection.channel_of(signal)
         known = channel is not None and (
-            signal not in OF_POWER
+            signal not in OF_CURRENT_PHASOR
             or inspection.pmu is None
             or quantity_of(channel.unit) == SIGNALS[signal].quantity
         )
         if channel is not None and known:
             section[signal] = channel_entry(channel, bases.get(signal))
-        elif signal in OF_POWER and has_current:
-            section[signal] = f"{PREFIX}{signal}"
-        elif signal in OF_POWER:
+        elif signal in OF_CURRENT_PHASOR and has_current:
+            section[signal] = f"{PHASOR_COLUMNS}{signal}"
+        elif signal in OF_CURRENT_PHASOR:
             section[signal] = {"column": QUESTION, "unit": QUESTION, "base": QUESTION}
     return section

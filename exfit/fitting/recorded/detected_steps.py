@@ -109,10 +109,6 @@ def _lowest(value: float | Unknown) -> float:
 
 def _bounded(place: str, step: FindableStep, record: Record, limit: float | None) -> FindableStep:
     """Return a step of the reference, with numbers where it says auto; ``limit``: of outliers."""
-    from exfit.dsp.filtering import outliers
-    from exfit.dsp.step_detection import find_step
-    from exfit.records.steps import bounds_about, bounds_of_instant
-
     auto = [
         key
         for key in ("at", "step")
@@ -120,6 +116,10 @@ def _bounded(place: str, step: FindableStep, record: Record, limit: float | None
     ]
     if not auto:
         return step
+    from exfit.dsp.filtering import outliers
+    from exfit.dsp.step_detection import find_step
+    from exfit.records.steps import bounds_about, bounds_of_instant
+
     vt = record.signals["vt"]
     kept = np.isfinite(vt)
     try:

@@ -13,7 +13,6 @@ from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.model import Minima, Minimum
-from exfit.results.search_summary import multiple
 from exfit.util.text import rounded_value
 
 Values = Mapping[str, float]
@@ -186,6 +185,8 @@ def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
 
 def times(cost: float, other: float) -> str:
     """Return a cost in words, as a multiple of another one."""
+    from exfit.results.search_summary import multiple
+
     return multiple(cost / other) if other > 0.0 else f"{cost:.3g} pu² above"
 
 

@@ -15,8 +15,6 @@ from exfit.dsp.sampling import present_samples
 from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import MACHINE
-from exfit.records.contradictions import LARGEST_STEP, size_in_words
-from exfit.records.ripple import ripple_at_rest
 from exfit.registry import parts
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Overlay
@@ -44,6 +42,8 @@ def case_warnings(case: Case) -> Iterator[str]:
 
 
 def _large_steps(recording: Recording) -> Iterator[str]:
+    from exfit.records.contradictions import LARGEST_STEP, size_in_words
+
     for k, event in enumerate(recording.test.events("vref")):
         size = start_value(event.step)
         if size is not None and abs(size) > LARGEST_STEP:
@@ -174,6 +174,8 @@ def _farthest(moves: Array) -> float:
 
 def _ripples(recording: Recording, setup: ExperimentSetup) -> Iterator[str]:
     """Yield the lines of channels at rest that the case does nothing about."""
+    from exfit.records.ripple import ripple_at_rest
+
     time, instants = setup.record.time, setup.test.instants
     if not instants:
         return

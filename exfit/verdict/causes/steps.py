@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.step_detection import first_step
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance
@@ -152,6 +151,8 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
 
 def _detected_delay(record: FittedRecord) -> float:
     """Delay (s) of the step in the record after that in the response, 0 if unknown."""
+    from exfit.dsp.step_detection import first_step
+
     overlays, time = record.comparison.overlays, record.comparison.time
     overlay = overlays.get("vt") or next(iter(overlays.values()))
     kept = np.isfinite(overlay.error)
