@@ -78,3 +78,8 @@ def test_without_features_the_core_fits_simulates_and_validates(tmp_path):
     event = run(MAIN, tmp_path, "validate", EVENT, "--as-found", "--no-plots")
     assert event.returncode == 1
     assert "grid-playback: this installation of exfit has no such plant" in event.stderr
+    programme = tmp_path / "programme.yaml"
+    programme.write_text(Path(CASE).read_text("utf-8") + "\ntests: [{name: up}]\n", "utf-8")
+    refused = run(MAIN, tmp_path, "simulate", str(programme), "--no-plots")
+    assert refused.returncode == 1
+    assert "tests: unknown key" in refused.stderr
