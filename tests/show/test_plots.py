@@ -11,6 +11,7 @@ from tiers import few_of
 from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.results.played_records import LeftOut, PlayedRecord, driving_signals
+from exfit.results.verdict import GOOD, Verdict
 from exfit.show import figures as plots
 from exfit.simulation.simulator import Response
 from exfit.util.strategies import PHASES
@@ -125,6 +126,7 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
         validation=(),
         versions={},
         inputs={},
+        verdict=Verdict(GOOD),
     )
 
 
