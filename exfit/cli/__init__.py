@@ -99,7 +99,7 @@ class Commands(click.Group):
 
 
 def _of_system(fault: OSError) -> str:
-    """Return what the system refuses: a name that is too long, a folder that may not be read.
+    """Describe a refusal of the system: a name that is too long, a folder that may not be read.
 
     Raises the fault again where it has nothing to do with a file that somebody named.
     """

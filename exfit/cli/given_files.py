@@ -92,7 +92,7 @@ class ParameterFile(GivenFile):
 
 
 def _fit_first(case: Path, command: str) -> str:
-    """Return what makes the result of a case that a command takes."""
+    """Describe the way to a result of a case, for a command that takes one."""
     folder = Path("runs") / f"{case.stem}-fit"
     if (folder / RESULT).is_file():
         return f"{command} {folder} takes that of its fit"
@@ -113,7 +113,7 @@ def _meant(path: Path) -> Path | None:
 
 
 def _kind_of(path: Path) -> Kind | None:
-    """Return what a file certainly is, None where that is not certain."""
+    """Recognise a file; None where that is not certain."""
     suffix = path.suffix.lower()
     if path.is_dir():
         return Kind.RESULT if (path / RESULT).is_file() else None

@@ -70,7 +70,7 @@ def unfailing_output() -> Iterator[Callable[[Any], Any]]:
 
 
 def output_is_lost() -> bool:
-    """Return whether nobody sees any more what is written to standard output."""
+    """Tell whether standard output has no reader any more."""
     return _fault_of(sys.stdout) is not None
 
 
@@ -106,6 +106,6 @@ def _unfailing(stream: TextIO | None) -> TextIO:
 
 
 def _fault_of(stream: TextIO) -> OSError | None:
-    """Return why what is written to a stream is lost."""
+    """Name the reason for which a stream loses its text."""
     outlet = getattr(getattr(stream, "buffer", None), "raw", None)
     return outlet.fault if isinstance(outlet, Outlet) else None

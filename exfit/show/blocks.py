@@ -193,12 +193,12 @@ def remarks(
 
 
 def notes(texts: Iterable[str]) -> Iterator[Note]:
-    """Yield what must be known beside the numbers."""
+    """Yield notes on the numbers."""
     return remarks("note:", texts, kind="warning")
 
 
 def unresolved(texts: Iterable[str]) -> Iterator[Note]:
-    """Yield what the records do not determine."""
+    """Yield notes on parameters that the records do not determine."""
     return remarks("unresolved:", texts, kind="warning")
 
 

@@ -7,7 +7,7 @@ from exfit.workflows.model_check import STEPS, Check
 
 
 def check(result: Check) -> Iterator[Block]:
-    """Yield what a check shows of a case."""
+    """Yield the result of a check."""
     if result.has_equations:
         yield from _equations(result)
     else:
@@ -23,7 +23,7 @@ def check(result: Check) -> Iterator[Block]:
 
 
 def _equations(result: Check) -> Iterator[Block]:
-    """Yield what a check shows of the equations: derivatives, a flat run, sub-steps."""
+    """Yield the checks of the equations: derivatives, a flat run, sub-steps."""
     if result.deviations:
         heads = [*(f"{step:.0e}" for step in STEPS), "best"]
         yield Table(

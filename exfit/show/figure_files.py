@@ -116,7 +116,7 @@ def _encoded(figure: PlannedFigure, pool: "ThreadPoolExecutor") -> "Future[bytes
 
 
 def _version_of(path: Path) -> Version:
-    """Return what changes when a file is replaced."""
+    """Identify a file: this changes when it is replaced."""
     try:
         state = path.stat()
     except OSError:

@@ -39,7 +39,7 @@ MARKS: dict[str, Mark] = {GOOD: "ok", MATCHES: "doubt"}  # of verdicts; the othe
 def briefs(
     result: FitResult, folder: Path | None = None, before: FitResult | None = None
 ) -> Iterator[list[Block]]:
-    """Yield what is first read of a fit, and of its files in a folder, each time in fewer lines.
+    """Yield the result of a fit in brief, with the folder of its files, each time in fewer lines.
 
     Left out are the values of records, then causes from the last one on, then validations that
     are accepted.
@@ -142,7 +142,7 @@ def verdict(result: FitResult) -> Note:
 
 
 def _causes(result: FitResult) -> Iterator[Note]:
-    """Yield why a fit may be as it is, each with what to do."""
+    """Yield the likeliest causes, each with its remedy."""
     label = "note:" if result.verdict.verdict == GOOD else "cause:"
     yield from remarks(label, (cause.sentence for cause in result.verdict.causes), kind="remedy")
 
@@ -198,7 +198,7 @@ def fitted_table(
 
 
 def remarks_on(parameter: FittedParameter) -> Iterator[str]:
-    """Yield what must be seen beside a value."""
+    """Yield the remarks on a value."""
     if parameter.at_bound:
         yield f"on its {parameter.at_bound}"
     if not parameter.physical:

@@ -15,7 +15,7 @@ MORE = "... and {:,} more in inspect.json"
 
 
 def inspection(result: Inspection, record: Sequence[str]) -> Iterator[Block]:
-    """Yield what a file holds, and the sections of a case that it suggests."""
+    """Yield the content of a file, and the sections of a case that it suggests."""
     clock = " and ".join(result.clock.columns)
     yield paragraph(
         f"{result.path.name}: {len(result.time)} samples by {clock}, "
@@ -116,7 +116,7 @@ def _some(texts: Sequence[str]) -> str:
 
 
 def _signals(channels: Sequence[InspectedChannel]) -> Iterator[str]:
-    """Yield which signal each channel is taken for, how surely and why, and which are none."""
+    """Name the signal of each channel, with the reason, and the channels without one."""
     for channel in channels:
         if channel.signal:
             surely = "sure" if channel.sure else "a guess"

@@ -174,7 +174,7 @@ def _phase_ends(result: "FitResult") -> PlannedFigures:
 
 
 def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> PlannedFigures:
-    """Return what each parameter does to each signal over time, and how they are correlated."""
+    """Plan the figures of the sensitivities over time and of the correlations."""
     from exfit.show import figures as plots
 
     return {
@@ -340,7 +340,7 @@ def _remember(case: Path, parameters: str) -> None:
 
 
 def _last_parameters(case: Path) -> Path | None:
-    """Return where the parameters of a case's last fit are kept; None where no place is.
+    """Find the file for the parameters of a case's last fit; None where no place is.
 
     A copy beside the compiled code: a folder of results may be written over by another case.
     """

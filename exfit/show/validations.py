@@ -24,7 +24,7 @@ FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interv
 
 
 def comparisons(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
-    """Yield how well each record is met, side by side, and its step measured beside simulated."""
+    """Yield the match of each record, side by side, and its step measured beside simulated."""
     if all_of_them:
         yield _errors(all_of_them)
     yield from played(all_of_them)
@@ -37,7 +37,7 @@ def comparisons(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
 
 
 def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
-    """Yield what of records was played in, and how the signals that are compared depart."""
+    """Yield the signals that were played in, and the errors of those that are compared."""
     events = [match for match in all_of_them if match.played is not None]
     rows: list[tuple[Cell, ...]] = []
     for match in events:
@@ -69,7 +69,7 @@ def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
 
 
 def rejections(all_of_them: Iterable[Comparison]) -> Iterator[Note]:
-    """Yield which records that were not fitted the response does not hold on, and why."""
+    """Yield the reason for each validation that is not accepted."""
     return remarks("not accepted:", (match.reason for match in all_of_them), "bad")
 
 
@@ -82,7 +82,7 @@ def in_a_line(match: Comparison) -> Note:
 
 
 def validation(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
-    """Yield what is not accepted, which records were fitted, and each match."""
+    """Yield the rejections, the fitted records, and the match of each."""
     yield from rejections(all_of_them)
     for role, chosen in (("fitted, not judged:", False), ("validated:", True)):
         records = [f"{m.name} ({m.record})" for m in all_of_them if m.validation is chosen]
@@ -132,7 +132,7 @@ def _features(matches: Sequence[Comparison]) -> Table:
 
 
 def _without(matches: Iterable[Comparison]) -> Iterator[str]:
-    """Yield which lines features of records are read without, and which features are missing."""
+    """Name the lines that features are read without, and the features that are missing."""
     measured = {match.name: match.features.measured for match in matches}
     for name, features in measured.items():
         if features is not None and features.removed:

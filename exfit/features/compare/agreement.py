@@ -110,7 +110,7 @@ def compare(
     align: bool = False,
     step_at: float | None = None,
 ) -> Agreement:
-    """Return how responses, and a record, differ.
+    """Compare responses, with each other and with a record.
 
     Each is the folder or the result.json of a run, or a file of any kind that records have. The
     signals that the first shares with others are compared over the time that all cover, on the

@@ -11,7 +11,7 @@ from exfit.util.text import percentage, rounded
 
 
 def agreement(result: Agreement) -> Iterator[Block]:
-    """Yield how responses and a record differ, features of their step, and what was fitted."""
+    """Yield the differences of responses and a record, features of their step, fitted values."""
     yield _curves(result)
     yield _differences(result)
     yield _matches(result)

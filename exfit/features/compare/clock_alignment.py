@@ -109,7 +109,7 @@ def _matched(reference: Curve, curve: Curve, signal: str, offset: float, within:
 
 
 def _from_reference(reference: Curve, curve: Curve, signal: str) -> Difference:
-    """Return how a curve differs from the reference."""
+    """Subtract the reference from a curve."""
     pair = [curve, reference] if reference.measured else [reference, curve]
     (difference,) = differences(pair, [signal])
     return difference

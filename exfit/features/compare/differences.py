@@ -108,7 +108,7 @@ class Difference:
 
 
 def differences(curves: Sequence[Curve], signals: Sequence[str]) -> list[Difference]:
-    """Return how responses differ from the first, then from the record where there is one.
+    """Subtract the first from the other responses, then the record where there is one.
 
     The first are on the finest of their clocks over the time that all responses cover, the others
     at the instants of the record in that time. Not all curves need to have all of the signals.
@@ -145,7 +145,7 @@ def _refuse_apart(time: Array, curves: Sequence[Curve]) -> None:
 def _from(
     first: Curve, others: Sequence[Curve], signals: Sequence[str], time: Array
 ) -> Iterator[Difference]:
-    """Yield how the signals of others differ from those of the first at some instants."""
+    """Yield the differences of others from the first at some instants."""
     for second in others:
         for signal in signals:
             if signal in first.signals and signal in second.signals:
@@ -187,6 +187,6 @@ def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
 
 
 def _durations(time: Array) -> Array:
-    """Return how long each instant (M,) stands for: half the way to its neighbours, s."""
+    """Weigh each instant (M,) by the time it stands for: half the way to its neighbours, s."""
     steps = np.diff(time)
     return np.asarray(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))

@@ -53,7 +53,7 @@ def agreement(compared: "Agreement") -> Figure:
 
 
 def _looks(names: list[str]) -> dict[str, dict[str, Any]]:
-    """Return how each response is drawn, by its name: of many the later are the narrower."""
+    """Choose the line of each response, by its name: of many the later are the narrower."""
     others = [color for color in COLORS if color not in TAKEN]
     lines = OF_TWO + tuple((color, STYLES[k % len(STYLES)]) for k, color in enumerate(others))
     widths = [WIDTHS[-1]] * len(OF_TWO) if len(names) <= len(OF_TWO) else WIDTHS

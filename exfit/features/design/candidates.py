@@ -100,7 +100,7 @@ class Bench:
         return self.base.parameters(self.problem.values(self.problem.start))
 
     def information(self, moves: Moves, duration: float) -> Array | None:
-        """Return that of each candidate channel (C, N, N), None for a test beyond a limit."""
+        """Compute the information of each candidate channel (C, N, N), None beyond a limit."""
         key = (moves, duration)
         if key not in self.tried:
             self.tried[key] = self._information(moves, duration)
@@ -129,7 +129,7 @@ class Bench:
         return np.asarray(np.einsum("cmi,cmj->cij", blocks, blocks))
 
     def covariance(self, moves: Moves, signals: Sequence[str], duration: float) -> Array | None:
-        """Return that of all relative errors (N, N), None where they are not determined."""
+        """Compute the covariance of all relative errors (N, N), None where it has no bound."""
         information = self.information(moves, duration)
         if information is None:
             return None

@@ -32,7 +32,7 @@ LOCAL = (
 
 
 def designed_test(design: DesignedTest) -> Iterator[Block]:
-    """Yield what each addition brings, then the sheet of the best test."""
+    """Yield the gain of each addition, then the sheet of the best test."""
     noise = ", ".join(
         f"{signal}{NO_BREAK}{design.noise[signal]:.2g}" for signal in design.best.channels
     )
@@ -64,7 +64,7 @@ def designed_test(design: DesignedTest) -> Iterator[Block]:
 
 
 def design(result: Design) -> Iterator[Block]:
-    """Yield how well planned tests would determine each parameter: standard errors in percent."""
+    """Yield the standard errors of each parameter in planned tests, in percent."""
     listed = ", ".join(f"{signal}{NO_BREAK}{level:.2g}" for signal, level in result.noise.items())
     yield paragraph(f"expected standard errors, with noise (pu): {listed}")
     others = "; of steps of 2, 5, 10 %; twice as long; with further signals"

@@ -217,7 +217,7 @@ def _checked_run(case: Case, bench: Bench, moves: Moves, duration: float) -> Run
 
 
 def _at_other_values(bench: Bench, best: Stage, moves: Moves, single: Moves) -> OtherValues:
-    """Return what becomes of a test, and of the single step, where parameters are others."""
+    """Assess a test, and the single step, with other values of the parameters."""
     extremes: dict[str, tuple[float, float]] = {}
     ratios: dict[str, float | None] = dict.fromkeys(bench.names, 0.0)
     for other in _benches_beside(bench):
@@ -254,7 +254,7 @@ def _bench(
     criterion: str,
     noise: Mapping[str, float],
 ) -> Bench:
-    """Return what all candidates share; raises CaseError for what the case does not have."""
+    """Prepare the basis of all candidates; raises CaseError for what the case does not have."""
     _refuse(case, of, channels, criterion)
     free = free_parameters(case)
     setups = build_experiments(case) if case.recordings else ()

@@ -49,7 +49,7 @@ def best_moves(
 
 
 def gains(before: float, after: float) -> bool:
-    """Return whether a criterion is so much smaller that an addition is worth it."""
+    """Tell whether a criterion is so much smaller that an addition is worth it."""
     return after <= (1.0 - LEAST_GAIN) * before
 
 

@@ -77,7 +77,7 @@ class Design:
 
 
 def identify(case: Case, noise: Mapping[str, float]) -> Design:
-    """Return how well tests would determine the free parameters of a case, at their start values.
+    """Predict the standard errors of a case's free parameters in tests, at their start values.
 
     The case's own test comes first, on the clock of its record if it has one; beside it steps of
     2, 5 and 10 %, a test twice as long, and further signals. ``noise`` is that of signals, per
@@ -123,7 +123,7 @@ def _uncertainty_after(
     levels: Sequence[Mapping[str, float]],
     records: tuple[str, ...],
 ) -> UncertaintyAnalysis:
-    """Return how well experiments with these levels of noise would determine what is free.
+    """Predict the standard errors of experiments with these levels of noise.
 
     ``records`` names what is found about the records themselves.
     """
@@ -169,7 +169,7 @@ def _steps(experiments: Sequence[Experiment]) -> dict[str, float]:
 def _with_steps(
     free: Sequence[FreeParameter], experiments: Sequence[Experiment]
 ) -> list[FreeParameter]:
-    """Return what is free, with the sizes of the tests' steps to start from."""
+    """List the free parameters, with the sizes of the tests' steps to start from."""
     sizes = _steps(experiments)
     return [
         replace(parameter, start=sizes.get(parameter.name, parameter.start)) for parameter in free
@@ -270,7 +270,7 @@ def _scaled(experiment: Experiment, size: float) -> Experiment:
 
 
 def _largest_move(simulator: Simulator) -> float | None:
-    """Return by how much a test moves the reference, pu; None where it does not."""
+    """Find the size of a test's step of the reference, pu; None where it has none."""
     inputs = simulator.inputs
     if "vref" in inputs.recorded:
         grid = grid_segments(inputs, simulator.step)

@@ -52,7 +52,7 @@ def _figure(design: DesignedTest) -> PlannedFigures:
 
 
 def sheet_text(design: DesignedTest) -> str:
-    """Return what the people at the plant must do, record and watch."""
+    """Write the sheet for the people at the plant: steps, channels, limits."""
     return "\n".join([f"Test sheet: {design.name}", "", *sheet_lines(design), ""])
 
 
@@ -82,7 +82,7 @@ def sheet_lines(design: DesignedTest) -> Iterator[str]:
 
 
 def _extreme(design: DesignedTest, signal: str, low: float, high: float) -> str:
-    """Return between which values a signal stays, and its limits."""
+    """Write the range of a signal, and its limits."""
     limits = design.limits
     if signal == "vt":
         ends = (design.vt0 - limits.vt, design.vt0 + limits.vt)

@@ -57,14 +57,14 @@ class Limits:
         return self.vt if self.vref == inf else self.vref
 
     def keep(self, run: Run) -> bool:
-        """Return whether a simulated test is within the limits at every point of its grid."""
+        """Tell whether a simulated test is within the limits at every point of its grid."""
         extremes = extremes_of(run)
         return bool(np.isfinite([*extremes.values()]).all()) and self.allow(
             extremes, float(run.outputs["vt"][0])
         )
 
     def allow(self, extremes: Extremes, vt0: float) -> bool:
-        """Return whether signals that stay between extremes, from a voltage, are within limits."""
+        """Tell whether signals that stay between extremes, from a voltage, are within limits."""
         (vt_low, vt_high), (efd_low, efd_high) = extremes["vt"], extremes["efd"]
         deviation = max(vt_high - vt0, vt0 - vt_low)
         within_efd = self.efd_min - ROUNDING <= efd_low and efd_high <= self.efd + ROUNDING

@@ -88,7 +88,7 @@ class Likelihood:
 
     @classmethod
     def of(cls, comparisons: Sequence[Comparison]) -> "Likelihood":
-        """Return that of comparisons."""
+        """Compute the likelihood of comparisons."""
         channels = [
             overlay.error[np.isfinite(overlay.error)]
             for match in comparisons

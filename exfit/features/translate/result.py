@@ -196,7 +196,7 @@ class Translation:
 
 
 def _limits_in_words(step: StepComparison, source: str, target: str) -> str:
-    """Return which limits were met in a step, where any was."""
+    """Name the limits that were met in a step, where any was."""
     met = [
         f"{model} is at {', '.join(limits)}"
         for model, limits in ((source, step.source_limits), (target, step.target_limits))

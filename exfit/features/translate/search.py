@@ -87,7 +87,7 @@ def free_parameters(task: TranslationTask, values: Mapping[str, StartValue]) -> 
 
 
 def _is_fitted(row: Parameter, start: StartValue, source: Model) -> bool:
-    """Return whether a parameter is one that bump tests are fitted for, and no bypassed lag."""
+    """Tell whether a parameter is one that bump tests are fitted for, and no bypassed lag."""
     given = {entry.symbol for entry in source.sheet if entry.free} & {*start.of}
     return row.free and not (_bypassed(row, start) and given)
 

@@ -67,14 +67,14 @@ class Placed:
         return {name: start.get(f"{name}0", value) for name, value in own.items()}
 
     def limited_signals(self) -> dict[str, float]:
-        """Return what the signal behind each limit is at rest, by the limit's name."""
+        """Find the value at rest of the signal behind each limit, by the limit's name."""
         graph = traced(self.system)
         limiters = equation_limits(self.system)
         values = evaluate([limiter.value for limiter in limiters], at_rest(graph, self.values))
         return {limiter.limit: float(values[limiter.value]) for limiter in limiters}
 
     def at_least_zero(self) -> bool:
-        """Return whether the exciter's voltage cannot become negative, whatever the data say."""
+        """Tell whether the exciter's voltage cannot become negative, whatever the data say."""
         return any(limiter.limit == "0" for limiter in equation_limits(self.system))
 
     def _at_rest(self) -> dict[str, float]:
@@ -164,7 +164,7 @@ def _without_counterpart(row: Parameter, source: Placed) -> StartValue:
 
 
 def _fed_by_terminals(model: Model) -> bool:
-    """Return whether the field voltage that a model can give falls with that of the terminals."""
+    """Tell whether a model's largest field voltage falls with that of the terminals."""
     return any(words in row.meaning for row in model.sheet for words in FED_BY_TERMINALS)
 
 

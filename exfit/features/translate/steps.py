@@ -64,7 +64,7 @@ class StepPlant:
         return Placed(model, self.system(model), {**self.values, **values})
 
     def simulator(self, model: Model, step: float) -> Simulator:
-        """Return what simulates a step of the reference (pu)."""
+        """Make the simulation of a step of the reference (pu)."""
         times = times_of_steps()
         inputs = Inputs(0.0, float(times[-1]), (InputStep(STEP_AT, step),))
         return Simulator(self.system(model), inputs, times, INTEGRATION_STEP)
@@ -97,7 +97,7 @@ class ReferenceStep:
         return f"{100.0 * self.step:+g} % {self.plant.label}"
 
     def experiment(self, target: Model, values: Values) -> Experiment:
-        """Return what compares a target with the source: errors as shares of step and range."""
+        """Make the comparison of a target with the source: errors as shares of step and range."""
         efd = self.source.signals["efd"]
         weights = {"vt": 1.0 / abs(self.step), "efd": EFD_WEIGHT / float(np.ptp(efd))}
         channels = tuple(
@@ -174,7 +174,7 @@ def network_of(result: FitResult) -> dict[str, float]:
 
 
 def _has_source(network: Values) -> bool:
-    """Return whether a network says how a unit starts, and has something to the source."""
+    """Tell whether a network gives the start of a unit, and has something to the source."""
     starts = "P" in network and not network.keys().isdisjoint({"Q", "E"})
     return starts and (network["R"], network["X"]) != (0.0, 0.0)
 

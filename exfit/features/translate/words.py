@@ -32,14 +32,14 @@ def translated_parameters(
 
 
 def _value_source(result: FitResult, entry: StartValue) -> str:
-    """Return where a value comes from in one word: of several in the source the least certain."""
+    """Name the origin of a value in one word: of several in the source the least certain."""
     if entry.kind not in ("copied", "computed"):
         return entry.kind
     return least_certain(result.sources.get(name, NOT_STATED) for name in entry.of)
 
 
 def _state(result: FitResult, name: str) -> str:
-    """Return how the source's value came about, and whether its record determined it."""
+    """Describe the origin of the source's value, and whether its record determined it."""
     parameter = result.parameters.get(name)
     if parameter is None:
         return result.source_of(name)
@@ -54,7 +54,7 @@ def translation_notes(
     unnoticed: Values,
     steps: Sequence[StepComparison],
 ) -> Iterator[str]:
-    """Yield what must be known beside the numbers."""
+    """Yield notes on the numbers."""
     source, target = task.source.name, task.target.name
     yield from _fit_notes(task)
     hidden = [name for name, share in unnoticed.items() if share > UNDETERMINED]
@@ -70,7 +70,7 @@ def translation_notes(
 
 
 def _fit_notes(task: TranslationTask) -> Iterator[str]:
-    """Yield what of the fit itself must be known."""
+    """Yield notes on the fit itself."""
     result, source = task.result, task.source.name
     if not result.holds:
         yield f"the fit of {source} does not hold: {outcome_of(result)}: {explanation_of(result)}"

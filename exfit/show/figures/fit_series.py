@@ -93,7 +93,7 @@ def _costs(axes: Axes, runs: "Sequence[FitRun]") -> None:
 
 
 def _look(place: int, count: int) -> dict[str, Any]:
-    """Return how the curve of a fit is drawn: the later, the narrower."""
+    """Choose the line of a fit: the later, the narrower."""
     share = place / max(count - 1, 1)
     return {
         "color": COLORS[place % len(COLORS)],

@@ -57,7 +57,7 @@ def _voltages(axes: Axes, simulated: Response) -> None:
 
 
 def overview(title: str, simulated: Response) -> Figure:
-    """Return what a model does with its typical data: its voltages."""
+    """Draw the voltages of a model with its typical data."""
     signals = [name for name in ("vt", "efd") if name in simulated.signals]
     figure = new_figure(0.6 + 2.2 * len(signals))
     rows = panels(figure, len(signals))[:, 0]

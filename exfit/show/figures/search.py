@@ -143,7 +143,7 @@ def waterfall(search: Minima, title: str) -> Figure:
 
 
 def refuted_ends(search: Minima, ends: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which ends the records refute: those of the minima at or next below them."""
+    """Mark the ends that the records refute: those of the minima at or next below them."""
     minima = sorted(search.minima, key=lambda minimum: minimum.cost)
     places = np.searchsorted([minimum.cost for minimum in minima], ends, side="right") - 1
     return np.array([bool(minima[max(place, 0)].refuted) for place in places], dtype=np.bool_)

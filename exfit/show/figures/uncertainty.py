@@ -29,7 +29,7 @@ BAR = 0.05  # width of the colour bar, of that of the map
 
 
 def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
-    """Return by how much 1 % more of each parameter moves each signal over time.
+    """Draw the change of each signal over time for 1 % more of each parameter.
 
     What belongs to a record is left out.
     """

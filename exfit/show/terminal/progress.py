@@ -177,7 +177,7 @@ class LiveIterations:
 
 
 def _most(iterations: int | Mapping[str, int]) -> str:
-    """Return how many iterations there may be, in words."""
+    """Write the largest number of iterations in words."""
     if isinstance(iterations, int):
         return f"{iterations} a phase"
     return ", ".join(f"{count} {phase}" for phase, count in iterations.items())
@@ -202,7 +202,7 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def _fitting(width: int) -> int:
-    """Return how many columns of the history a terminal has room for: none is cut in two."""
+    """Count the columns of the history that a terminal has room for: none is cut in two."""
     return max(k for k in range(1, len(HISTORY) + 1) if k == 1 or len(_row(HISTORY[:k])) <= width)
 
 
@@ -221,7 +221,7 @@ def _cells(line: Iteration) -> tuple[str, ...]:
 
 
 def task(case: Case, strategy: str | None) -> str:
-    """Return what a fit is about to do."""
+    """Describe the fit that begins."""
     free = ", ".join(case.free())
     return f"{case.path.stem}: {case.subject}, {strategy or case.estimate.strategy}; free {free}"
 
@@ -234,7 +234,7 @@ class ProgressBar:
 
     @contextmanager
     def running(self) -> Iterator[Callable[[Progress], None]]:
-        """Return what takes the progress."""
+        """Show a bar, and give the function that takes the progress."""
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
         from rich.progress import Progress as Bars
 

@@ -74,7 +74,7 @@ class SeriesProgress:
 
 
 def progress_words(progress: Progress) -> str:
-    """Return how far a fit is, in words."""
+    """Describe the progress of a fit."""
     if isinstance(progress, Iteration):
         return f"iteration {progress.number}, f {progress.cost:.4e}"
     return f"{progress.stage} {progress.done} of {progress.total}, best f {progress.best:.4e}"

@@ -102,7 +102,7 @@ def _styles(measured: Dots, simulated: Dots) -> list[list[str]]:
 
 
 def _down(samples: Array, limits: tuple[float, float], rows: int) -> NDArray[np.int64]:
-    """Return how many dots below the top samples lie."""
+    """Place samples: dots below the top."""
     low, high = limits
     place = (high - np.clip(samples, low, high)) / (high - low) * (4 * rows - 1)
     return np.rint(place).astype(np.int64)

@@ -33,7 +33,7 @@ class GuardedConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterator[Segment]:
-        """Yield what is shown, with codes in place of control characters that it did not add."""
+        """Render segments with codes in place of control characters that no style added."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=printable(segment.text))
 
