@@ -39,7 +39,7 @@ def test_ctrl_c_among_the_causes_keeps_the_fit_and_says_what_was_not_tried(run, 
                 raise KeyboardInterrupt
 
     monkeypatch.setattr(terminal, "LiveIterations", Interrupting)
-    interrupted = run("fit", late, "--no-plots", "-o", "folder")
+    interrupted = run("fit", late, "--no-plots", "-o", "folder", "--verbose")
     assert (whole.code, interrupted.code) == (3, 3)
     assert "note: not tried as causes (interrupted): " in interrupted.out
     written = (late.parent / "folder" / "result.json").read_text(encoding="utf-8")

@@ -350,15 +350,35 @@ def test_a_fit_that_converges_ends_with_0_and_writes_its_files(run):
 
 
 def test_a_fit_without_a_terminal_prints_plain_lines_of_80_columns(run):
+    """Not the iterations, which history.csv has."""
     ran = run("fit", case_file(), "--no-plots")
-    assert "\x1b" not in ran.out
-    assert "…" not in ran.out
-    assert max(map(len, ran.out.splitlines())) <= WIDTH
-    history = columns("runs/case-fit/history.csv")
-    shown = re.findall(r"^ +(\d+) (?:lm|dgn) ", ran.out, re.MULTILINE)
-    assert shown == history["iteration"]
-    for word in ("converged", "cost", "rmse", "simulations", "runs/case-fit", "down-step"):
-        assert word in ran.out
+    everything = run("fit", case_file(), "--no-plots", "--verbose")
+    assert ran.out.splitlines()[-1].startswith("verdict: ")
+    assert len(ran.out.splitlines()) <= 30
+    for out in (ran.out, everything.out):
+        assert "\x1b" not in out
+        assert "…" not in out
+        assert max(map(len, out.splitlines())) <= WIDTH
+        assert not re.search(r"^ +(\d+) (?:lm|dgn) ", out, re.MULTILINE)
+        for word in ("cost", "rmse", "runs/case-fit", "down-step"):
+            assert word in out
+    for word in ("converged", "simulations", "sensitivity:", "step of vt"):
+        assert word in everything.out
+        assert word not in ran.out
+
+
+def test_a_stored_result_is_shown_as_its_run_showed_it(run):
+    for option, whole in (([], []), (["--verbose"], ["--all"])):
+        ran = run("fit", case_file(), "--no-plots", *option)
+        shown = run("show", "runs/case-fit", *whole)
+        assert (shown.code, shown.err) == (0, "")
+        assert ran.out.endswith(shown.out)
+    drawn = run("fit", case_file())
+    assert drawn.code == 0
+    assert "overlay.png " in run("show", "runs/case-fit/result.json", "--all").out
+    run("validate", case_file(), "--no-plots")
+    assert "validated: down-step" in run("show", "runs/case-validate").out
+    assert run("show", "runs").code == 1
 
 
 @pytest.mark.parametrize("columns", few_of([60, 80], 1))
@@ -478,9 +498,9 @@ def test_a_validation_much_worse_than_the_fit_ends_with_3_and_accept_alone_judge
     Path("down.csv").write_text(csv_text(TIME, 1.05 * np.array(samples["v"], float)))
     ran = run("fit", case_file(), "--no-plots")
     assert ran.code == 3
-    above, below = ran.out.split("\nparameter ", 1)
-    assert "\nnot accepted: on down-step the error is" in above
-    assert "on down-step the error is" not in below
+    assert ran.out.count("\nnot accepted: on down-step the error is") == 1
+    assert ran.out.index("\nparameter ") < ran.out.index("\nnot accepted: on down-step")
+    assert "down-step is not accepted" in " ".join(ran.out.partition("\nverdict: ")[2].split())
     printed = json.loads(run("fit", case_file(), "--no-plots", "--json").out)
     (match,) = printed["validation"]
     assert not match["accepted"]
@@ -851,12 +871,12 @@ def test_results_are_written_and_shown_before_a_figure_is_drawn(run, monkeypatch
 
     monkeypatch.setattr(FigureFiles, "draw", drawn)
     monkeypatch.setattr(plots, "encoded", lambda picture: b"")
-    ran = run("fit", case_file(), *filter(None, [option]))
+    ran = run("fit", case_file(), option or "--verbose")
     assert ran.code == 0
     (before,) = shown
     if option is None:
         assert "converged" in before
-        assert before.endswith("written to runs/case-fit\n")
+        assert before.splitlines()[-1].startswith("verdict: ")
         lines = ran.out.splitlines()
         figures = {name for name in FILES_OF_A_FIT if name.endswith(".png")}
         assert {line.split()[0] for line in lines} == figures
@@ -1145,7 +1165,7 @@ def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
 
 def test_an_acceptance_without_a_validation_waits_for_a_record_by_hand(run):
     case = changed(CASE, ("accept", {"rmse": 1.0}), ("validate", []))
-    ran = run("fit", case_file(case), "--no-plots")
+    ran = run("fit", case_file(case), "--no-plots", "--verbose")
     assert ran.code == 0
     assert "no record under validate to judge" in " ".join(ran.out.split())
 

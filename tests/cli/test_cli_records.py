@@ -55,7 +55,7 @@ def test_of_many_channels_the_foremost_are_shown_and_the_others_counted(run):
     lines = out.splitlines()
     table = lines[next(k for k, line in enumerate(lines) if line.startswith("channel ")) + 1 :]
     assert [line.split()[0] for line in table[:3]] == ["vt", "c0", "c1"]
-    assert table.index("... and 21 more in inspect.json") == 40
+    assert table.index("... and 21 more in inspect.json") == 41  # behind a blank line
     assert "c11, ... and 48 more in inspect.json" in " ".join(out.split())
     content = json.loads(Path("runs/many.csv-inspect/inspect.json").read_text())
     assert [channel["name"] for channel in content["channels"]] == names[1:]
