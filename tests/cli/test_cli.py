@@ -353,7 +353,8 @@ def test_a_fit_without_a_terminal_prints_plain_lines_of_80_columns(run):
     """Not the iterations, which history.csv has."""
     ran = run("fit", case_file(), "--no-plots")
     everything = run("fit", case_file(), "--no-plots", "--verbose")
-    assert ran.out.splitlines()[-1].startswith("verdict: ")
+    last = [line for line in ran.out.splitlines() if line[0:1] != " "][-1]
+    assert last.startswith("verdict: ")
     assert len(ran.out.splitlines()) <= 30
     for out in (ran.out, everything.out):
         assert "\x1b" not in out
@@ -876,7 +877,8 @@ def test_results_are_written_and_shown_before_a_figure_is_drawn(run, monkeypatch
     (before,) = shown
     if option is None:
         assert "converged" in before
-        assert before.splitlines()[-1].startswith("verdict: ")
+        last = [line for line in before.splitlines() if line[0:1] != " "][-1]
+        assert last.startswith("verdict: ")
         lines = ran.out.splitlines()
         figures = {name for name in FILES_OF_A_FIT if name.endswith(".png")}
         assert {line.split()[0] for line in lines} == figures
