@@ -23,13 +23,13 @@ from exfit.features.programme.steady.fields_on_load import (
     base_of,
     field_on_load,
 )
+from exfit.features.programme.steady.points import Points, given_points, read_points
 from exfit.features.programme.steady.saturation import FieldWinding, saturation_curve
 from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
 from exfit.features.programme.steady.v_curve import v_curve
 from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
-from exfit.records.points import Points, given_points, read_points
 from exfit.records.units import needs_base
 from exfit.signals import FIELDS, TERMINALS
 

@@ -30,7 +30,7 @@ class Points:
 
 
 def read_points(path: Path, columns: Mapping[str, str | None], sheet: str | None = None) -> Points:
-    """Return columns of a recorder's file of any kind; it needs no time.
+    """Read columns of a recorder's file of any kind; it needs no time.
 
     ``columns`` gives the unit of each column, None where that of the file counts. Raises
     RecordError for a file that cannot be read, a column that is missing or in another unit, or a
@@ -45,7 +45,7 @@ def read_points(path: Path, columns: Mapping[str, str | None], sheet: str | None
 
 
 def given_points(rows: Sequence[Sequence[float]], signals: Sequence[str], source: Path) -> Points:
-    """Return the columns of numbers that a case itself gives, by signal, in the order of a row."""
+    """Take the columns of numbers that a case itself gives, by signal, in the order of a row."""
     columns = dict(zip(signals, np.array(rows).T, strict=False))
     digest = hashlib.sha256(json.dumps([list(row) for row in rows]).encode()).hexdigest()
     return Points(columns, {}, source, digest)
