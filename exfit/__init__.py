@@ -22,7 +22,7 @@ from exfit.errors import (
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.features.design.design import design_test
+    from exfit.features.design.design import design_test, identify
     from exfit.features.fleet.batch import batch
     from exfit.features.fleet.folder import read_fleet
     from exfit.features.planner.table_cases import cases_of_table
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from exfit.workflows import (
         check,
         fit,
-        identify,
         load_case,
         profile,
         read_record,
@@ -86,7 +85,6 @@ _MODULES = {
     "check": "exfit.workflows",
     "fit": "exfit.workflows",
     "fit_all": "exfit.runs.fits",
-    "identify": "exfit.workflows",
     "load_case": "exfit.workflows",
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",

@@ -20,7 +20,7 @@ LEAVES = {"signals", "dsp", "estimate", "inference", "engine"}
 # beside the core, and another feature only as here
 OTHER_FEATURES = {
     "fleet": {"planner", "programme", "report", "start"},
-    "planner": {"start", "fleet"},
+    "planner": {"start", "fleet", "translate"},
     "programme": {"report"},
     "rank": set(),
     "report": {"drawings", "external", "planner", "programme"},

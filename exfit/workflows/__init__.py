@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Any
 from exfit.case import load
 from exfit.case.case import Case
 from exfit.case.load import CaseOrPath
-from exfit.errors import CaseError
 
 if TYPE_CHECKING:
     from exfit import estimate
-    from exfit.features.design.experiment_design import Design
     from exfit.records.record import Record
     from exfit.results.comparisons import Comparison
     from exfit.results.model import FitResult, Iteration
@@ -245,28 +243,6 @@ def profile(
     case = loaded(case)
     with program_of(case) as program:
         return profiles.profile(case, names, progress, program)
-
-
-def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Design":
-    """Foretell the standard errors of free parameters by the tests of a case, at its start values.
-
-    Args:
-        case: a case, or the path of its file; it needs no record.
-        noise: standard deviation of the noise by signal, per unit; what is missing: the case's
-            own, else that of its record, else a typical one.
-
-    Raises ExfitError for input that cannot be used.
-
-    Example:
-        >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
-    """
-    from exfit.features.design import experiment_design
-
-    case = loaded(case)
-    if case.has_no_equations:
-        text = "plant.twin: missing; identify needs the equations of a plant of exfit"
-        raise CaseError([f"{case.path}: {text}"])
-    return experiment_design.identify(case, noise or {})
 
 
 def check(case: CaseOrPath) -> "Check":

@@ -14,9 +14,10 @@ from records import case_of, config, found_in, one, synthetic, write
 from exfit.case.case import Case
 from exfit.case.peek import files_of
 from exfit.errors import CaseError, RecordError
+from exfit.features.design.design import identify
 from exfit.fitting.build import build_experiments
 from exfit.records.record import Record
-from exfit.workflows import fit, identify, simulate
+from exfit.workflows import fit, simulate
 
 K, A = 4.0, 2.0
 TIME = np.arange(0.0, 4.0, 0.01)  # 100 Hz

@@ -11,6 +11,7 @@ from places import CONFIGS
 from records import SAMPLES, case_of, config
 
 from exfit.case.load import load_case
+from exfit.features.design.design import identify
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
@@ -19,7 +20,7 @@ from exfit.inference.sensitivity import effects
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
 from exfit.show.fits import ranking
-from exfit.workflows import fit, identify, simulate
+from exfit.workflows import fit, simulate
 
 SMALL = 1e-4  # relative: a central difference over it is off by about its square
 CURVED = 1e-4  # relative: what that leaves, with room

@@ -8,4 +8,4 @@ COMMANDS = {
     )
 }
 
-PUBLIC = {"design_test": "design:design_test"}
+PUBLIC = {"design_test": "design:design_test", "identify": "design:identify"}

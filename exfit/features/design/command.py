@@ -94,10 +94,10 @@ def identify(
 
 def _identify(loaded: "Case", folder: Path, noise: Mapping[str, float], output: Output) -> None:
     """Show how well the test of a case, and others beside it, determine its parameters."""
-    from exfit import workflows
+    from exfit.features.design.design import identify
     from exfit.features.design.files import write_design
 
-    design = workflows.identify(loaded, noise)
+    design = identify(loaded, noise)
     figures = write_design(design, folder)
     if output.as_json:
         print_json(design.as_json())

@@ -1,13 +1,35 @@
-"""The design of a test of a case, or of its file."""
+"""What the tests of a case would show, and the best test: of a case, or of its file."""
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
 
 from exfit.case.case import Case
-from exfit.case.load import load_case
+from exfit.errors import CaseError
+from exfit.features.design import experiment_design
 from exfit.features.design.designed_test import DesignedTest, designed_test
+from exfit.features.design.experiment_design import Design
 from exfit.features.design.limits import Limits
+from exfit.workflows import loaded
+
+
+def identify(case: Case | str | PathLike[str], noise: Mapping[str, float] | None = None) -> Design:
+    """Foretell the standard errors of free parameters by the tests of a case, at its start values.
+
+    Args:
+        case: a case, or the path of its file; it needs no record.
+        noise: standard deviation of the noise by signal, per unit; what is missing: the case's
+            own, else that of its record, else a typical one.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
+    """
+    case = loaded(case)
+    if case.has_no_equations:
+        text = "plant.twin: missing; identify needs the equations of a plant of exfit"
+        raise CaseError([f"{case.path}: {text}"])
+    return experiment_design.identify(case, noise or {})
 
 
 def design_test(
@@ -40,6 +62,5 @@ def design_test(
         >>> exfit.design_test("case.yaml", ["KA"], limits={"vt": 0.05, "efd": 4}).best.steps
     """
     names = [of] if isinstance(of, str) else of
-    loaded = case if isinstance(case, Case) else load_case(Path(case))
     bounds = Limits.of(limits or {})
-    return designed_test(loaded, names, bounds, duration, channels, criterion, noise or {})
+    return designed_test(loaded(case), names, bounds, duration, channels, criterion, noise or {})

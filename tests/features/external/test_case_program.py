@@ -11,9 +11,10 @@ import pytest
 import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
+from exfit.features.design.design import identify
 from exfit.features.external.twin_descent import ProgramFunctions
 from exfit.results.tables import parameter_file
-from exfit.workflows import check, identify, profile, validation_result
+from exfit.workflows import check, profile, validation_result
 
 PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
