@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Announce = Callable[[SolverIteration], None]
 Doubt = Callable[[Result], str]  # what speaks against an end; "" where nothing does
 
-STAGES = ("dgn", "lm-then-dgn")
+METHODS_OF_AUTO = ("dgn", "lm-then-dgn")
 CONFIRMED = 2  # descents that must lead to a minimum which is in doubt
 
 

@@ -14,7 +14,7 @@ from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
-from exfit.fitting.descents import NO_JUDGE, STAGES, Announce, Judge, no_doubt
+from exfit.fitting.descents import METHODS_OF_AUTO, NO_JUDGE, Announce, Judge, no_doubt
 from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
@@ -133,7 +133,7 @@ def search(
     judge = judge or NO_JUDGE
     search_of = local_search if options.search == "local" else global_search
     if staged:
-        return search_of(searches, STAGES, judge, announce)
+        return search_of(searches, METHODS_OF_AUTO, judge, announce)
     return search_of(searches, (method,), judge._replace(doubt=no_doubt), announce)
 
 

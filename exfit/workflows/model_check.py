@@ -1,6 +1,6 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.experiment import Experiment
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
@@ -75,22 +76,25 @@ def check(case: Case, program: Program | None = None) -> Check:
     names = {parameter.name for parameter in free}
     values = {**{parameter.name: parameter.start for parameter in free}, **case.values()}
     fixed = {name: value for name, value in values.items() if name not in names}
-    drift, error = 0.0, 0.0
+    drift, error, substeps = 0.0, 0.0, 1
     for experiment in experiments:
         simulator, at = experiment.with_inputs(values), experiment.parameters(values)
         signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))
         error = max(error, simulator.step_error(at, signals))
+        substeps = max(substeps, experiment.simulator.substeps(at))
+    own_values: Sequence[str] = ()
+    from_program: Mapping[str, Mapping[str, float]] = {}
+    if program is not None:
+        own_values = [*program.own_value_notes()]
+        from_program = program.deviations(setups, values)
     residuals = Residuals(experiments, free, fixed, case.ties)
     first = experiments[0].simulator
     at = experiments[0].parameters(values)
     return Check(
         deviations={} if case.has_no_equations else deviations(residuals),
         bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
-        substeps=max(
-            experiment.simulator.substeps(experiment.parameters(values))
-            for experiment in experiments
-        ),
+        substeps=substeps,
         step=first.step,
         step_error=error,
         drift=drift,
@@ -98,19 +102,13 @@ def check(case: Case, program: Program | None = None) -> Check:
             *typical_notes(case, case.values()),
             *diagram_notes(case),
             *search_range_notes(case),
-            *(() if program is None else program.own_value_notes()),
+            *own_values,
             *(note for setup in setups for note in setup.record.notes),
-            *dict.fromkeys(
-                note
-                for experiment in experiments
-                for note in unstable_rest_notes(
-                    experiment.with_inputs(values), experiment.parameters(values)
-                )
-            ),
+            *dict.fromkeys(_rest_notes(experiments, values)),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
         has_equations=not case.has_no_equations,
-        from_program={} if program is None else program.deviations(setups, values),
+        from_program=from_program,
     )
 
 
@@ -125,6 +123,12 @@ def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
         if not warnings:
             raise
         raise ExfitError("\n".join([*warnings, str(fault)])) from fault
+
+
+def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[str]:
+    for experiment in experiments:
+        simulator = experiment.with_inputs(values)
+        yield from unstable_rest_notes(simulator, experiment.parameters(values))
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

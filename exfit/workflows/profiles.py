@@ -154,7 +154,8 @@ def profile(
     names = tuple(names)
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
-    setups, problem, found = _found(case, setups, problem, progress, program)
+    state = _searched(case, setups, problem, progress, program)
+    setups, problem, found = state.setups, state.problem, state.found
     x, records = found.best.x, names_of_records(setups)
     uncertainty = uncertainty_at(problem, x, records)
     verdict = _verdict(case, setups, problem, found, uncertainty)
@@ -224,17 +225,14 @@ def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str
     return {name: free[name] for name in wanted}
 
 
-def _found(
+def _searched(
     case: Case,
     setups: tuple[ExperimentSetup, ...],
     problem: FitProblem,
     progress: Callable[[estimate.Progress], None],
     program: Program | None,
-) -> tuple[tuple[ExperimentSetup, ...], FitProblem, SearchResult]:
-    """Return the tests and the problem of a case as they were searched, and that search.
-
-    Raises KeyboardInterrupt where it was interrupted.
-    """
+) -> SearchState:
+    """Search a case to its minimum; raises KeyboardInterrupt at an interruption."""
     options = case.estimate.to_the_minimum()
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
     unseen = tuple(build_experiment(case, recording, start) for recording in judged)
@@ -242,7 +240,7 @@ def _found(
     state = in_turn(SEARCH, SearchState(*at, watch=progress))
     if state.interrupted:
         raise KeyboardInterrupt
-    return state.setups, state.problem, state.found
+    return state
 
 
 def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:

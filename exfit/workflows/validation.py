@@ -107,9 +107,7 @@ def validate(
     steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
     or where there is nothing to validate on.
     """
-    given = GivenSteps(
-        *(tuple(each) if isinstance(each, Sequence) else (each,) for each in (step, at))
-    )
+    given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
     saw: tuple[Recording, ...] = ()
@@ -137,6 +135,10 @@ def validate(
         tests += [_validated(case, matches, *pair, own) for pair in pairs]
     described = other_program_of(case, program, [test.setup for test in tests])
     return Validation(case, own, tuple(tests), described)
+
+
+def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Sequence) else (given,)
 
 
 def _fitted(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
-from exfit.fitting.descents import NO_JUDGE, STAGES, Judge, no_doubt
+from exfit.fitting.descents import METHODS_OF_AUTO, NO_JUDGE, Judge, no_doubt
 from exfit.fitting.global_search import (
     FurtherDescents,
     global_search,
@@ -88,7 +88,7 @@ def doubted(*costs):
 def judged(searches, doubt, search=global_search):
     """Return what strategy auto comes to, and the lines that were announced."""
     lines = []
-    return search(searches, STAGES, Judge(doubt, doubt), lines.append), lines
+    return search(searches, METHODS_OF_AUTO, Judge(doubt, doubt), lines.append), lines
 
 
 def searched(searches, search=global_search, refused=no_doubt):
@@ -245,7 +245,7 @@ def test_a_lower_minimum_found_later_is_judged_like_the_others(other, taken):
 def test_a_doubt_leads_to_lm_and_dgn_and_the_note_says_why(search):
     searches = Scripted(end(4.0), end(1.0, phases=("lm", "lm", "dgn")))
     found, _ = judged(searches, doubted(4.0), search)
-    assert searches.calls[:2] == [*STAGES]
+    assert searches.calls[:2] == [*METHODS_OF_AUTO]
     assert found.best.cost == 1.0
     assert found.notes == ("auto took dgn and lm-then-dgn, because after dgn: doubt about 4",)
 
