@@ -19,7 +19,7 @@ SEED = 0
 REALISATIONS = 4
 
 
-def carried_noise(
+def propagated_noise(
     setup: ExperimentSetup, values: Values, realisations: int = REALISATIONS
 ) -> list[Array]:
     """Draw moves of each channel, pu, by more noise on the recorded inputs.

@@ -18,7 +18,7 @@ ROWS_OF_A_PART = 200  # of a factor: its other half is zero
 BIAS_KNOWN_TO = 0.12  # of itself, as the variance of noise by fourth differences of 720 samples
 
 
-class CarriedNoise(NamedTuple):
+class PropagatedNoise(NamedTuple):
     """The covariance of the noise of M errors: diag(own) + carried carried'.
 
     ``own`` (M,) is the variance of noise that is independent in each, ``carried`` (M, D) what D
@@ -82,7 +82,7 @@ class Whitening:
         return white
 
 
-def whitening(noise: CarriedNoise, order: Rows, scale: float) -> Whitening:
+def whitening(noise: PropagatedNoise, order: Rows, scale: float) -> Whitening:
     """Make a whitening of errors that follow one another in time by ``order`` (M,)."""
     return Whitening(
         tuple(_parts(noise, order, scale)),
@@ -92,7 +92,7 @@ def whitening(noise: CarriedNoise, order: Rows, scale: float) -> Whitening:
     )
 
 
-def _parts(noise: CarriedNoise, order: Rows, scale: float) -> Iterator[WhitenedRows]:
+def _parts(noise: PropagatedNoise, order: Rows, scale: float) -> Iterator[WhitenedRows]:
     done = 0
     while done < len(order):
         first = max(done - ROWS_BEFORE, 0)

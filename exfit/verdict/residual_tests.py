@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from exfit.dsp.noise import MEDIAN_DEVIATION, spread
 from exfit.fitting.channels import noise_shape
 from exfit.fitting.experiment import Channel
-from exfit.fitting.propagated_noise import carried_noise
+from exfit.fitting.propagated_noise import propagated_noise
 from exfit.fitting.residuals import LEAST_NOISE, scatter_of
 from exfit.inference.noise import effective_samples, whiteness
 from exfit.inference.quantiles import chi_square_tail
@@ -189,7 +189,7 @@ def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[S
     """
     experiment, first = record.setup.experiment, 0
     whitening = experiment.whitening
-    carried = carried_noise(record.setup, values) if whitening is None else []
+    carried = propagated_noise(record.setup, values) if whitening is None else []
     for k, channel in enumerate(experiment.channels):
         if whitening is None:
             own = _scatter(record, channel, values, carried[k] if carried else None)

@@ -22,12 +22,12 @@ from exfit.fitting.channel_weights import (
 )
 from exfit.fitting.descents import Announce, Judge
 from exfit.fitting.global_search import SearchResult
-from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.registry import parts
 from exfit.results.intervals.determination import (
     NEEDS_PROFILE,

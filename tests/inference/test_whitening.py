@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from exfit.inference import whitening as module
-from exfit.inference.whitening import CarriedNoise, whitening
+from exfit.inference.whitening import PropagatedNoise, whitening
 
 COUNT = 60  # of samples of each of two channels
 ORDER = np.arange(2 * COUNT).reshape(2, COUNT).T.ravel()
@@ -16,7 +16,7 @@ def noise():
     decay = 0.7 ** np.arange(COUNT)
     response = np.tril(np.array([np.roll(decay, k) for k in range(COUNT)]).T)
     own = np.repeat([0.5, 2.0], COUNT)
-    return CarriedNoise(own, np.vstack([3.0 * response, -response]))
+    return PropagatedNoise(own, np.vstack([3.0 * response, -response]))
 
 
 def test_white_errors_are_independent_and_of_one_size(noise):

@@ -31,7 +31,7 @@ from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.setup import ExperimentSetup
-from exfit.inference.whitening import CarriedNoise, whitening
+from exfit.inference.whitening import PropagatedNoise, whitening
 from exfit.inference.wording import digits, listed
 from exfit.plants.parts import initial
 from exfit.simulation.inputs import SplinedInput
@@ -85,7 +85,7 @@ def noise_of_channel(channel: Channel) -> float:
     return max(noise(channel.measured[channel.kept], ORDER), LEAST_NOISE)
 
 
-def carried_noise(setup: ExperimentSetup, values: Values) -> CarriedNoise:
+def propagated_noise(setup: ExperimentSetup, values: Values) -> PropagatedNoise:
     """Return the noise of the errors of a test: that of its channels and what inputs carry.
 
     The response to noise is that of the simulation, linear in it, about the values.
@@ -111,7 +111,7 @@ def carried_noise(setup: ExperimentSetup, values: Values) -> CarriedNoise:
             columns.append(by_level)
         own.append(variance)
         first += channel.size
-    return CarriedNoise(np.concatenate(own), np.hstack(columns))
+    return PropagatedNoise(np.concatenate(own), np.hstack(columns))
 
 
 def responses_to_samples(experiment: Experiment, values: Values, signal: str) -> Array:
@@ -305,7 +305,7 @@ def whitened(residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Arr
     They are as large as before, so that costs are of the same size.
     """
     values = residuals.values(theta)
-    noises = [carried_noise(setup, values) for setup in setups]
+    noises = [propagated_noise(setup, values) for setup in setups]
     scale = float(np.sqrt(np.mean(np.concatenate([noise.variance for noise in noises]))))
     experiments = [
         replace(setup.experiment, whitening=whitening(noise, in_time(setup.experiment), scale))

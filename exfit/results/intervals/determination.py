@@ -12,13 +12,17 @@ from exfit import estimate
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.global_search import AT_TOLERANCE, SearchResult
-from exfit.fitting.nonlinearity import nonlinear_parameters, not_served_by_linear_theory
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
+from exfit.fitting.uncertainty import (
+    UncertaintyAnalysis,
+    nonlinear_parameters,
+    not_served_by_linear_theory,
+    uncertainty_at,
+)
 from exfit.inference.confidence import Uncertainty
 from exfit.inference.wording import listed
 from exfit.results.intervals.instants import decided_by_few_samples, minima_between_samples

@@ -20,7 +20,7 @@ from exfit.errors import ExfitError
 from exfit.estimate import Stop
 from exfit.fitting.build import build_experiment
 from exfit.fitting.descents import short_descent
-from exfit.fitting.propagated_noise import carried_noise
+from exfit.fitting.propagated_noise import propagated_noise
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -304,7 +304,7 @@ def _draws(setup: ExperimentSetup, values: Values) -> Array | None:
     None where the response to it diverges.
     """
     experiment, generator = setup.experiment, np.random.default_rng(SEED)
-    carried = carried_noise(setup, values, REALISATIONS)
+    carried = propagated_noise(setup, values, REALISATIONS)
     if not carried:
         return None
     draws = []

@@ -11,7 +11,7 @@ from grid_events import TRUTH, event_case, recorded
 
 from exfit.case.load import load_case
 from exfit.features.events import input_noise
-from exfit.features.events.input_noise import carried_noise, noise_of_inputs, with_added
+from exfit.features.events.input_noise import noise_of_inputs, propagated_noise, with_added
 from exfit.fitting.build import build_experiments
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.workflows import fit
@@ -59,7 +59,7 @@ def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, m
     values = case.values()
     monkeypatch.setattr(input_noise, "noise_of_inputs", lambda _: {"vt": 1.0, "angle": 1.0})
     monkeypatch.setattr(input_noise, "noise_of_channel", lambda _: 1.0)
-    carried = carried_noise(setup, values).carried
+    carried = propagated_noise(setup, values).carried
     samples, resting = len(columns["t"]), np.count_nonzero(columns["t"] < setup.test.steady)
     first = {"vt": 0, "angle": samples, "p": 2 * samples, "q": 2 * samples + resting}[signal]
     usual, _ = setup.experiment.errors(values)

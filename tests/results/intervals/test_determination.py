@@ -11,9 +11,9 @@ import exfit.workflows as workflows
 from exfit.case.load import load_case
 from exfit.estimate import CostProfile, ProfileEnd, least_squares
 from exfit.fitting.global_search import SearchResult
-from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.search import fitted, names_of_records, search
+from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.inference.confidence import Uncertainty
 from exfit.results.intervals.determination import (
     FoundMinimum,
