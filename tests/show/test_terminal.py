@@ -172,7 +172,8 @@ def test_a_standard_error_is_shown_beside_an_interval_of_linear_theory_alone(
         ]
         assert [error in text for text in texts] == [True, False]
         assert distrusted.parameters[name].std_error == parameter.std_error
-        cells = [f"<td>{parameter.std_error:.2g}</td>" in fit_html(f) for f in (missed, distrusted)]
+        cell = f">{parameter.std_error:.2g}</td>"
+        cells = [cell in fit_html(result) for result in (missed, distrusted)]
         assert cells == [True, False]
 
 
