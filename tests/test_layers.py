@@ -4,7 +4,7 @@ import ast
 import os
 import subprocess
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
@@ -163,6 +163,25 @@ def test_no_folder_of_the_package_has_more_than_25_entries():
         entries[folder].append(path)
     crowded = {folder.name: len(found) for folder, found in entries.items() if len(found) > 25}
     assert crowded.keys() <= {"exciters"}
+
+
+def names_given(statement):
+    """Yield the names that a statement at the top of a module gives to something."""
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        yield statement.name
+    elif isinstance(statement, ast.Assign | ast.AnnAssign):
+        for target in getattr(statement, "targets", None) or [statement.target]:
+            names = (node for node in ast.walk(target) if isinstance(node, ast.Name))
+            yield from (node.id for node in names if isinstance(node.ctx, ast.Store))
+
+
+def test_no_module_gives_a_name_twice():
+    """The second would change what the first is for."""
+    faults = []
+    for name, tree in trees():
+        given = Counter(each for statement in tree.body for each in names_given(statement))
+        faults += [f"{name}: {each}" for each, count in given.items() if count > 1]
+    assert faults == []
 
 
 def test_no_class_is_defined_in_two_modules():

@@ -114,7 +114,7 @@ def shorten(
 
 WORST_CONDITION = 1e8  # beyond it a full Gauss-Newton step is a guess
 LEAST_REACH = 0.3
-GOOD = 0.25  # gain ratio from which the model was right about the length
+LENGTH_PROVED = 0.25  # gain ratio from which the model was right about the length
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ class LineSearch:
         if move.point is None:
             return move, self
         farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))
-        useful = move.damping == 1.0 and move.quality > GOOD
+        useful = move.damping == 1.0 and move.quality > LENGTH_PROVED
         least = self.reach if useful else LEAST_REACH
         return move, replace(self, reach=max(least, 2.0 * farthest))
 
