@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,9 +25,7 @@ from exfit.results.verdict import (
 from exfit.verdict.causes import Evidence, causes_of
 from exfit.verdict.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.verdict.residual_tests import residual_tests
-
-if TYPE_CHECKING:
-    from exfit.verdict.score_tests import Contradiction
+from exfit.verdict.score_tests import Contradiction, contradictions
 
 MOST_CAUSES = 5  # that a reader is given
 VALUES = "values of the case"
@@ -54,8 +51,6 @@ def verdict_of(evidence: Evidence) -> Verdict:
     contradicted: list[Contradiction | RecorderAverages] = []
     try:
         if good_but_for_averages and not noise_is_carried:
-            from exfit.verdict.score_tests import contradictions
-
             contradicted += contradictions(evidence)
     except KeyboardInterrupt:
         words, reason = MATCHES, UNTESTED
