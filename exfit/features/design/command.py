@@ -107,6 +107,7 @@ def _identify(loaded: "Case", folder: Path, noise: Mapping[str, float], output: 
 
         console = terminal.console()
         terminal.show(console, design_blocks.design(design))
+        console.print()
         terminal.written(console, folder)
     output.draw(figures)
 
