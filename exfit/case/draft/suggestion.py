@@ -9,6 +9,7 @@ from typing import Any
 from exfit.case.draft.bases import Base
 from exfit.case.draft.case_draft import Noted, Remark, Section, in_braces
 from exfit.case.open_values import QUESTION
+from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
 from exfit.records.channel_names import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
@@ -171,7 +172,7 @@ def _rejection_sections(inspection: Inspection, opening: BreakerOpening) -> Sect
     opens = {"opens": {"start": "auto"}}
     return {
         "plant": {
-            "type": Noted("machine-on-load", "or infinite-bus, with the exciter in service"),
+            "type": Noted(MACHINE_ON_LOAD.name, "or infinite-bus, with the exciter in service"),
             "network": Noted(levels, "pu of the machine, until the breaker opens"),
         },
         "test": {"breaker": Noted(opens, f"{opening.at:.4f} +- {opening.error:.1g} s")},

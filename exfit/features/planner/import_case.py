@@ -16,6 +16,7 @@ from exfit.features.planner.records import PSSE, SPEED_FLAG
 from exfit.features.planner.unit import Unit, UnitPart, read_unit
 from exfit.features.start.starting_case import inputs_section
 from exfit.features.start.starting_unit import PartData, UnitData
+from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.util.files import read_limited
 from exfit.util.sources import TYPICAL
 
@@ -42,7 +43,11 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
     ``file`` is the path of the dynamics file as the case names it.
     """
     exciter = unit.exciter
-    plant = {"type": "open-circuit", "machine": _named(unit.machine), **_parameters(unit.machine)}
+    plant = {
+        "type": OPEN_CIRCUIT.name,
+        "machine": _named(unit.machine),
+        **_parameters(unit.machine),
+    }
     values = Noted(_values(exciter), "what a fit shall find goes under free")
     sections: Section = {
         "model": _named(exciter),

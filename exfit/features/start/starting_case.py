@@ -27,6 +27,8 @@ from exfit.features.start.starting_tests import StartingTest
 from exfit.features.start.starting_unit import PartData, UnitData
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
+from exfit.plants.infinite_bus import INFINITE_BUS
+from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.records.field_base import shows_power
 from exfit.records.inspection import Inspection
 from exfit.util.sources import TYPICAL
@@ -177,7 +179,7 @@ def _plant(unit: UnitData, inspection: Inspection) -> Section:
         return {"type": "none"}
     power = inspection.channel_of("p")
     if power is None or not shows_power(power):
-        kind = Noted("open-circuit", "the breaker is open, at rated speed")
+        kind = Noted(OPEN_CIRCUIT.name, "the breaker is open, at rated speed")
         return {"type": kind, **_machine(unit.machine, {})}
     levels = {signal.upper(): _level(inspection, signal) for signal in ("p", "q")}
     network = {
@@ -189,7 +191,7 @@ def _plant(unit: UnitData, inspection: Inspection) -> Section:
     }
     measured = {name: "measured" for name, level in levels.items() if level != QUESTION}
     return {
-        "type": Noted("infinite-bus", f"{power.name} shows power"),
+        "type": Noted(INFINITE_BUS.name, f"{power.name} shows power"),
         "network": network,
         **_machine(unit.machine, {"R": TYPICAL, **measured}),
     }
