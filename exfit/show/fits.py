@@ -171,30 +171,25 @@ def fitted_table(
         TableColumn("unit"),
         *([TableColumn("")] if any(marks.values()) else []),
     )
-    no_interval = result.verdict.in_place_of_interval
     rows = []
     for name, parameter in shown.items():
         vague = result.knowledge is not None and parameter.why
         doubtful = parameter.at_bound or not parameter.physical or vague
-        old = () if before is None else (parameter.rounded(before.values.get(name)),)
-        error = "-"  # where linear theory does not serve
-        if result.knowledge is not None and parameter.linear_error is not None:
-            confidence = result.knowledge.confidence.parameters[name]
-            error = error_of(confidence, parameter.of_record)
-        rows.append(
-            row(
-                name,
-                number(parameter.start),
-                *old,
-                parameter.rounded(parameter.value),
-                no_interval or interval(parameter.interval, parameter.rounded),
-                error,
-                parameter.unit,
-                *([marks[name]] if any(marks.values()) else []),
-                mark="doubt" if doubtful else "",
-            )
-        )
+        before_it = [] if before is None else [parameter.rounded(before.values.get(name))]
+        cells = (name, number(parameter.start), *before_it, *_found(result, name))
+        mark = [marks[name]] if any(marks.values()) else []
+        rows.append(row(*cells, *mark, mark="doubt" if doubtful else ""))
     return Table(heads, tuple(rows))
+
+
+def _found(result: FitResult, name: str) -> tuple[str, str, str, str]:
+    """Write a fitted value, its interval, its error where linear theory serves, and its unit."""
+    parameter, error = result.parameters[name], "-"
+    if result.knowledge is not None and parameter.linear_error is not None:
+        confidence = result.knowledge.confidence.parameters[name]
+        error = error_of(confidence, parameter.of_record)
+    limits = result.verdict.in_place_of_interval or interval(parameter.interval, parameter.rounded)
+    return parameter.rounded(parameter.value), limits, error, parameter.unit
 
 
 def remarks_on(parameter: FittedParameter) -> Iterator[str]:
