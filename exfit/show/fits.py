@@ -173,13 +173,16 @@ def fitted_table(
     )
     rows = []
     for name, parameter in shown.items():
-        vague = result.knowledge is not None and parameter.why
-        doubtful = parameter.at_bound or not parameter.physical or vague
         before_it = [] if before is None else [parameter.rounded(before.values.get(name))]
         cells = (name, number(parameter.start), *before_it, *_found(result, name))
         mark = [marks[name]] if any(marks.values()) else []
-        rows.append(row(*cells, *mark, mark="doubt" if doubtful else ""))
+        rows.append(row(*cells, *mark, mark=_mark(result, parameter)))
     return Table(heads, tuple(rows))
+
+
+def _mark(result: FitResult, parameter: FittedParameter) -> Mark:
+    vague = result.knowledge is not None and parameter.why
+    return "doubt" if parameter.at_bound or not parameter.physical or vague else ""
 
 
 def _found(result: FitResult, name: str) -> tuple[str, str, str, str]:
