@@ -31,7 +31,8 @@ from solver_ends import WANTED_DIGITS, certified_ends, published_ends
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.estimate import least_squares
-from exfit.fitting.search import UNIT, fitted
+from exfit.fitting.parameters import UNIT
+from exfit.fitting.search import fitted
 
 PAGE = ROOT / "docs" / "estimator.md"
 TEMPLATE = Path(__file__).with_suffix(".md.jinja")
