@@ -23,7 +23,7 @@ OTHER_FEATURES = {
     "planner": {"start", "fleet", "translate"},
     "programme": {"report"},
     "rank": set(),
-    "report": {"drawings", "external", "planner", "programme"},
+    "report": {"drawings", "planner", "programme"},
     "start": {"planner"},
     "translate": {"planner"},
 }

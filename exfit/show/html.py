@@ -28,25 +28,27 @@ def _pieces(blocks: Iterable[Block], draw: Callable[[Chart], str]) -> Iterator[s
         if is_list:
             notes = (block for block in group if isinstance(block, Note))
             yield "\n".join(["<ul>", *(f"<li>{_sentence(note)}</li>" for note in notes), "</ul>"])
-            continue
-        for block in group:
-            match block:
-                case Heading(text, level):
-                    yield f"<h{level + 1}>{escape(text)}</h{level + 1}>"
-                case Facts(pairs):
-                    yield '<dl class="about">'
-                    for name, text in pairs:
-                        yield f"<div><dt>{escape(name)}</dt><dd>{escape(text)}</dd></div>"
-                    yield "</dl>"
-                case Note():
-                    style = ' class="missing"' if block.mark == "faint" else ""
-                    yield f"<p{style}>{_sentence(block)}</p>"
-                case Table():
-                    yield _wide(block.title or "Table", _table(block))
-                case Verbatim(text):
-                    yield _wide("Text", f"<pre>{escape(text)}</pre>")
-                case Chart():
-                    yield draw(block)
+        else:
+            yield from filter(None, (_piece(block, draw) for block in group))
+
+
+def _piece(block: Block, draw: Callable[[Chart], str]) -> str:
+    match block:
+        case Heading(text, level):
+            return f"<h{level + 1}>{escape(text)}</h{level + 1}>"
+        case Facts(pairs):
+            rows = (f"<div><dt>{escape(n)}</dt><dd>{escape(t)}</dd></div>" for n, t in pairs)
+            return "\n".join(['<dl class="about">', *rows, "</dl>"])
+        case Note():
+            style = ' class="missing"' if block.mark == "faint" else ""
+            return f"<p{style}>{_sentence(block)}</p>"
+        case Table():
+            return _wide(block.title or "Table", _table(block))
+        case Verbatim(text):
+            return _wide("Text", f"<pre>{escape(text)}</pre>")
+        case Chart():
+            return draw(block)
+    return ""
 
 
 def _sentence(note: Note) -> str:

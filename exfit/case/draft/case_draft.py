@@ -150,21 +150,25 @@ class _Writer:
         if self.times.get(id(value), 0) > 1:
             self.anchors[id(value)] = f"{key}{len(self.anchors) + 1 if self.anchors else ''}"
             head += f" &{self.anchors[id(value)]}"
+        entries = _entries(value)
         text = in_braces(value)
         short = len(head) + 1 + len(text) <= WIDTH
-        entries = _entries(value)
-        deep = any(_entries(entry) for entry in entries.values())
         if not entries or (short and indent and not _has_comments(value)):
             yield _commented(f"{head} {text}", noted.behind)
-        elif isinstance(value, Mapping) and (not indent or deep or _has_comments(value)):
+        else:
             yield _commented(head, noted.behind)
+            yield from self._below(value, indent)
+
+    def _below(self, value: Any, indent: str) -> Iterator[str]:
+        """Write a section or list below its key: an entry a line where it is deep or top."""
+        entries = _entries(value)
+        deep = any(_entries(entry) for entry in entries.values())
+        if isinstance(value, Mapping) and (not indent or deep or _has_comments(value)):
             yield from self.mapping(value, f"{indent}  ")
         elif deep:
-            yield _commented(head, noted.behind)
             for entry in entries.values():
                 yield from self._item(entry, indent)
         else:
-            yield _commented(head, noted.behind)
             yield from _wrapped(value, f"{indent}  ")
 
     def _item(self, entry: Mapping[str, Any], indent: str) -> Iterator[str]:
