@@ -140,7 +140,10 @@ def test_given_values_hold_in_every_fit_and_their_file_is_watched(place, monkeyp
     monkeypatch.setattr(watch, "changed", change_once)
     given = ["--parameters", "values.yaml", "--set", "a=1.5"]
     with pytest.raises(SystemExit) as ended:
-        cli.main(args=["fit", "case.yaml", "--watch", "--no-plots", *given], prog_name="exfit")
+        cli.main(
+            args=["fit", "case.yaml", "--watch", "--verbose", "--no-plots", *given],
+            prog_name="exfit",
+        )
     assert ended.value.code == 0
     printed = capsys.readouterr().out
     assert re.findall(r"^k +(\S+)", printed, re.M) == ["3", "5"]

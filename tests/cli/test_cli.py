@@ -956,7 +956,7 @@ def test_a_model_of_the_user_s_own_gives_the_same_fit(run):
         pytest.param("vc, d.VC", "vc, _", ["VC"], id="slope forgotten"),
         pytest.param("x.VC, x.VL", "_, x.VL", ["VC"], id="state at rest forgotten"),
         pytest.param(
-            "    vr = clip(smaller(larger(va, u.vuel), u.voel), p.VRMIN, p.VRMAX)\n",
+            "    vr = clip(clip(va, u.vuel, u.voel), p.VRMIN, p.VRMAX)\n",
             "    vr = p.VRMAX if va > p.VRMAX else va\n",
             ["own.py:", "branch", "where"],
             id="branch",

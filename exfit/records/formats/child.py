@@ -208,12 +208,12 @@ def _answered(answers: IO[bytes], ask: Callable[[], Any]) -> Any:
 
 def _limit_memory(most: float) -> None:
     """Limit the addresses of this process to those that it has and so many bytes more."""
-    try:
-        import resource
-    except ImportError:  # Windows
+    if sys.platform == "win32":
         return
+    import resource
+
     try:
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
         used = float(pages * resource.getpagesize())
     except OSError:
         used = ADDRESSES
