@@ -47,6 +47,7 @@ def pytest_configure(config):
     command line has: there are as many workers as processors.
     """
     config.addinivalue_line("markers", "long: does not run over the few models")
+    config.addinivalue_line("markers", "every_example: runs with --models=all only")
     config.addinivalue_line("markers", "each_model: a law of each model, in whichever folder")
     few = config.getoption("models") == "few"
     hypothesis.settings.load_profile("few" if few else "all")
@@ -91,6 +92,8 @@ def _is_selected(item, models):
     Over the others run the laws of the models themselves, what takes long, and drawn inputs once
     more, in greater number.
     """
+    if item.get_closest_marker("every_example"):
+        return False
     other_model = _is_given_another_model(item)
     if models == "few":
         return not (other_model or item.get_closest_marker("long"))

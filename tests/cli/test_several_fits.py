@@ -104,6 +104,7 @@ def test_a_validation_that_is_not_accepted_is_explained_below_the_table(run):
     assert max(map(len, ran.out.splitlines())) <= WIDTH
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("estimate", "options", "alone"),
     [

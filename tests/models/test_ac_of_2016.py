@@ -22,6 +22,7 @@ from rotating import (
     solved,
 )
 from scipy.optimize import brentq
+from tiers import examples_of
 
 from exfit.models import MODELS
 from exfit.models.sheet import typical
@@ -230,7 +231,7 @@ LIMITS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "changes", "ceiling"), LIMITS)
+@pytest.mark.parametrize(("name", "changes", "ceiling"), examples_of(LIMITS, 4))
 def test_a_large_step_drives_efd_to_its_ceiling_and_never_beyond(name, changes, ceiling):
     p = parameters(name, **changes)
     expected = ceiling(p)
@@ -240,7 +241,7 @@ def test_a_large_step_drives_efd_to_its_ceiling_and_never_beyond(name, changes, 
     assert efd.max() <= expected * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", examples_of(FUNCTIONS, 3))
 def test_a_large_step_down_drives_the_exciter_to_its_floor(name):
     p = parameters(name, **({} if name == "AC4C" else {"VEMIN": 0.9}))
     floor = p.VRMIN if name == "AC4C" else behind_rectifier(p.VEMIN, IFD, p)

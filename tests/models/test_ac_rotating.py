@@ -22,6 +22,7 @@ from rotating import (
     solved,
 )
 from scipy.optimize import brentq
+from tiers import examples_of
 
 from exfit.errors import SimulationError
 from exfit.models import MODELS
@@ -143,7 +144,7 @@ CEILINGS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "ceiling", "changes"), CEILINGS)
+@pytest.mark.parametrize(("name", "ceiling", "changes"), examples_of(CEILINGS, 3))
 def test_a_large_step_drives_efd_to_its_ceiling_and_back(name, ceiling, changes):
     p, expected = ceiling(**changes)
     top, _, below = driven(name, p, (0.5, -0.5, -0.5))

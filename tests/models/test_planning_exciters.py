@@ -17,6 +17,7 @@ from diagrams import (
 )
 from oracle import rates_at_rest, system_of, typical_values
 from scipy.optimize import brentq
+from tiers import examples_of
 
 from exfit.models import MODELS
 from exfit.models.sheet import typical
@@ -250,7 +251,7 @@ CEILINGS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "changes", "ceiling"), CEILINGS)
+@pytest.mark.parametrize(("name", "changes", "ceiling"), examples_of(CEILINGS, 4))
 def test_a_large_step_drives_efd_to_its_ceiling_never_beyond_and_back(name, changes, ceiling):
     """Up for twenty seconds, sixteen time constants of the slowest here, then down for ten."""
     p = parameters(name, changes)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from diagrams import Transfer, alone, lag, lead_lag, pid, rectified, standing, washout
 from oracle import drawn_values, lively_values, typical_values
+from tiers import examples_of
 
 from exfit.models import MODELS
 from exfit.plants import Names
@@ -156,7 +157,7 @@ LARGE = {
 }
 
 
-@pytest.mark.parametrize(("name", "changes"), LARGE.items())
+@pytest.mark.parametrize(("name", "changes"), examples_of(LARGE.items(), 3))
 def test_a_large_step_reaches_the_limits_of_the_diagram_and_never_passes_them(name, changes):
     values = lively_values(name) | changes
     floor, ceiling = limits(name, SimpleNamespace(**values))

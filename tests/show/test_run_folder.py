@@ -389,6 +389,7 @@ def test_a_fit_is_written_even_where_it_cannot_be_remembered(fitted, tmp_path, m
     assert run_folder.last_fit(CASE) is None
 
 
+@pytest.mark.long
 def test_files_with_percent_signs_in_their_names_are_as_any_and_several_have_an_overlay(
     tmp_path, monkeypatch
 ):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import FIRST_ORDER, TIME, TRUTH
 from places import ROOT
-from tiers import few_of
+from tiers import examples_of, few_of
 
 import exfit
 from exfit import estimate
@@ -99,7 +99,7 @@ def test_auto_goes_on_from_a_minimum_that_noise_and_validation_exclude():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", THESIS)
+@pytest.mark.parametrize("name", examples_of(THESIS, 3))
 def test_an_end_that_auto_trusts_is_the_lowest_and_holds_on_the_validation(name):
     """From the start of the thesis and from random ones; tests/studies/auto.py has more of them."""
     case = load_case(ROOT / "configs" / f"{name}.yaml")

@@ -63,6 +63,7 @@ def test_events_share_the_parameters_and_a_third_one_is_met(fitted):
     )
 
 
+@pytest.mark.long
 def test_an_event_by_hand_finds_its_own_rest(events, fitted):
     """Of a unit with another gain Q is not accepted, while P would be."""
     path, result = fitted
@@ -98,6 +99,7 @@ def test_the_recorded_output_of_a_stabiliser_is_not_added_to_it(tmp_path):
         load_case(path)
 
 
+@pytest.mark.long
 def test_a_model_as_it_is_is_verified_without_a_fit(events, tmp_path, capsys):
     """A planner's data, nothing of it free: each event is validated."""
     path = event_case(events, "trip", "night", free=False)

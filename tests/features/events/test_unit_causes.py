@@ -11,13 +11,8 @@ from exfit.fitting.build import build_experiments
 from exfit.workflows import fit
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        "swing torque",
-        *(pytest.param(kind, marks=pytest.mark.long) for kind in KINDS if kind != "swing torque"),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
 def test_what_the_unit_has_otherwise_is_the_first_cause(kind, tmp_path):
     verdict = fit(load_case(drawn(kind, 2, tmp_path).faulty), search="local").verdict
     assert verdict.verdict in ("misses the record", "no match")

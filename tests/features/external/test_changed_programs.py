@@ -5,6 +5,8 @@ import yaml
 from outside_cases import PROGRAM, written_case
 from programmes import written
 
+pytestmark = pytest.mark.long  # fits by a program
+
 MARKER = "from pathlib import Path\nPath(__file__).with_name('started').touch()\n"
 CHANGED = "not run: the file has changed since the fit"
 

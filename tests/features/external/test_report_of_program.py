@@ -12,6 +12,8 @@ from pages import Page
 
 from exfit.cli import main
 
+pytestmark = pytest.mark.long  # fits by a program
+
 
 def run(*arguments):
     outcome = CliRunner().invoke(main, [*map(str, arguments)])

@@ -74,6 +74,7 @@ def test_a_file_of_another_name_and_other_options_are_refused(run, event):
     assert run("export", "run", "--plb", "event.plb")[0] == 1
 
 
+@pytest.mark.long
 def test_a_fit_of_a_bump_test_was_driven_by_no_event(run, empty_folder):
     case = yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text())
     case["record"]["file"] = str(ROOT / "sample_data" / "ac1a_up.csv")

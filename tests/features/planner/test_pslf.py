@@ -53,8 +53,8 @@ def test_a_record_is_read_as_it_was_typed_and_comes_back_from_what_is_written(de
 
 
 @pytest.mark.long
-def test_two_hundred_records_of_a_model_go_there_and_back(definition):
-    for seed in range(10, 200):
+def test_a_hundred_records_of_a_model_go_there_and_back(definition):
+    for seed in range(10, 100):
         there_and_back(definition, seed)
 
 
