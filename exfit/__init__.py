@@ -100,7 +100,8 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         from exfit.registry import parts
 
-        return parts("PUBLIC")[name].load()
+        if name in parts("PUBLIC"):
+            return parts("PUBLIC")[name].load()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -66,11 +66,15 @@ def features() -> Mapping[str, ModuleType]:
 @cache
 def parts(plug: str) -> Mapping[str, LazyPart]:
     """Collect what all features fill a plug with, by name."""
-    return {
-        name: LazyPart(f"{PLACE}.{feature}.{path}")
-        for feature, module in features().items()
-        for name, path in getattr(module, plug, {}).items()
-    }
+    found: dict[str, LazyPart] = {}
+    for feature, module in features().items():
+        for name, path in getattr(module, plug, {}).items():
+            if name in found:
+                raise ValueError(
+                    f"{plug}: {name}: of two features, {feature} and {found[name].path}"
+                )
+            found[name] = LazyPart(f"{PLACE}.{feature}.{path}")
+    return found
 
 
 @cache

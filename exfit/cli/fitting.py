@@ -88,6 +88,8 @@ def fit(
 
     given = Given(parameters, changes)
     several = len(cases) > 1 or len(strategies) > 1
+    if verbose and (several or not output.shown):
+        raise click.UsageError("--verbose shows one fit: not with several, --quiet or --json.")
     if watch and several:
         raise click.UsageError("--watch fits one case with one strategy.")
     if several:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
+from exfit.errors import ExfitError
 
 
 @click.command(short_help="Print a stored result again.")
@@ -25,9 +26,12 @@ def show(result: Path, everything: bool) -> None:
     from exfit.results.io import load_result, load_validation, result_file
     from exfit.show import fits, run_folder, terminal, validations
     from exfit.show.blocks import Table, columns, paragraph, row
-    from exfit.util.file_names import VALIDATION
+    from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
 
     console, source = terminal.console(), result_file(result)
+    programme = result / WHOLE_PROGRAMME if result.is_dir() else result
+    if programme.name == WHOLE_PROGRAMME and programme.is_file():
+        raise ExfitError(f"{result}: a programme; `exfit report` makes a page of it")
     validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
     if source == validated or (validated.is_file() and not source.exists()):
         validation = load_validation(validated)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from exfit.inference.sensitivity import ParameterEffect
@@ -42,24 +43,26 @@ def briefs(
     """Yield the result of a fit in brief, with the folder of its files, each time in fewer lines.
 
     Left out are the values of records, then causes from the last one on, then validations that
-    are accepted.
+    are accepted, then notes from the last one on.
     """
-    causes = len(result.verdict.causes)
+    causes, noted = len(result.verdict.causes), len(result.notes)
     accepted = sum(not match.reason for match in result.validation)
-    yield [*_brief(result, folder, before, causes, accepted, True)]
+    yield [*_brief(result, folder, before, (causes, accepted, noted), True)]
     for most in range(causes, 0, -1):
-        yield [*_brief(result, folder, before, most, accepted, False)]
-    yield [*_brief(result, folder, before, min(causes, 1), 0, False)]
+        yield [*_brief(result, folder, before, (most, accepted, noted), False)]
+    for most in range(noted, -1, -1):
+        yield [*_brief(result, folder, before, (min(causes, 1), 0, most), False)]
 
 
 def _brief(
     result: FitResult,
     folder: Path | None,
     before: FitResult | None,
-    causes: int,
-    accepted: int,
+    most: tuple[int, int, int],
     of_records: bool,
 ) -> Iterator[Block]:
+    """Yield a fit in brief, with at most so many causes, accepted validations and notes."""
+    causes, accepted, noted = most
     yield fitted_table(result, before, of_records)
     yield figures(f"cost {result.start_cost:.4e} -> {result.cost:.4e}", *_errors(result))
     good = [match for match in result.validation if not match.reason]
@@ -68,12 +71,16 @@ def _brief(
             yield in_a_line(match)
     if accepted < len(good):
         yield paragraph(f"{len(good) - accepted} further validations are accepted")
+    yield from notes(result.notes[:noted])
+    if noted < len(result.notes):
+        yield paragraph(f"{len(result.notes) - noted} further notes", "doubt")
     listed = [*_causes(result)]
     yield from listed[:causes]
     if causes < len(listed):
         yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
     if folder is not None:
-        yield paragraph(f"written to {folder}; all of it: `exfit show --all {folder}`")
+        shown = quote(folder.as_posix())
+        yield paragraph(f"written to {folder}; all of it: `exfit show --all {shown}`")
     yield verdict(result)
 
 

@@ -380,6 +380,11 @@ def test_a_stored_result_is_shown_as_its_run_showed_it(run):
     run("validate", case_file(), "--no-plots")
     assert "validated: down-step" in run("show", "runs/case-validate").out
     assert run("show", "runs").code == 1
+    Path("programme.json").write_text("{}")
+    for place in (".", "programme.json"):
+        assert "a programme; `exfit report`" in run("show", place).err
+    for beside in (("--quiet",), ("--json",), ("--strategy", "lm", "--strategy", "dgn")):
+        assert run("fit", case_file(), "--verbose", *beside).code == 2
 
 
 @pytest.mark.parametrize("columns", few_of([60, 80], 1))

@@ -26,7 +26,9 @@ def workplace(empty_folder):
 
 def test_a_fit_starts_from_a_file_and_from_the_command_line(run, workplace):
     given = ["--parameters", "values.yaml", "--set", "k=8", "--set", "k=6"]
-    assert run("fit", "case.yaml", *given, "-o", "out", "--no-plots").code == 0
+    ran = run("fit", "case.yaml", *given, "-o", "out", "--no-plots")
+    assert ran.code == 0
+    assert "note: the fit starts from k 6" in ran.out
     result = load_result("out")
     assert result.history[0].values == {"k": 6.0, "a": 2.5}
     sources = {name: given.source for name, given in result.given_values.items()}

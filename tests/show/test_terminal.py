@@ -102,6 +102,7 @@ def test_in_brief_a_fit_has_thirty_lines_at_most_and_the_verdict_last(missed, wi
         parameters={**missed.parameters, **levels},
         knowledge=None,
         validation=tuple(validations),
+        notes=tuple(f"note {k} of the fit" for k in range(count)),
     )
     stream = io.StringIO()
     versions = fits.briefs(result, Path("runs/missed"))
@@ -113,6 +114,8 @@ def test_in_brief_a_fit_has_thirty_lines_at_most_and_the_verdict_last(missed, wi
     assert "`exfit show --all runs/missed` verdict:" in text
     assert all(any(line.startswith(name) for line in lines) for name in missed.parameters)
     assert CAUSES[0].sentence in text
+    written = text.count("of the fit")
+    assert written == count or f"{count - written} further notes" in text
 
 
 def shown(result, width):

@@ -26,7 +26,8 @@ SETTINGS["oldest"] = {**SETTINGS["prescott"], **SETTINGS["numpy"], **SETTINGS["x
 
 LINEAR_ALGEBRA = (
     *("simulation", "dsp", "estimate", "inference", "fitting", "results/intervals", "verdict"),
-    *("workflows", "features/events", "features/translate"),
+    *("workflows", "features/events", "features/translate", "features/design"),
+    *("features/programme/steady", "features/compare", "features/rank", "features/external"),
 )
 NUMERICAL = ("engine", "models", "plants", *LINEAR_ALGEBRA)
 

@@ -109,11 +109,11 @@ class Fleet:
         return self.folder / case.key if case.status == "done" else None
 
     def fit_of(self, case: CaseSummary) -> Path | None:
-        """Return the folder of the fit of a case, that of its bump tests in a programme."""
+        """Find the folder of the fit of a case, that of its bump tests in a programme; or None."""
         place = self.folder_of(case)
-        if place is not None and (place / WHOLE_PROGRAMME).is_file():
-            return place / FIT_OF_PROGRAMME
-        return place
+        if place is None or not (place / WHOLE_PROGRAMME).is_file():
+            return place
+        return place / FIT_OF_PROGRAMME if (place / FIT_OF_PROGRAMME).is_dir() else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the curves as plain data, as ``exfit batch --json`` prints it."""

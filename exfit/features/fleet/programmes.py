@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.summary import CaseFacts, CaseSummary, SummaryParameter, summary_of
+from exfit.util.file_names import WHOLE_PROGRAMME
 
 if TYPE_CHECKING:
     from exfit.features.programme.result import ProgrammeResult
@@ -36,12 +37,14 @@ def run_programme(
         if result.failed:
             raise ExfitError("\n".join(f"{name}: {why}" for name, why in result.failed.items()))
         folder.write_programme(result, place)
-        files = {
-            path.relative_to(place).as_posix(): path.read_text(encoding="utf-8")
-            for path in sorted(place.rglob("*"))
-            if path.is_file()
-        }
-    return result, files
+        return result, files_of(place)
+
+
+def files_of(place: Path) -> dict[str, str]:
+    """Read the files of a programme by name, last the one that says that all is done."""
+    paths = sorted(path for path in place.rglob("*") if path.is_file())
+    paths.sort(key=lambda path: path == place / WHOLE_PROGRAMME)
+    return {path.relative_to(place).as_posix(): path.read_text(encoding="utf-8") for path in paths}
 
 
 def summary_of_programme(result: "ProgrammeResult", key: str, seconds: float) -> CaseSummary:

@@ -167,7 +167,10 @@ def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
         folder = fleet.fit_of(case)
         if folder is None:
             if case.status != "no record":
-                others.append(LeftUnit(case.name, f"{case.status}: {case.reason}", False))
+                why = f"{case.status}: {case.reason}"
+                if case.status == "done":
+                    why = "a programme without bump tests: nothing was fitted"
+                others.append(LeftUnit(case.name, why, False))
             continue
         try:
             # a fit of equal content stands under one key: each case has its own path

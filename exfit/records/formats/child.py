@@ -20,7 +20,7 @@ from dataclasses import fields
 from importlib import import_module
 from io import BufferedReader
 from pathlib import Path
-from subprocess import PIPE, Popen
+from subprocess import PIPE, Popen, TimeoutExpired
 from tempfile import TemporaryFile
 from threading import Timer
 from time import monotonic
@@ -40,6 +40,7 @@ from exfit.records.formats.memory import (
     TooLargeError,
     memory_limit,
 )
+from exfit.util.ended_processes import ending, last_lines
 from exfit.util.root import on_disk
 
 BOOT = (
@@ -49,9 +50,10 @@ ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "RUST_BACKTRACE": "0"}
 PACKAGES = {"excel": "python_calamine", "matlab": "scipy.io", "parquet": "pyarrow.parquet"}
 LONGEST = (60.0, 10e-6)  # s to answer, and for each byte of the file
 ADDRESSES = 2e9  # bytes that libraries reserve, where the system does not say it
-OUT_OF_MEMORY = b"memory allocation"  # as Rust says it
+OUT_OF_MEMORY = ("memory allocation", "MemoryError")  # as Rust and Python say it
+PANIC = "panicked"  # Rust's word for an end by a fault of its own
+ENDING = 5.0  # s that a process has to end after it closed its output
 LEAST = 0.3e9  # bytes: with fewer addresses some packages read no file at all
-LAST_WORDS = 4096  # bytes of what the child said that are looked at
 
 
 def read_table(module: str, path: Path, sheet: str | None, memory: float | None) -> Columns:
@@ -78,15 +80,20 @@ class _Child:
     def __init__(self, limit: MemoryLimit, module: str, function: str, sheet: str | None) -> None:
         _refuse_larger_archive(limit)
         self.limit = limit
-        self.first = [module, function, str(limit.path), sheet, limit.most]
-        self.errors = TemporaryFile()  # noqa: SIM115 - it ends with the process
-        self.process = Popen(
-            [sys.executable, "-P", "-c", BOOT, *sys.path],
-            stdin=PIPE,
-            stdout=PIPE,
-            stderr=self.errors,
-            env={**os.environ, **ENVIRONMENT},
-        )
+        self.seconds = LONGEST[0] + LONGEST[1] * limit.size
+        self.first = [module, function, str(limit.path), sheet, limit.most, self.seconds]
+        try:
+            self.errors = TemporaryFile()  # noqa: SIM115 - it ends with the process
+            self.process = Popen(
+                [sys.executable, "-P", "-c", BOOT, *sys.path],
+                stdin=PIPE,
+                stdout=PIPE,
+                stderr=self.errors,
+                env={**os.environ, **ENVIRONMENT},
+            )
+        except OSError as fault:
+            text = f"{limit.path}: the process that reads it cannot be started: {fault}"
+            raise RecordError(text) from fault
         finalize(self, _end, self.process, self.errors)
 
     def ask(self, request: Any = None) -> Any:
@@ -102,8 +109,7 @@ class _Child:
     def _answer(self, request: Any) -> tuple[Any, NDArray[np.uint8]]:
         requests = cast(IO[bytes], self.process.stdin)
         answers = cast(BufferedReader, self.process.stdout)
-        seconds = LONGEST[0] + LONGEST[1] * self.limit.size
-        late, began = Timer(seconds, self.process.kill), monotonic()
+        late, began = Timer(self.seconds, self.process.kill), monotonic()
         late.daemon = True
         late.start()
         try:
@@ -114,7 +120,10 @@ class _Child:
             if answers.readinto(data.data) < size:
                 raise EOFError
         except (OSError, EOFError, ValueError):
-            self._refuse_ended(seconds, monotonic() - began)
+            self._refuse_ended(monotonic() - began)
+        except BaseException:
+            self.process.kill()  # else the rest of this answer would be taken for the next one
+            raise
         finally:
             late.cancel()
         if memory:
@@ -123,18 +132,23 @@ class _Child:
             raise RecordError(error)
         return content, data
 
-    def _refuse_ended(self, allowed: float, taken: float) -> NoReturn:
+    def _refuse_ended(self, taken: float) -> NoReturn:
         """Raise the error of a process that ended without an answer."""
-        self.process.kill()
-        code = self.process.wait()
-        if taken >= allowed:
-            raise RecordError(f"{self.limit.path}: reading it took longer than {allowed:.3g} s")
-        self.errors.seek(max(self.errors.seek(0, os.SEEK_END) - LAST_WORDS, 0))
-        if OUT_OF_MEMORY in self.errors.read():
+        if taken >= self.seconds:
+            self.process.kill()
+            text = f"reading it took longer than {self.seconds:.3g} s"
+            raise RecordError(f"{self.limit.path}: {text}")
+        try:
+            code = self.process.wait(ENDING)
+        except TimeoutExpired:
+            self.process.kill()
+            code = self.process.wait()
+        said = last_lines(self.errors)
+        if any(words in said for words in OUT_OF_MEMORY):
             raise self._too_large()
-        raise RecordError(
-            f"{self.limit.path}: damaged: it ended the process that read it (code {code})"
-        )
+        what = "damaged: " if code < 0 or PANIC in said else ""
+        why = ending(code, "the process that read it") + (f": {said}" if said else "")
+        raise RecordError(f"{self.limit.path}: {what}{why}")
 
     def _too_large(self) -> TooLargeError:
         most = self.limit.most / GIGABYTE
@@ -171,12 +185,16 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what a package prints is no answer
     requests = sys.stdin.buffer
-    module, function, path, sheet, most = json.loads(requests.readline())
+    module, function, path, sheet, most, seconds = json.loads(requests.readline())
+    lonely = Timer(2.0 * seconds, os._exit, (1,))  # where who asked has been killed
+    lonely.daemon = True
+    lonely.start()
     with suppress(ImportError):  # said by the module itself
         import_module(PACKAGES[module])
     _limit_memory(most)
     read = getattr(import_module(f"exfit.records.formats.{module}"), function)
     found = _answered(answers, lambda: read(Path(path), *([] if sheet is None else [sheet])))
+    lonely.cancel()
     if isinstance(found, Contents):
         for line in requests:
             _answered(answers, lambda at=int(line): found.fetch(at))  # type: ignore[misc]
@@ -186,21 +204,22 @@ def _answered(answers: IO[bytes], ask: Callable[[], Any]) -> Any:
     """Answer with what a function returns, or why it does not."""
     found: Any = None
     content: Any
-    error, memory, data = None, False, b""
+    data = b""
     try:
         found = ask()
+        if isinstance(found, np.ndarray):
+            content, data = found.dtype.str, found.tobytes()
+        elif isinstance(found, Contents):
+            plain = (field.name for field in fields(found) if field.name != "fetch")
+            content = {name: getattr(found, name) for name in plain}
+        else:
+            content = found
+        head = json.dumps([None, False, content, len(data)]).encode()
     except RecordError as fault:
-        error = str(fault)
+        head = json.dumps([str(fault), False, None, 0]).encode()
     except MemoryError:
-        memory = True
-    if isinstance(found, np.ndarray):
-        content, data = found.dtype.str, found.tobytes()
-    elif isinstance(found, Contents):
-        plain = (field.name for field in fields(found) if field.name != "fetch")
-        content = {name: getattr(found, name) for name in plain}
-    else:
-        content = found
-    answers.write(json.dumps([error, memory, content, len(data)]).encode() + b"\n")
+        head, data = json.dumps([None, True, None, 0]).encode(), b""
+    answers.write(head + b"\n")
     answers.write(data)
     answers.flush()
     return found

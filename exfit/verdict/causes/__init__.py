@@ -67,7 +67,7 @@ BY_TRIAL: Mapping[str, Recogniser] = {
     "limits": wrong_limit,
     "further step": further_step,
 }
-LAST: Mapping[str, Recogniser] = {"recorder that averages": averaging}
+AFTER_TRIALS: Mapping[str, Recogniser] = {"recorder that averages": averaging}
 FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
 
 
@@ -90,8 +90,9 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
 
 def recognisers_of(case: Case) -> Mapping[str, Recogniser]:
     """List what looks for the causes of a misfit in turn, the recorder's last."""
+    at_rest = _of_features("CAUSES_AT_REST")
     of_events = _of_features("CAUSES_OF_EVENTS") if case.kind.finds_rest else {}
-    return {**WITHOUT_TRIAL, **_of_features("CAUSES_AT_REST"), **of_events, **BY_TRIAL, **LAST}
+    return {**WITHOUT_TRIAL, **at_rest, **of_events, **BY_TRIAL, **AFTER_TRIALS}
 
 
 def _of_features(plug: str) -> Mapping[str, Recogniser]:

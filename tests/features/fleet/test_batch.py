@@ -14,6 +14,7 @@ from exfit.errors import ExfitError
 from exfit.features.fleet.batch import tables_of
 from exfit.features.fleet.folder import CaseOutcome, write_outcome
 from exfit.features.fleet.local import in_this_process as here
+from exfit.features.fleet.programmes import files_of
 from exfit.features.fleet.table import report_file
 from exfit.features.fleet.task import CHANGED
 from exfit.features.programme.kept import load_summary
@@ -268,6 +269,13 @@ def test_a_programme_is_a_row_with_the_files_of_all_its_tests(tmp_path, monkeypa
 
 
 @pytest.mark.long
+def test_the_file_that_says_that_a_programme_is_done_is_written_last(tmp_path):
+    for name in ("a/result.json", "programme.json", "v-curve/result.json"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("{}")
+    assert [*files_of(tmp_path)] == ["a/result.json", "v-curve/result.json", "programme.json"]
+
+
 def test_a_programme_of_which_a_test_fails_has_failed_with_its_reason(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     content = programme_content()

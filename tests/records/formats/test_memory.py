@@ -17,6 +17,7 @@ TOO_LARGE = {
     "xlsx_of_repeated_text.xlsx": REACHED,
     "xlsx_of_blanks.xlsx": "3221229791 bytes, unpacked: reading needs about 3.37 GB",
     "xlsx_that_declares.xlsx": "3221226250 bytes, unpacked: reading needs about 3.37 GB",
+    "ods_of_repeats.ods": REACHED,
     "xls_of_one_far_cell.xls": REACHED,
     "xls_of_dimensions.xls": REACHED,
     "mat_of_zeros.mat": "134217728 samples in 1 column: reading needs about 12 GB",
@@ -28,7 +29,6 @@ TOO_LARGE = {
 }
 REFUSED = {
     "xlsx_that_lies.xlsx": "not an Excel workbook, or damaged: I/O error: File is larger than its",
-    "ods_of_repeats.ods": "not an Excel workbook, or damaged: Cannot detect file format",
     "ods_of_blank_repeats.ods": "not an Excel workbook, or damaged: chunk size must be non-zero",
     "mat_of_sparse.mat": "not a MATLAB file, or damaged",
     "mat4_of_dimensions.mat": "not a MATLAB file, or damaged: Not enough bytes to read matrix",

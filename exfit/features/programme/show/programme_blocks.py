@@ -76,8 +76,6 @@ def values_table(values: Sequence[EnteredValue]) -> Table:
     for value in values:
         known = value.given is not None
         given = f"{value.given:g}, {value.given_source}" if known else value.given_source or "none"
-        if not value.entered:
-            given += ", used"
         rows.append(
             row(
                 value.name,
@@ -87,6 +85,7 @@ def values_table(values: Sequence[EnteredValue]) -> Table:
                 value.source,
                 value.test,
                 given,
+                "test" if value.entered else "file",
                 mark="doubt" if value.excluded else "",
             )
         )
@@ -97,6 +96,7 @@ def values_table(values: Sequence[EnteredValue]) -> Table:
         *columns("95 % interval", "source"),
         TableColumn("test", expendable=2),
         TableColumn("in the file"),
+        TableColumn("used"),
     )
     return Table(heads, tuple(rows), "values that tests gave to those after them")
 
