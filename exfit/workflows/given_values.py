@@ -218,9 +218,11 @@ def with_values(case: Case, values: "ValuesOrResult | None") -> Case:
     """
     if values is None:
         return case
+    if isinstance(values, Mapping):
+        return with_given_values(case, values, "values")
     from exfit.results.model import FitResult
 
-    if not isinstance(values, FitResult):
+    if not isinstance(values, FitResult):  # as a Series of pandas
         return with_given_values(case, values, "values")
     if values.model != case.subject:
         raise CaseError([f"values: model: {values.model}, but {case.path} has {case.subject}"])
@@ -230,13 +232,13 @@ def with_values(case: Case, values: "ValuesOrResult | None") -> Case:
 
 def changes_of(case: Case, values: "ValuesOrResult | None") -> Values:
     """Return changes of values by name: of a fit all that it has, of others the checked ones."""
-    if values is None:
-        return changed_values(case, {}, "values")
+    if values is None or isinstance(values, Mapping):
+        return changed_values(case, values or {}, "values")
     from exfit.results.model import FitResult
 
-    return (
-        values.values if isinstance(values, FitResult) else changed_values(case, values, "values")
-    )
+    if isinstance(values, FitResult):
+        return values.values
+    return changed_values(case, values, "values")
 
 
 def given_values(case: Case) -> "dict[str, GivenInPlace]":
