@@ -146,10 +146,9 @@ def test_a_plant_is_one_file_one_section_and_one_line(copy):
     copy.write("exfit/plants/offset.py", PLANT)
     copy.add(
         "exfit/plants/kinds.py",
-        "from exfit.plants.open",
-        "from exfit.plants.offset import OFFSET\n",
+        '        "open-circuit": ',
+        '        "offset": "offset:OFFSET",\n',
     )
-    copy.add("exfit/plants/kinds.py", "        ALONE,\n", "        OFFSET,\n")
     copy.add("exfit/case/schema/plants.py", "\nPlant = (", SECTION + "\n")
     copy.add(
         "exfit/case/schema/plants.py",
@@ -194,12 +193,12 @@ def poles(case: Path) -> None:
 '''
 
 
-def test_a_command_is_one_file_and_its_place_in_the_list(copy):
-    """Beside the workflow that it calls, its table, its tests, and its row in the README."""
-    copy.write("exfit/cli/poles.py", COMMAND)
-    importing = "from exfit.cli.records import"
-    copy.add("exfit/cli/__init__.py", importing, "from exfit.cli.poles import poles\n")
-    copy.add("exfit/cli/__init__.py", "*OF_RESULTS, models", "poles, ")
+def test_a_command_is_the_folder_of_its_feature(copy):
+    """Beside its tests and its page in the documentation."""
+    (copy.folder / "exfit/features/poles").mkdir()
+    table = '{"poles": ("examine", "Print the poles of CASE.", "command:poles")}'
+    copy.write("exfit/features/poles/__init__.py", f"COMMANDS = {table}\n")
+    copy.write("exfit/features/poles/command.py", COMMAND)
     shown = copy.exfit("--help", "poles --help", "poles case.yaml")
     assert "Print the poles of CASE" in shown
     assert "poles of case.yaml" in shown

@@ -6,7 +6,7 @@ Everything but click is imported in the command that needs it, so that help appe
 import atexit
 import gc
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,6 +16,9 @@ from exfit.errors import ExfitError
 from exfit.registry import LazyCommand, LazyPart
 from exfit.registry import commands as of_features
 from exfit.util.interrupts import SIGNALLED, endings_as_interruptions
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -67,6 +70,15 @@ class Commands(click.Group):
         known = OF_CORE.get(cmd_name) or of_features().get(cmd_name)
         command: click.Command | None = None if known is None else known.part.load()
         return command
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
+        """Complete the name of a command, without importing any, or an option."""
+        from click.shell_completion import CompletionItem
+
+        known = {**OF_CORE, **of_features()}
+        names = (name for name in self.list_commands(ctx) if name.startswith(incomplete))
+        items = [CompletionItem(name, help=known[name].help) for name in names]
+        return [*items, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands by their groups, from what is known without importing them."""

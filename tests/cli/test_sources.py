@@ -42,7 +42,7 @@ def new_case(run, empty_folder):
 def test_what_a_new_case_fills_in_stays_typical_up_to_the_planners_file(run, new_case):
     text = new_case.read_text()
     new_case.write_text(text.replace("VRMAX: typical", "VRMAX: nameplate"))
-    code, out, _ = run("fit", str(new_case), *FIT)
+    code, out, _ = run("fit", str(new_case), "--verbose", *FIT)
     assert code in (0, 3)  # with typical data it may not match
     printed = words(out)
     assert "sources of the values: " in printed

@@ -1,6 +1,7 @@
 """What the tests of a programme came to, as blocks."""
 
 from collections.abc import Iterator, Sequence
+from math import inf, isfinite
 
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
 from exfit.features.programme.run import CheckedStep
@@ -179,7 +180,8 @@ def points_table(result: VCurve) -> Table:
         cells = [f"{value:.3f}" for value in (result.p[k], result.q[k], result.vt[k])]
         for reading in result.readings.values():
             cells += [f"{reading.measured[k]:.4f}", f"{reading.simulated[k]:.4f}"]
-            cells.append(f"{100.0 * reading.residuals[k] / reading.measured[k]:+.2f} %")
+            share = reading.residuals[k] / reading.measured[k] if reading.measured[k] else inf
+            cells.append(f"{100.0 * share:+.2f} %" if isfinite(share) else "-")
         worst = any(reading.worst == k for reading in result.readings.values())
         rows.append(row(str(k + 1), *cells, "largest" if worst else ""))
     title = f"points on load, {result.machine}"
