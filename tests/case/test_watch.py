@@ -113,7 +113,7 @@ def test_every_change_is_fitted_a_fault_waits_and_ctrl_c_ends_with_0(place):
         assert "none.csv" in run.until("watching case.yaml, none.csv")
 
         write_case(CASE)
-        assert "converged" in run.until("watching")
+        assert "verdict: " in run.until("watching")
 
         write_record(np.where(TRUTH > 0.0, 0.5 * TRUTH, 0.0))
         last = run.until("watching")
