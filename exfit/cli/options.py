@@ -17,6 +17,7 @@ from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.show.blocks import Block
     from exfit.show.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
@@ -85,6 +86,24 @@ class Output:
         folder = self.folder(f"{case.path.stem}-{command}", files)
         refuse_own_files(case, folder, files, after_records)
         return folder
+
+    def show(
+        self,
+        content: Mapping[str, Any],
+        blocks: "Iterable[Block]",
+        folder: Path,
+        figures: "FigureFiles",
+    ) -> None:
+        """Print a result as JSON or in blocks, with the folder of its files; draw its figures."""
+        if self.as_json:
+            print_json(content)
+        elif self.shown:
+            from exfit.show import terminal
+
+            console = terminal.console()
+            terminal.show(console, blocks)
+            terminal.written(console, folder)
+        self.draw(figures)
 
     def draw(self, figures: "FigureFiles", listed: bool = True) -> None:
         """Draw the figures of a run, last of all it does; ``listed``: with a line for each."""

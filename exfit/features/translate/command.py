@@ -1,13 +1,38 @@
-"""The command translate."""
+"""The command translate, and what it shows."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import NOT_CONVERGED, Output, output_options, print_json
+from exfit.cli.options import NOT_CONVERGED, Output, output_options
 from exfit.errors import ExfitError
+from exfit.show.blocks import (
+    NO_BREAK,
+    Block,
+    Table,
+    TableColumn,
+    columns,
+    notes,
+    number,
+    paragraph,
+    row,
+)
+
+if TYPE_CHECKING:
+    from exfit.features.translate.result import Translation
+
+LOOP_ROWS = (
+    ("bandwidth", "bandwidth", "Hz"),
+    ("peak", "peak", "dB"),
+    ("gain margin", "gain_margin", "dB"),
+    ("phase margin", "phase_margin", "deg"),
+    ("least damping ratio", "damping", ""),
+    ("at", "frequency", "Hz"),
+)
 
 
 @click.command(short_help="Find the parameters of another model for the same response.")
@@ -53,21 +78,74 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
         if output.shown:
             from exfit.show import terminal
 
-            console = terminal.console()
-            with terminal.ProgressBar(console).running() as progress:
+            with terminal.ProgressBar(terminal.console()).running() as progress:
                 translation = translated(fit, target, steps, progress)
         else:
             translation = translated(fit, target, steps)
     except ExfitError as fault:
         raise ExfitError(f"{source}: {fault}") from None
     figures = write_translation(translation, fit, (model, target), folder)
-    if output.as_json:
-        print_json(translation.to_dict())
-    elif output.shown:
-        from exfit.features.translate.translation_blocks import translation as blocks_of
-
-        terminal.show(console, blocks_of(translation))
-        terminal.written(console, folder)
-    output.draw(figures)
+    output.show(translation.to_dict(), blocks_of(translation), folder, figures)
     if translation.poor:
         raise SystemExit(NOT_CONVERGED)
+
+
+def blocks_of(result: "Translation") -> Iterator[Block]:
+    """Yield the verdict, the parameters with their origin, errors in each step, what is lost."""
+    yield paragraph(result.verdict, "bad" if result.poor else "strong")
+    rows = []
+    for name, parameter in result.parameters.items():
+        words = parameter.origin_in_words
+        if parameter.undetermined:
+            words += "; hardly shown by the steps"
+        doubtful = parameter.undetermined or parameter.origin == "typical"
+        cells = (name, number(parameter.value), parameter.unit, words)
+        rows.append(row(*cells, mark="doubt" if doubtful else ""))
+    heads = columns("parameter", "value", "unit", f"from {result.source}", numbers=("value",))
+    yield Table(heads, tuple(rows))
+    yield _steps(result)
+    if result.loops:
+        yield _loops(result)
+    if result.lost:
+        lost = ", ".join(f"{name}{NO_BREAK}{value:g}" for name, value in result.lost.items())
+        yield paragraph(f"no counterpart in {result.target}: {lost}")
+    yield from notes(result.notes)
+
+
+def _steps(result: "Translation") -> Table:
+    """Make the table of errors: of vt in percent of the step, of efd in percent of its range."""
+    rows = []
+    for step in result.steps:
+        vt, efd = step.errors["vt"], step.errors["efd"]
+        errors = (vt.rmse_percent, vt.largest_percent, efd.largest_percent)
+        rows.append(
+            row(
+                f"{100.0 * step.step:+g} %",
+                step.plant,
+                *(f"{value:.2g} %" if value < 100.0 else f"{value:.0f} %" for value in errors),
+                " ".join(step.source_limits),
+                " ".join(step.target_limits),
+                mark="" if step.fitted else "faint",
+            )
+        )
+    numbers = ("step", "rms vt", "max vt", "max efd")
+    heads = columns("step", "plant", *numbers[1:], numbers=numbers)
+    limits = (TableColumn(f"{model} at", folds=True) for model in (result.source, result.target))
+    return Table((*heads, *limits), tuple(rows))
+
+
+def _loops(result: "Translation") -> Table:
+    beside = (
+        TableColumn(model, number=True, group=loop.plant)
+        for loop in result.loops
+        for model in (result.source, result.target)
+    )
+    rows = (
+        row(
+            label,
+            unit,
+            *(number(getattr(figures, key), 4) for loop in result.loops for figures in loop[1:]),
+        )
+        for label, key, unit in LOOP_ROWS
+    )
+    return Table((*columns("voltage loop", "unit"), *beside), tuple(rows), leading=2)

@@ -12,7 +12,6 @@ from exfit.signals import label_of
 if TYPE_CHECKING:
     from exfit.features.translate.result import StepComparison, Translation
 
-
 PERCENT = 100.0
 
 
@@ -26,25 +25,20 @@ def translation(result: "Translation", title: str) -> Figure:
     grid = panels(figure, 3, len(plants), sharex=True, height_ratios=[2.0, 1.6, 1.2])
     for column, plant in enumerate(plants):
         steps = [step for step in result.steps if step.plant == plant]
-        for row, signal in enumerate(("vt", "efd")):
-            _signals(grid[row, column], result, steps, signal)
+        for axes, signal in zip(grid[:2, column], ("vt", "efd"), strict=True):
+            for step in steps:
+                source = envelope(result.time, step.source[signal])
+                target = envelope(result.time, step.target[signal])
+                axes.plot(*source, "-", color=START, linewidth=1.4)
+                axes.plot(*target, "--", color=SIMULATED, linewidth=1.4)
+            axes.set_ylabel(label_of(signal))
+            tidy(axes)
         _errors(grid[2, column], result, steps)
         grid[0, column].set_title(plant, fontsize=10)
-    grid[1, 0].legend(loc="upper right", frameon=False)
+    below = grid[1, 0]
+    below.legend(below.lines[:2], [result.source, result.target], loc="upper right", frameon=False)
     figure.suptitle(title, fontsize=11)
     return figure
-
-
-def _signals(axes: Axes, result: "Translation", steps: "list[StepComparison]", signal: str) -> None:
-    for step in steps:
-        first = step is steps[0]
-        labels = (result.source, result.target) if first else (None, None)
-        source = envelope(result.time, step.source[signal])
-        target = envelope(result.time, step.target[signal])
-        axes.plot(*source, "-", color=START, linewidth=1.4, label=labels[0])
-        axes.plot(*target, "--", color=SIMULATED, linewidth=1.4, label=labels[1])
-    axes.set_ylabel(label_of(signal))
-    tidy(axes)
 
 
 def _errors(axes: Axes, result: "Translation", steps: "list[StepComparison]") -> None:

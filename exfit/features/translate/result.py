@@ -16,7 +16,6 @@ POOR = 5.0  # % of the step: an error beyond it changes what a study shows
 EXACT = 1e-4  # % of the step: what differs by less differs by rounding and sub-steps
 WITHOUT_EFFECT = "without effect"  # origin of what the source does not have
 UNDETERMINED = 0.5  # relative change of a parameter that stays unnoticed
-SAMPLES: Mapping[str, Any] = {**IN_FILE}
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class TranslatedParameter:
             return "fitted to its responses"
         if not names:
             return self.origin
-        return f"computed from {names}" if names and self.origin == "computed" else names
+        return f"computed from {names}" if self.origin == "computed" else names
 
     @property
     def undetermined(self) -> bool:
@@ -88,8 +87,8 @@ class StepComparison:
     errors: Mapping[str, SignalError]
     source_limits: tuple[str, ...]
     target_limits: tuple[str, ...]
-    source: Mapping[str, Array] = field(metadata=SAMPLES)
-    target: Mapping[str, Array] = field(metadata=SAMPLES)
+    source: Mapping[str, Array] = field(metadata=IN_FILE)
+    target: Mapping[str, Array] = field(metadata=IN_FILE)
 
     @property
     def label(self) -> str:
@@ -130,12 +129,7 @@ class Translation:
     source's parameters that the target does not have. ``time`` (M,) in s is that of all responses.
     """
 
-    DERIVED: ClassVar = {
-        "verdict": "verdict",
-        "exact": "exact",
-        "exact_within_limits": "exact_within_limits",
-        "poor": "poor",
-    }
+    DERIVED: ClassVar = {key: key for key in ("verdict", "exact", "exact_within_limits", "poor")}
 
     name: str
     source: str
@@ -147,7 +141,7 @@ class Translation:
     searched: bool
     notes: tuple[str, ...]
     seconds: float
-    time: Array = field(metadata=SAMPLES)
+    time: Array = field(metadata=IN_FILE)
 
     @property
     def values(self) -> dict[str, float]:
@@ -178,10 +172,19 @@ class Translation:
     @property
     def verdict(self) -> str:
         """What to make of it, in a sentence."""
-        by = f"{self.worst.percent:.2g} % of the step, at {self.worst.label}"
-        limits = _limits_in_words(self.worst, self.source, self.target)
         if self.exact:
             return f"exact: {self.target} responds as {self.source} in all steps"
+        worst = self.worst
+        met = [
+            f"{model} is at {', '.join(limits)}"
+            for model, limits in (
+                (self.source, worst.source_limits),
+                (self.target, worst.target_limits),
+            )
+            if limits
+        ]
+        by = f"{worst.percent:.2g} % of the step, at {worst.label}"
+        limits = f" ({'; '.join(met)})" if met else ""
         differs = f"{self.target} differs from {self.source} by up to {by}{limits}"
         if self.poor:
             return f"poor, beyond {POOR:g} %: {differs}"
@@ -193,13 +196,3 @@ class Translation:
         """Return the figures as plain data, without the samples."""
         figures: dict[str, Any] = plain(self)
         return figures
-
-
-def _limits_in_words(step: StepComparison, source: str, target: str) -> str:
-    """Name the limits that were met in a step, where any was."""
-    met = [
-        f"{model} is at {', '.join(limits)}"
-        for model, limits in ((source, step.source_limits), (target, step.target_limits))
-        if limits
-    ]
-    return f" ({'; '.join(met)})" if met else ""

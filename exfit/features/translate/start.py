@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from math import inf, isclose, isfinite, prod
 from typing import Literal
 
-from exfit.engine.system import System
-from exfit.engine.trace import evaluate
+from exfit.features.translate.steps import Placed, TranslationTask
 from exfit.models.counterparts import (
     CEILINGS,
     FACTORS,
@@ -26,15 +25,12 @@ from exfit.models.counterparts import (
     REMOVABLE,
     SUPPLY_SWITCH,
     WITHOUT_EFFECT,
-    Counterpart,
     by_quantity,
     computed_if_zero,
     counterparts,
-    has_effect,
     quantity,
 )
 from exfit.models.sheet import Model, Parameter
-from exfit.simulation.limits import at_rest, equation_limits, traced
 
 Values = Mapping[str, float]
 
@@ -52,64 +48,25 @@ class StartValue:
     of: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Placed:
-    """A model in a plant: its system, and all values of that by name."""
-
-    model: Model
-    system: System
-    values: Values
-
-    def resolved(self) -> dict[str, float]:
-        """Return the values of the model's parameters, those computed at the start as computed."""
-        start = self._at_rest()
-        own = {row.symbol: self.values[row.symbol] for row in self.model.sheet}
-        return {name: start.get(f"{name}0", value) for name, value in own.items()}
-
-    def limited_signals(self) -> dict[str, float]:
-        """Find the value at rest of the signal behind each limit, by the limit's name."""
-        graph = traced(self.system)
-        limiters = equation_limits(self.system)
-        values = evaluate([limiter.value for limiter in limiters], at_rest(graph, self.values))
-        return {limiter.limit: float(values[limiter.value]) for limiter in limiters}
-
-    def at_least_zero(self) -> bool:
-        """Tell whether the exciter's voltage cannot become negative, whatever the data say."""
-        return any(limiter.limit == "0" for limiter in equation_limits(self.system))
-
-    def _at_rest(self) -> dict[str, float]:
-        graph = traced(self.system)
-        start = at_rest(graph, self.values)
-        return {
-            name: float(start[node])
-            for name, node in zip(self.system.setpoints, graph.r, strict=True)
-        }
-
-
-def starting_values(
-    source: Placed, target: Model, place: Callable[[Values], Placed]
-) -> dict[str, StartValue]:
+def starting_values(task: TranslationTask) -> dict[str, StartValue]:
     """Return a value for every parameter of the target, by what it is in the source.
 
-    ``place`` puts values of the target into the source's plant. What the source does not have is
-    without effect where that is possible, else typical.
+    What the source does not have is without effect where that is possible, else typical.
     """
+    source, target = task.placed, task.target
     resolved = source.resolved()
-    pairs = counterparts(target.sheet, source.model.sheet)
-    values = {pair.row.symbol: _value(pair, source, resolved) for pair in pairs}
+    values = {
+        row.symbol: _value(row, same, source, resolved)
+        for row, same in counterparts(target.sheet, source.model.sheet)
+    }
     values |= _lead_and_lag(target, source.model, resolved)
     values |= _gains(target, source.model, resolved)
-    return with_limits(values, source, target, place)
+    return with_limits(values, task)
 
 
-def with_limits(
-    values: Mapping[str, StartValue],
-    source: Placed,
-    target: Model,
-    place: Callable[[Values], Placed],
-) -> dict[str, StartValue]:
+def with_limits(values: Mapping[str, StartValue], task: TranslationTask) -> dict[str, StartValue]:
     """Return values of the target with the limits of the source, at the same field voltage."""
-    rows = by_quantity(target.sheet)
+    source, rows = task.placed, by_quantity(task.target.sheet)
     theirs = by_quantity(source.model.sheet)
     # a self-excited exciter starts at a share of its ceiling
     limits = {
@@ -117,7 +74,7 @@ def with_limits(
         for name, row in rows.items()
         if name in (*CEILINGS, *FLOORS)
     }
-    placed = place({**{name: entry.value for name, entry in values.items()}, **limits})
+    placed = task.place({**{name: entry.value for name, entry in values.items()}, **limits})
     limited = dict(values)
     for names, tightest in ((CEILINGS, min), (FLOORS, max)):
         limited |= _limits(source, placed, names, tightest)
@@ -128,19 +85,8 @@ def with_limits(
     return limited
 
 
-def lost_parameters(source: Placed, values: Mapping[str, StartValue]) -> tuple[Parameter, ...]:
-    """Return the parameters of the source that act, and of which nothing is in the target."""
-    used = {name for entry in values.values() for name in entry.of}
-    return tuple(
-        row
-        for row in source.model.sheet
-        if row.symbol not in used and has_effect(row, source.values[row.symbol])
-    )
-
-
-def _value(pair: Counterpart, source: Placed, resolved: Values) -> StartValue:
+def _value(row: Parameter, same: Parameter | None, source: Placed, resolved: Values) -> StartValue:
     """Return the value of a parameter that is no main limit."""
-    row, same = pair
     if same is not None:
         raw = computed_if_zero(row) and computed_if_zero(same)
         value = source.values[same.symbol] if raw else resolved[same.symbol]
@@ -155,17 +101,15 @@ def _without_counterpart(row: Parameter, source: Placed) -> StartValue:
     if name == "floor of the exciter voltage" and source.at_least_zero():
         return StartValue(0.0, "computed")
     if name == SUPPLY_SWITCH:
-        return StartValue(1.0 if _fed_by_terminals(source.model) else 2.0, "computed")
+        meanings = [entry.meaning for entry in source.model.sheet]
+        # its largest field voltage falls with that of the terminals
+        fed_by_them = any(words in meaning for meaning in meanings for words in FED_BY_TERMINALS)
+        return StartValue(1.0 if fed_by_them else 2.0, "computed")
     if name in REMOVABLE:
         return StartValue(_far(row), "without effect")
     if name in WITHOUT_EFFECT and row.low <= WITHOUT_EFFECT[name] <= row.high:
         return StartValue(WITHOUT_EFFECT[name], "without effect")
     return StartValue(row.typical, "typical")
-
-
-def _fed_by_terminals(model: Model) -> bool:
-    """Tell whether a model's largest field voltage falls with that of the terminals."""
-    return any(words in row.meaning for row in model.sheet for words in FED_BY_TERMINALS)
 
 
 def _far(row: Parameter) -> float:
@@ -193,21 +137,16 @@ def _gains(target: Model, source: Model, values: Values) -> dict[str, StartValue
     """Return the regulator's gain where one model has it in several factors, as before a PID."""
     ours, theirs = by_quantity(target.sheet), by_quantity(source.sheet)
     if PROPORTIONAL in ours and PROPORTIONAL not in theirs and GAIN in theirs:
-        return _before_a_gain(ours, theirs[GAIN], values)
+        gain = theirs[GAIN].symbol
+        gains = _computed(ours[PROPORTIONAL], values[gain], gain)
+        if GAIN in ours and gains:
+            gains[ours[GAIN].symbol] = StartValue(1.0, "without effect")
+        return gains
     lost = {*FACTORS} & theirs.keys() - ours.keys()
     if GAIN not in ours or not lost:
         return {}
     used = [row.symbol for name, row in theirs.items() if name in (GAIN, *lost)]
     return _computed(ours[GAIN], prod(values[symbol] for symbol in used), *used)
-
-
-def _before_a_gain(
-    ours: Mapping[str, Parameter], gain: Parameter, values: Values
-) -> dict[str, StartValue]:
-    """Return the source's gain as the proportional one of a PID, with 1 behind it."""
-    proportional = _computed(ours[PROPORTIONAL], values[gain.symbol], gain.symbol)
-    behind = [ours[GAIN].symbol] if GAIN in ours and proportional else []
-    return proportional | {symbol: StartValue(1.0, "without effect") for symbol in behind}
 
 
 def _computed(row: Parameter, value: float, *of: str) -> dict[str, StartValue]:
@@ -218,39 +157,31 @@ def _computed(row: Parameter, value: float, *of: str) -> dict[str, StartValue]:
 
 
 def _limits(
-    source: Placed,
-    target: Placed,
-    names: Iterable[str],
-    tightest: Callable[..., float],
+    source: Placed, target: Placed, names: Iterable[str], tightest: Callable[..., float]
 ) -> dict[str, StartValue]:
     """Return the target's ceilings, or floors: each that of the source, or else the tightest.
 
     What the source's others would cut off earlier, which the target does not have, cuts there.
     """
-    theirs, ours = _rows(source.model, names), _rows(target.model, names)
-    shares, at_rest_here = _shares(source, theirs), target.limited_signals()
+    theirs, ours = (
+        {name: row for name, row in by_quantity(model.sheet).items() if name in names}
+        for model in (source.model, target.model)
+    )
+    at_target = target.limited_signals()
+    shares = _shares(source, theirs)
+    lost = {name: share for name, share in shares.items() if name not in ours}
     limits = {}
     for name, row in ours.items():
-        candidates = _candidates(name, shares, ours)
-        at_rest_now = at_rest_here.get(row.symbol, 0.0)
-        if candidates and at_rest_now > 0.0:
+        if name in shares:
+            candidates = {name: shares[name], **lost}
+        else:
+            candidates = {} if name in REMOVABLE else shares
+        at_rest = at_target.get(row.symbol, 0.0)
+        if candidates and at_rest > 0.0:
             share = tightest(candidates.values())
-            chosen = next(name for name, value in candidates.items() if value == share)
-            limits[row.symbol] = _limit(source, theirs[chosen], row, share, at_rest_now)
+            same = theirs[next(name for name, value in candidates.items() if value == share)]
+            limits[row.symbol] = _limit(source, same, row, share * at_rest)
     return limits
-
-
-def _rows(model: Model, names: Iterable[str]) -> dict[str, Parameter]:
-    """Return those parameters of a model that are certain quantities."""
-    return {name: row for name, row in by_quantity(model.sheet).items() if name in names}
-
-
-def _candidates(name: str, shares: Values, ours: Iterable[str]) -> Values:
-    """Return the limits of the source that one of the target may stand for."""
-    if name in shares:
-        lost = {other: share for other, share in shares.items() if other not in ours}
-        return {name: shares[name], **lost}
-    return {} if name in REMOVABLE else shares
 
 
 def _shares(source: Placed, rows: Mapping[str, Parameter]) -> dict[str, float]:
@@ -263,15 +194,11 @@ def _shares(source: Placed, rows: Mapping[str, Parameter]) -> dict[str, float]:
     }
 
 
-def _limit(
-    source: Placed, theirs: Parameter, row: Parameter, share: float, at_rest_now: float
-) -> StartValue:
-    given = source.values[theirs.symbol]
-    resolved = source.resolved()[theirs.symbol]
-    if computed_if_zero(theirs) and computed_if_zero(row) and given == 0.0:
-        return StartValue(0.0, "copied", (theirs.symbol,))
-    value = share * at_rest_now
-    if isclose(value, resolved, rel_tol=SAME_AT_REST) or abs(resolved) >= NO_LIMIT:
-        return StartValue(resolved, "copied", (theirs.symbol,))
-    inside = min(max(value, row.low), row.high)
-    return StartValue(inside, "computed", (theirs.symbol,))
+def _limit(source: Placed, same: Parameter, row: Parameter, value: float) -> StartValue:
+    """Return a limit of the target, copied where the value is that of the source."""
+    given = source.resolved()[same.symbol]
+    if computed_if_zero(same) and computed_if_zero(row) and source.values[same.symbol] == 0.0:
+        return StartValue(0.0, "copied", (same.symbol,))
+    if isclose(value, given, rel_tol=SAME_AT_REST) or abs(given) >= NO_LIMIT:
+        return StartValue(given, "copied", (same.symbol,))
+    return StartValue(min(max(value, row.low), row.high), "computed", (same.symbol,))

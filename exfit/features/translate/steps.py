@@ -3,17 +3,18 @@
 The plant is that of a fit, with its machine, and without noise, recorder or stabiliser of a test.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.case.draft.free_parameters import ALONE
 from exfit.case.peek import section_of, stabiliser_inputs
 from exfit.engine.system import System
+from exfit.engine.trace import evaluate
 from exfit.errors import ExfitError, SimulationError
-from exfit.features.translate.start import Placed
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.models import GOVERNORS, MODELS, STABILISERS, find
 from exfit.models.machines import MACHINES
@@ -24,7 +25,8 @@ from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.plants.plant import Equipment, PlantKind
 from exfit.results.model import FitResult
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.simulation.limit_hits import LimitHit, limits_hit
+from exfit.simulation.limit_hits import limits_hit
+from exfit.simulation.limits import at_rest, equation_limits, traced
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -40,6 +42,44 @@ EFD_WEIGHT = 0.1  # of the error of efd, as a share of its range, beside that of
 RATED_VOLTAGE = 1.0  # pu, at the start
 DEFAULT_MACHINE = "GENROU"
 SIGNALS = ("vt", "efd")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A model in a plant: its system, and all values of that by name."""
+
+    model: Model
+    system: System
+    values: Values
+
+    def resolved(self) -> dict[str, float]:
+        """Return the values of the model's parameters, those computed at the start as computed."""
+        graph = traced(self.system)
+        start = at_rest(graph, self.values)
+        computed = {
+            name: float(start[node])
+            for name, node in zip(self.system.setpoints, graph.r, strict=True)
+        }
+        symbols = [row.symbol for row in self.model.sheet]
+        return {name: computed.get(f"{name}0", self.values[name]) for name in symbols}
+
+    def limited_signals(self) -> dict[str, float]:
+        """Find the value at rest of the signal behind each limit, by the limit's name."""
+        graph = traced(self.system)
+        limiters = equation_limits(self.system)
+        values = evaluate([limiter.value for limiter in limiters], at_rest(graph, self.values))
+        return {limiter.limit: float(values[limiter.value]) for limiter in limiters}
+
+    def at_least_zero(self) -> bool:
+        """Tell whether the exciter's voltage cannot become negative, whatever the data say."""
+        return any(limiter.limit == "0" for limiter in equation_limits(self.system))
+
+
+class StepResponse(NamedTuple):
+    """A response to a step: vt and efd (M,) pu by name, and the limits that it met."""
+
+    signals: Mapping[str, Array]
+    limits: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -69,18 +109,22 @@ class StepPlant:
         inputs = Inputs(0.0, float(times[-1]), (InputStep(STEP_AT, step),))
         return Simulator(self.system(model), inputs, times, INTEGRATION_STEP)
 
+    def response(self, model: Model, values: Values, step: float) -> StepResponse:
+        """Simulate a step; raises SimulationError where there is no response."""
+        parameters = {**self.values, **values}
+        simulator = self.simulator(model, step).with_enough_substeps(parameters)
+        signals = simulator.response(parameters, SIGNALS).signals
+        names = (
+            f"{hit.signal} >= 0" if hit.limit == "0" else hit.limit
+            for hit in limits_hit(simulator, parameters)
+        )
+        return StepResponse(signals, tuple(dict.fromkeys(names)))
+
 
 def times_of_steps() -> Array:
     """Return the clock of all responses (M,), s."""
     end = STEP_AT + DURATION
     return np.linspace(0.0, end, round(end / SPACING) + 1)
-
-
-class StepResponse(NamedTuple):
-    """A response to a step: vt and efd (M,) pu by name, and the limits that it met."""
-
-    signals: Mapping[str, Array]
-    limits: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,128 +135,18 @@ class ReferenceStep:
     step: float
     source: StepResponse
 
-    @property
-    def label(self) -> str:
-        """Its size and plant."""
-        return f"{100.0 * self.step:+g} % {self.plant.label}"
-
     def experiment(self, target: Model, values: Values) -> Experiment:
         """Make the comparison of a target with the source: errors as shares of step and range."""
-        efd = self.source.signals["efd"]
-        weights = {"vt": 1.0 / abs(self.step), "efd": EFD_WEIGHT / float(np.ptp(efd))}
-        channels = tuple(
-            Channel(name, self.source.signals[name], weight) for name, weight in weights.items()
-        )
+        signals = self.source.signals
+        weights = {"vt": 1.0 / abs(self.step), "efd": EFD_WEIGHT / float(np.ptp(signals["efd"]))}
+        channels = tuple(Channel(name, signals[name], weight) for name, weight in weights.items())
         simulator = self.plant.simulator(target, self.step)
-        experiment = Experiment(simulator, channels, self.plant.values, name=self.label)
+        name = f"{100.0 * self.step:+g} % {self.plant.label}"
+        experiment = Experiment(simulator, channels, self.plant.values, name=name)
         try:
             return experiment.with_enough_substeps({**self.plant.values, **values})
         except SimulationError:  # these values may not have a response, others will
             return experiment
-
-
-def source_model(result: FitResult) -> Model:
-    """Return the exciter of a fit.
-
-    A user's own model is run only from the file that was fitted. Raises ExfitError where there is
-    no exciter, or its file is missing or another.
-    """
-    if result.model == result.machine_model:
-        raise ExfitError(f"the fit is of {result.model}, without an exciter")
-    sha256 = result.inputs.get("model", "")
-    if sha256:
-        name = section_of(result.case_text, result.case, "model") or result.files.get("model", "")
-        return find(str(name), result.case.parent, sha256)
-    if result.model not in MODELS:
-        raise ExfitError(f"{result.model} is not in the catalogue")
-    return MODELS[result.model]
-
-
-def source_values(result: FitResult, model: Model) -> dict[str, float]:
-    """Return the fitted values of an exciter; raises ExfitError where one is missing."""
-    values = result.values_of("")
-    missing = [row.symbol for row in model.sheet if row.symbol not in values]
-    if missing:
-        raise ExfitError(f"no value of {', '.join(missing)} in the result")
-    return {row.symbol: values[row.symbol] for row in model.sheet}
-
-
-def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
-    """Return the plants in which two models are compared: of a fit on load both."""
-    machine = MACHINES[result.machine_model or DEFAULT_MACHINE]
-    given = {**typical(machine.sheet), **result.machine}
-    values = {MACHINE + symbol: value for symbol, value in given.items()} | {VT0: RATED_VOLTAGE}
-    form = SATURATION[result.saturation]
-    plants = [StepPlant(OPEN_CIRCUIT, Equipment(None, machine, form), values)]
-    network = network_of(result)
-    if network:
-        equipment = Equipment(
-            None,
-            machine,
-            form,
-            given=frozenset(network),
-            stabiliser=_stabiliser(result),
-            governor=GOVERNORS.get(result.governor_model or ""),
-        )
-        own = {NETWORK + symbol: value for symbol, value in network.items()}
-        own |= {STABILISER + symbol: value for symbol, value in result.stabiliser.items()}
-        own |= {GOVERNOR + symbol: value for symbol, value in result.governor.items()}
-        plants.append(StepPlant(INFINITE_BUS, equipment, {**values, **own}))
-    return tuple(plants)
-
-
-def network_of(result: FitResult) -> dict[str, float]:
-    """Return the network of a fit, or of the first of its records that has one with a source.
-
-    That of a grid event has none: there the recorded voltage is played in.
-    """
-    networks: list[dict[str, float]] = [dict(result.network)]
-    for test in result.tests:
-        own = {} if test.network is None else test.network
-        networks.append({symbol: parameter.value for symbol, parameter in own.items()})
-    return next(filter(_has_source, networks), {})
-
-
-def _has_source(network: Values) -> bool:
-    """Tell whether a network gives the start of a unit, and has something to the source."""
-    starts = "P" in network and not network.keys().isdisjoint({"Q", "E"})
-    return starts and (network["R"], network["X"]) != (0.0, 0.0)
-
-
-def _stabiliser(result: FitResult) -> Stabilised | None:
-    name = result.stabiliser_model
-    if name is None or name not in STABILISERS:
-        return None
-    model = STABILISERS[name]
-    return Stabilised(model, stabiliser_inputs(result.case_text, result.case) or model.inputs)
-
-
-def reference_steps(
-    plants: Iterable[StepPlant], source: Model, values: Values, sizes: Sequence[float]
-) -> tuple[ReferenceStep, ...]:
-    """Return the steps up and down of each size (pu), with the responses of the source.
-
-    Raises SimulationError where the source has no response to one.
-    """
-    return tuple(
-        ReferenceStep(plant, step, response_of(plant, source, values, step))
-        for plant in plants
-        for size in sizes or (STEPS_ON_LOAD if plant.kind.on_load else STEPS)
-        for step in (abs(size), -abs(size))
-    )
-
-
-def response_of(plant: StepPlant, model: Model, values: Values, step: float) -> StepResponse:
-    """Return the response of a model to a step; raises SimulationError where there is none."""
-    parameters = {**plant.values, **values}
-    simulator = plant.simulator(model, step).with_enough_substeps(parameters)
-    response = simulator.response(parameters, SIGNALS)
-    hits = limits_hit(simulator, parameters)
-    return StepResponse(response.signals, tuple(dict.fromkeys(_limit_name(hit) for hit in hits)))
-
-
-def _limit_name(hit: LimitHit) -> str:
-    return f"{hit.signal} >= 0" if hit.limit == "0" else hit.limit
 
 
 @dataclass(frozen=True)
@@ -239,3 +173,82 @@ class TranslationTask:
     def fitted(self) -> tuple[ReferenceStep, ...]:
         """The steps in which the source meets no limit; where there is none, all."""
         return tuple(step for step in self.steps if not step.source.limits) or self.steps
+
+
+def translation_task(result: FitResult, target: Model, sizes: Sequence[float]) -> TranslationTask:
+    """Plan the steps up and down of each size (pu), with the responses of the fitted exciter.
+
+    A user's own model is run only from the file that was fitted. Raises ExfitError where one of
+    both is no exciter, its file is missing or another, or a value is missing, SimulationError
+    where the source has no response to a step.
+    """
+    if result.model == result.machine_model:
+        raise ExfitError(f"the fit is of {result.model}, without an exciter")
+    sha256 = result.inputs.get("model", "")
+    if sha256:
+        name = section_of(result.case_text, result.case, "model") or result.files.get("model", "")
+        source = find(str(name), result.case.parent, sha256)
+    elif result.model in MODELS:
+        source = MODELS[result.model]
+    else:
+        raise ExfitError(f"{result.model} is not in the catalogue")
+    if ALONE in (source.name, target.name):
+        raise ExfitError(f"{ALONE} is no exciter: it is without a machine")
+    values = result.values_of("")
+    missing = [row.symbol for row in source.sheet if row.symbol not in values]
+    if missing:
+        raise ExfitError(f"no value of {', '.join(missing)} in the result")
+    own = {row.symbol: values[row.symbol] for row in source.sheet}
+    plants = step_plants(result)
+    steps = tuple(
+        ReferenceStep(plant, step, plant.response(source, own, step))
+        for plant in plants
+        for size in sizes or (STEPS_ON_LOAD if plant.kind.on_load else STEPS)
+        for step in (abs(size), -abs(size))
+    )
+    return TranslationTask(result, source, target, own, plants, steps)
+
+
+def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
+    """Return the plants in which two models are compared: of a fit on load both."""
+    machine = MACHINES[result.machine_model or DEFAULT_MACHINE]
+    given = {**typical(machine.sheet), **result.machine}
+    values = {MACHINE + symbol: value for symbol, value in given.items()} | {VT0: RATED_VOLTAGE}
+    form = SATURATION[result.saturation]
+    plants = [StepPlant(OPEN_CIRCUIT, Equipment(None, machine, form), values)]
+    network = network_of(result)
+    if network:
+        model = STABILISERS.get(result.stabiliser_model or "")
+        heard = stabiliser_inputs(result.case_text, result.case)
+        equipment = Equipment(
+            None,
+            machine,
+            form,
+            given=frozenset(network),
+            stabiliser=None if model is None else Stabilised(model, heard or model.inputs),
+            governor=GOVERNORS.get(result.governor_model or ""),
+        )
+        parts = {NETWORK: network, STABILISER: result.stabiliser, GOVERNOR: result.governor}
+        own = {
+            prefix + symbol: value
+            for prefix, data in parts.items()
+            for symbol, value in data.items()
+        }
+        plants.append(StepPlant(INFINITE_BUS, equipment, {**values, **own}))
+    return tuple(plants)
+
+
+def network_of(result: FitResult) -> dict[str, float]:
+    """Return the network of a fit, or of the first of its records that has one with a source.
+
+    That of a grid event has none: there the recorded voltage is played in.
+    """
+    networks: list[dict[str, float]] = [dict(result.network)]
+    for test in result.tests:
+        own = {} if test.network is None else test.network
+        networks.append({symbol: parameter.value for symbol, parameter in own.items()})
+    for network in networks:
+        starts = "P" in network and not network.keys().isdisjoint({"Q", "E"})
+        if starts and (network["R"], network["X"]) != (0.0, 0.0):
+            return network
+    return {}

@@ -6,7 +6,7 @@ responses of the source, without noise, in the steps in which it meets no limit.
 """
 
 import time as clock
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from os import PathLike
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.draft.free_parameters import ALONE
+from exfit import estimate
 from exfit.errors import ExfitError, SimulationError
 from exfit.features.translate.result import (
     EXACT,
@@ -25,42 +25,40 @@ from exfit.features.translate.result import (
     LoopFigures,
     SignalError,
     StepComparison,
+    TranslatedParameter,
     Translation,
 )
-from exfit.features.translate.search import (
-    MANY_STARTS,
-    ONE_START,
-    Effort,
-    Watch,
-    free_parameters,
-    search,
-)
-from exfit.features.translate.start import StartValue, lost_parameters, starting_values, with_limits
+from exfit.features.translate.start import StartValue, starting_values, with_limits
 from exfit.features.translate.steps import (
-    ReferenceStep,
+    DEFAULT_MACHINE,
     StepPlant,
-    StepResponse,
     TranslationTask,
-    reference_steps,
-    response_of,
-    source_model,
-    source_values,
-    step_plants,
     times_of_steps,
+    translation_task,
 )
-from exfit.features.translate.words import translated_parameters, translation_notes
 from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.models import MODELS, find
-from exfit.models.sheet import Model
+from exfit.models.blocks import SHORTEST
+from exfit.models.counterparts import has_effect
+from exfit.models.sheet import Model, Parameter
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
+from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.simulation.small_signal import small_signal
+from exfit.util.sources import NOT_STATED, least_certain
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+Watch = Callable[[estimate.Progress], None]
 
 LARGEST_STEP = 0.5  # pu: beyond it no voltage is left
 HARDLY_MORE = 0.5  # % of the step: what a plainer set of values may cost
+NOTICEABLE = 1e-3  # of the step, rms: a change of the responses that a study would not see
+REACH = 10.0  # times the copied and the typical value: how far the search goes
+STARTS, REFINED = 32, 2  # from how many points the first search goes, how many it refines
+ITERATIONS = 20  # of each phase
+LEAST_GAIN = 1e-4  # of the cost, in an iteration
 
 
 class Candidate(NamedTuple):
@@ -100,8 +98,34 @@ def translate(
     """
     if not isinstance(result, FitResult):
         result = load_result(result)
-    _refuse_sizes(steps)
-    return _translation(result, target_model(model), steps, progress)
+    for size in steps:
+        if not 0.0 < abs(size) <= LARGEST_STEP:
+            raise ExfitError(f"step: {size:g} pu: must be above 0 and at most {LARGEST_STEP:g}")
+    target = target_model(model)
+    began = clock.perf_counter()
+    task = translation_task(result, target, steps)
+    copied = _candidate(task, starting_values(task), {})
+    best = copied if copied.largest <= EXACT else _best(task, copied, progress)
+    if not best.steps:
+        raise SimulationError(f"{target.name} has no response in the plant of {result.name}")
+    used = {name for entry in best.values.values() for name in entry.of}
+    return Translation(
+        name=result.name,
+        source=task.source.name,
+        target=target.name,
+        parameters={row.symbol: _parameter(task, row, best) for row in target.sheet},
+        steps=best.steps,
+        loops=tuple(_loops(task, _numbers(best.values))),
+        lost={
+            row.symbol: task.own[row.symbol]
+            for row in task.source.sheet
+            if row.symbol not in used and has_effect(row, task.own[row.symbol])
+        },
+        searched=best is not copied,
+        notes=tuple(_notes(task, best)),
+        seconds=clock.perf_counter() - began,
+        time=times_of_steps(),
+    )
 
 
 def target_model(model: Model | str) -> Model:
@@ -112,48 +136,17 @@ def target_model(model: Model | str) -> Model:
     return own.get(model.upper()) or find(model, Path())
 
 
-def _refuse_sizes(sizes: Sequence[float]) -> None:
-    for size in sizes:
-        if not 0.0 < abs(size) <= LARGEST_STEP:
-            raise ExfitError(f"step: {size:g} pu: must be above 0 and at most {LARGEST_STEP:g}")
-
-
-def _translation(
-    result: FitResult, target: Model, sizes: Sequence[float], watch: Watch
-) -> Translation:
-    began = clock.perf_counter()
-    task = _task(result, target, sizes)
-    copied = _candidate(task, starting_values(task.placed, target, task.place), {})
-    best = copied if copied.largest <= EXACT else _best(task, copied, watch)
-    if not best.steps:
-        raise SimulationError(f"{target.name} has no response in the plant of {result.name}")
-    lost = lost_parameters(task.placed, best.values)
-    return Translation(
-        name=result.name,
-        source=task.source.name,
-        target=target.name,
-        parameters=translated_parameters(task, best.values, best.unnoticed),
-        steps=best.steps,
-        loops=tuple(_loops(task, _numbers(best.values))),
-        lost={row.symbol: task.own[row.symbol] for row in lost},
-        searched=best is not copied,
-        notes=tuple(translation_notes(task, best.values, best.unnoticed, best.steps)),
-        seconds=clock.perf_counter() - began,
-        time=times_of_steps(),
-    )
-
-
 def _best(task: TranslationTask, copied: Candidate, watch: Watch) -> Candidate:
     """Return the best values: copied, or fitted, where that is closer.
 
     The limits follow the fitted values, so that the search goes on once more from there; and what
     the steps hardly show then is as it was copied, where that costs hardly anything.
     """
-    free = free_parameters(task, copied.values)
+    free = _free_parameters(task, copied.values)
     if not free:
         return copied
-    first = _fitted(task, free, copied, MANY_STARTS, watch)
-    second = _fitted(task, _from(first, free), first, ONE_START, watch)
+    first = _fitted(task, free, copied, STARTS, watch)
+    second = _fitted(task, _from(first, free), first, 1, watch)
     fitted = min(first, second, key=lambda candidate: candidate.largest)
     held = {
         name: copied.values[name]
@@ -163,7 +156,7 @@ def _best(task: TranslationTask, copied: Candidate, watch: Watch) -> Candidate:
     left = [parameter for parameter in free if parameter.name not in held]
     if held and left:
         start = fitted._replace(values={**fitted.values, **held})
-        plain = _fitted(task, _from(fitted, left), start, ONE_START, watch)
+        plain = _fitted(task, _from(fitted, left), start, 1, watch)
         if plain.largest <= fitted.largest + HARDLY_MORE:
             fitted = plain
     return fitted if fitted.largest < copied.largest else copied
@@ -174,80 +167,129 @@ def _from(candidate: Candidate, free: Sequence[FreeParameter]) -> list[FreeParam
     return [replace(entry, start=candidate.values[entry.name].value) for entry in free]
 
 
+def _free_parameters(
+    task: TranslationTask, values: Mapping[str, StartValue]
+) -> list[FreeParameter]:
+    """Return the parameters of the target that are fitted: those that bump tests are fitted for.
+
+    A lag that the source bypasses stays as it is, and so does what nothing tells the size of.
+    """
+    of_source = {entry.symbol for entry in task.source.sheet if entry.free}
+    free = []
+    for row in task.target.sheet:
+        start = values[row.symbol]
+        bypassed = row.unit == "s" and start.value < SHORTEST
+        if not row.free or (bypassed and of_source & {*start.of}):
+            continue
+        copied = bool(start.of) and not bypassed
+        value = start.value if copied else row.typical
+        if max(value, row.typical) > 0.0:
+            free.append(_free(row, value, copied))
+    return free
+
+
+def _free(row: Parameter, value: float, copied: bool) -> FreeParameter:
+    """Make a parameter free about a value; a gain that the source lacks may become zero."""
+    sizes = [size for size in (value, row.typical) if size > 0.0]
+    high = min(row.high, REACH * max(sizes))
+    if row.unit != "s" and row.low <= 0.0 and not (copied and value > 0.0):
+        return FreeParameter(row.symbol, value, 0.0, high, logarithmic=False)
+    low = max(row.low, min(sizes) / REACH, SHORTEST if row.unit == "s" else 0.0)
+    return FreeParameter(row.symbol, min(max(value, low), high), low, high, logarithmic=low > 0.0)
+
+
 def _fitted(
     task: TranslationTask,
     free: Sequence[FreeParameter],
     start: Candidate,
-    effort: Effort,
+    starts: int,
     watch: Watch,
 ) -> Candidate:
-    """Return values fitted to the steps, with the limits that follow; the start where none are."""
-    result = search(task, free, _numbers(start.values), effort, watch)
-    if result is None:
+    """Fit values to the steps, with the limits that follow; the start where none responds.
+
+    Raises KeyboardInterrupt at an interruption.
+    """
+    names = {parameter.name for parameter in free}
+    fixed = {name: value for name, value in _numbers(start.values).items() if name not in names}
+    at = fixed | {parameter.name: parameter.start for parameter in free}
+    experiments = [step.experiment(task.target, at) for step in task.fitted]
+    residuals = Residuals(experiments, free, fixed)
+    descent = estimate.Descent(
+        functions=SideBySide(residuals),
+        bounds=residuals.bounds,
+        max_iterations=ITERATIONS,
+        ftol=LEAST_GAIN,
+        x_scale=residuals.units,
+    )
+    first, *others = estimate.spread(residuals.bounds, starts, residuals.start)
+    order = np.argsort(residuals.costs(others), kind="stable")
+    points = [first, *(others[k] for k in order[: REFINED - 1])]
+    minima = estimate.multistart(points, [descent], watch=watch)
+    if minima.interrupted:
+        raise KeyboardInterrupt
+    if minima.best is None:
         return start
+    found = residuals.values(minima.best.x)
     values = {
-        name: replace(entry, value=result.values[name], kind="fitted")
-        if name in result.values
-        else entry
+        name: replace(entry, value=found[name], kind="fitted") if name in names else entry
         for name, entry in start.values.items()
     }
-    return _candidate(
-        task, with_limits(values, task.placed, task.target, task.place), result.unnoticed
-    )
+    return _candidate(task, with_limits(values, task), unnoticed_shares(residuals, minima.best))
 
 
-def _candidate(
-    task: TranslationTask, values: Mapping[str, StartValue], unnoticed: Values
-) -> Candidate:
-    return Candidate(values, _comparisons(task, _numbers(values)), unnoticed)
+def unnoticed_shares(residuals: Residuals, best: estimate.Result) -> dict[str, float]:
+    """Return by what share of its value each parameter that is not zero can change unnoticed.
 
-
-def _task(result: FitResult, target: Model, sizes: Sequence[float]) -> TranslationTask:
-    source = source_model(result)
-    for model in (source, target):
-        if model.name == ALONE:
-            raise ExfitError(f"{ALONE} is no exciter: it is without a machine")
-    own, plants = source_values(result, source), step_plants(result)
-    return TranslationTask(
-        result, source, target, own, plants, reference_steps(plants, source, own, sizes)
-    )
+    The others follow, as the linear model has it; half of the errors are those of vt.
+    """
+    values = residuals.values(best.x)
+    slopes = [free.slope(float(x)) for free, x in zip(residuals.free, best.x, strict=True)]
+    names = [free.name for free in residuals.free]
+    relative = np.array([values[name] / slope for name, slope in zip(names, slopes, strict=True)])
+    present = np.flatnonzero(relative)
+    if not len(present):
+        return {}
+    jacobian = best.jac[:, present] * relative[present]
+    _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
+    rounding = np.finfo(float).eps * len(jacobian) * max(singular[0], np.finfo(float).tiny)
+    per_share = directions / np.maximum(singular, rounding)[:, None]
+    spread = np.sqrt(np.sum(per_share**2, axis=0))
+    shares = NOTICEABLE * np.sqrt(len(jacobian) / 2.0) * spread
+    return {names[k]: float(share) for k, share in zip(present, shares, strict=True)}
 
 
 def _numbers(values: Mapping[str, StartValue]) -> dict[str, float]:
     return {name: entry.value for name, entry in values.items()}
 
 
-def _comparisons(task: TranslationTask, values: Values) -> tuple[StepComparison, ...]:
-    """Return the comparison in every step; nothing where the target has no response to one."""
-    try:
-        return tuple(
-            _comparison(
-                step,
-                response_of(step.plant, task.target, values, step.step),
-                fitted=step in task.fitted,
-            )
-            for step in task.steps
-        )
-    except SimulationError:
-        return ()
-
-
-def _comparison(step: ReferenceStep, target: StepResponse, fitted: bool) -> StepComparison:
-    source = step.source
-    measures = {"vt": abs(step.step), "efd": float(np.ptp(source.signals["efd"]))}
-    return StepComparison(
-        plant=step.plant.label,
-        step=step.step,
-        fitted=fitted,
-        errors={
+def _candidate(
+    task: TranslationTask, values: Mapping[str, StartValue], unnoticed: Values
+) -> Candidate:
+    """Compare the target with the source in every step; in none where it lacks a response."""
+    numbers, steps = _numbers(values), []
+    for step in task.steps:
+        source = step.source
+        try:
+            target = step.plant.response(task.target, numbers, step.step)
+        except SimulationError:
+            return Candidate(values, (), unnoticed)
+        measures = {"vt": abs(step.step), "efd": float(np.ptp(source.signals["efd"]))}
+        errors = {
             name: _error(target.signals[name] - source.signals[name], measure)
             for name, measure in measures.items()
-        },
-        source_limits=source.limits,
-        target_limits=target.limits,
-        source=source.signals,
-        target=target.signals,
-    )
+        }
+        comparison = StepComparison(
+            plant=step.plant.label,
+            step=step.step,
+            fitted=step in task.fitted,
+            errors=errors,
+            source_limits=source.limits,
+            target_limits=target.limits,
+            source=source.signals,
+            target=target.signals,
+        )
+        steps.append(comparison)
+    return Candidate(values, tuple(steps), unnoticed)
 
 
 def _error(difference: Array, measure: float) -> SignalError:
@@ -259,11 +301,8 @@ def _loops(task: TranslationTask, values: Values) -> Iterator[LoopComparison]:
     """Yield the voltage loop of both models in each plant in which both have one."""
     for plant in task.plants:
         try:
-            yield LoopComparison(
-                plant.label,
-                _loop(plant, task.source, task.own),
-                _loop(plant, task.target, values),
-            )
+            source = _loop(plant, task.source, task.own)
+            yield LoopComparison(plant.label, source, _loop(plant, task.target, values))
         except SimulationError:
             continue
 
@@ -281,3 +320,73 @@ def _loop(plant: StepPlant, model: Model, values: Values) -> LoopFigures:
         damping=None if least is None else least.damping,
         frequency=None if least is None else least.frequency,
     )
+
+
+def _parameter(task: TranslationTask, row: Parameter, best: Candidate) -> TranslatedParameter:
+    """Return a parameter of the target with where it is from.
+
+    Of several in the source the least certain names the origin of its value.
+    """
+    result, entry = task.result, best.values[row.symbol]
+    states = {}
+    for name in entry.of:
+        fitted = result.parameters.get(name)
+        if fitted is None:
+            states[name] = result.source_of(name)
+        elif fitted.at_bound:
+            states[name] = f"fitted, on its {fitted.at_bound}"
+        else:
+            states[name] = "fitted" if fitted.determined else "fitted, not determined"
+    sources = (result.sources.get(name, NOT_STATED) for name in entry.of)
+    return TranslatedParameter(
+        value=entry.value,
+        unit=row.unit,
+        meaning=row.meaning,
+        origin=entry.kind,
+        source=task.source.name,
+        of=states,
+        unnoticed=best.unnoticed.get(row.symbol),
+        value_source=(
+            least_certain(sources) if entry.kind in ("copied", "computed") else entry.kind
+        ),
+    )
+
+
+def _notes(task: TranslationTask, best: Candidate) -> Iterator[str]:
+    """Yield what must be known beside the numbers: of the fit, the parameters, the steps."""
+    source, target = task.source.name, task.target.name
+    yield from _fit_notes(task)
+    hidden = ", ".join(name for name, share in best.unnoticed.items() if share > UNDETERMINED)
+    if hidden:
+        yield f"the steps hardly show {hidden} of {target}: another value would do as well"
+    typical = ", ".join(name for name, entry in best.values.items() if entry.kind == "typical")
+    if typical:
+        yield f"typical, {source} has no such parameter: {typical} of {target}"
+    yield from _limit_notes(best.steps, source, target)
+    if task.result.machine_model is None:
+        yield f"the machine is typical, {DEFAULT_MACHINE}: the fit has none"
+    if not any(plant.kind.on_load for plant in task.plants):
+        yield "compared on open circuit alone: the fit has no network with a source"
+
+
+def _fit_notes(task: TranslationTask) -> Iterator[str]:
+    result, source = task.result, task.source.name
+    if not result.holds:
+        yield f"the fit of {source} does not hold: {outcome_of(result)}: {explanation_of(result)}"
+    own = {name: entry for name, entry in result.parameters.items() if name in task.own}
+    unknown = ", ".join(name for name, entry in own.items() if not entry.determined)
+    if unknown:
+        yield f"the record of the fit did not determine {unknown} of {source}"
+    outside = [f"{name} {entry.value:.4g}" for name, entry in own.items() if not entry.physical]
+    if outside:
+        yield f"not physical, outside the range of the data sheet: {', '.join(outside)}"
+
+
+def _limit_notes(steps: Sequence[StepComparison], source: str, target: str) -> Iterator[str]:
+    at_source = [s.label for s in steps if s.source_limits and not s.target_limits]
+    at_target = [s.label for s in steps if s.target_limits and not s.source_limits]
+    for limited, free, labels in ((source, target, at_source), (target, source, at_target)):
+        if labels:
+            yield f"{limited} meets a limit and {free} none: {', '.join(labels)}"
+    if not any(step.fitted and not step.source_limits for step in steps):
+        yield f"{source} meets a limit in every step: choose smaller ones by --step"

@@ -7,23 +7,33 @@ import yaml
 from places import ROOT
 
 from exfit.case.load import parse_case
-from exfit.features.translate.case import translated_case
+from exfit.features.translate.files import translated_case
+from exfit.features.translate.result import TranslatedParameter
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 
 CASE = ROOT / "configs" / "ac1a_typical.yaml"
 EXAC1 = MODELS["EXAC1"]
 VALUES = typical(EXAC1.sheet) | {"KA": 333.0, "TF": 0.0123}
-PROVENANCE = {row.symbol: f"from {row.symbol}" for row in EXAC1.sheet}
-SOURCES = dict.fromkeys(PROVENANCE, "fitted") | {"KC": "not stated", "KD": "without effect"}
+SOURCES = {"KC": "not stated", "KD": "without effect"}
 PLANT = {"type": "open-circuit", "machine": "GENROU", "parameters": {"Tpd0": 6.5, "Xd": 1.7}}
 
 
 def translated(text, case=CASE, folder=ROOT / "configs", **values):
-    parts = "EXAC1", EXAC1
     own = VALUES | values
-    sources = PROVENANCE, SOURCES
-    return translated_case(text, case, folder, parts, own, *sources, PLANT, "AC1A\nas EXAC1")
+    entries = {
+        row.symbol: TranslatedParameter(
+            value=own[row.symbol],
+            unit=row.unit,
+            meaning=row.meaning,
+            origin="copied",
+            source="AC1A",
+            of={row.symbol: "fitted"},
+            value_source=SOURCES.get(row.symbol, "fitted"),
+        )
+        for row in EXAC1.sheet
+    }
+    return translated_case(text, case, folder, ("EXAC1", EXAC1), entries, PLANT, "AC1A\nas EXAC1")
 
 
 def test_it_is_the_case_with_another_exciter():
@@ -36,7 +46,7 @@ def test_it_is_the_case_with_another_exciter():
     assert {name: case.values()[name] for name in VALUES} == VALUES
     assert [*case.free()] == [row.symbol for row in EXAC1.sheet if row.free]
     assert text.startswith("# AC1A\n# as EXAC1\nmodel: EXAC1\n")
-    assert "regulator gain; from KA" in text
+    assert "regulator gain; translated from AC1A: KA (fitted)" in text
     assert {name: case.sources()[name] for name in ("KA", "TR", "KC", "KD")} == {
         "KA": "fitted", "TR": "fitted", "KC": "not stated", "KD": "not stated"
     }  # fmt: skip

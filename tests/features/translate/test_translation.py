@@ -13,8 +13,8 @@ import exfit
 from exfit.errors import ExfitError, ModelError
 from exfit.features.planner.export import export
 from exfit.features.translate.result import EXACT, POOR
-from exfit.features.translate.search import NOTICEABLE, _unnoticed
 from exfit.features.translate.steps import step_plants
+from exfit.features.translate.translate import NOTICEABLE, unnoticed_shares
 from exfit.models import MODELS, STABILISERS
 from exfit.models.exciters import sexs
 from exfit.models.sheet import typical
@@ -283,7 +283,7 @@ def test_a_change_of_the_share_that_is_unnoticed_moves_the_responses_by_a_thousa
         free=[SimpleNamespace(name=name, slope=lambda _: 1.0) for name in names],
         values=lambda x: dict(zip(names, x, strict=True)),
     )
-    unnoticed = _unnoticed(residuals, SimpleNamespace(x=values, jac=jacobian))
+    unnoticed = unnoticed_shares(residuals, SimpleNamespace(x=values, jac=jacobian))
     for k, name in enumerate(names):
         change = jacobian[:, k] * unnoticed[name] * values[k]
         others = np.delete(jacobian, k, axis=1)
