@@ -22,7 +22,8 @@ from exfit.errors import (
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.features.design.design import design_test, identify
+    from exfit.features.design.designed_test import design_test
+    from exfit.features.design.experiment_design import identify
     from exfit.features.fleet.batch import batch
     from exfit.features.fleet.folder import read_fleet
     from exfit.features.planner.table_cases import cases_of_table

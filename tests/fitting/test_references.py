@@ -14,7 +14,7 @@ from records import case_of, config, found_in, one, synthetic, write
 from exfit.case.case import Case
 from exfit.case.peek import files_of
 from exfit.errors import CaseError, RecordError
-from exfit.features.design.design import identify
+from exfit.features.design.experiment_design import identify
 from exfit.fitting.build import build_experiments
 from exfit.records.record import Record
 from exfit.workflows import fit, simulate

@@ -11,7 +11,7 @@ from places import CONFIGS
 from records import SAMPLES, case_of, config
 
 from exfit.case.load import load_case
-from exfit.features.design.design import identify
+from exfit.features.design.experiment_design import identify
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence

@@ -8,4 +8,4 @@ COMMANDS = {
     )
 }
 
-PUBLIC = {"design_test": "design:design_test", "identify": "design:identify"}
+PUBLIC = {"design_test": "designed_test:design_test", "identify": "experiment_design:identify"}

@@ -8,19 +8,85 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.errors import SimulationError
-from exfit.features.design.limits import Limits
+from exfit.errors import CaseError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slopes_of
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.simulation.simulator import Simulator
+from exfit.simulation.simulator import Run, Simulator
+from exfit.util.text import near
 
 Array = NDArray[np.float64]
+Extremes = Mapping[str, tuple[float, float]]
 
 REST = 1.0  # s before the first step: the rest that a record must show
 LAST_DWELL = 1.0  # s that the last level is recorded at least
+ROUNDING = 1e-9  # pu: a limit that is met exactly is kept
 SMALLEST_SIZE = 0.1  # of the interval between bounds: what counts as 100 % of a value near zero
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How far a test may go, per unit.
+
+    ``vt`` and ``vref`` may deviate so far from the start, the reference by default as far as vt;
+    ``efd`` and ``efd_min`` are the largest and the least field voltage, besides the model's own.
+    Raises CaseError for a limit that leaves no room.
+    """
+
+    vt: float = 0.05
+    vref: float = inf
+    efd: float = inf
+    efd_min: float = -inf
+
+    def __post_init__(self) -> None:
+        for name in ("vt", "vref"):
+            if not getattr(self, name) > 0.0:
+                raise CaseError([f"limit {name}: {getattr(self, name):g}: must be above 0"])
+        if not self.efd_min < self.efd:
+            raise CaseError([f"limit efd_min: {self.efd_min:g}: must be below {self.efd:g}"])
+
+    @staticmethod
+    def of(values: Mapping[str, float]) -> "Limits":
+        """Return the limits of some names; raises CaseError for a name that is none."""
+        names = ("vt", "vref", "efd", "efd_min")
+        unknown = [name for name in values if name not in names]
+        if unknown:
+            raise CaseError(f"limit {name}: not a limit; {near(name, names)}" for name in unknown)
+        return Limits(**values)
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The limits that there are, by name."""
+        limits = {"vt": self.vt, "vref": self.of_vref, "efd": self.efd, "efd_min": self.efd_min}
+        return {name: limit for name, limit in limits.items() if abs(limit) < inf}
+
+    @property
+    def of_vref(self) -> float:
+        """How far the reference may deviate from the start, pu."""
+        return self.vt if self.vref == inf else self.vref
+
+    def keep(self, run: Run) -> bool:
+        """Tell whether a simulated test is within the limits at every point of its grid."""
+        extremes = extremes_of(run)
+        return bool(np.isfinite([*extremes.values()]).all()) and self.allow(
+            extremes, float(run.outputs["vt"][0])
+        )
+
+    def allow(self, extremes: Extremes, vt0: float) -> bool:
+        """Tell whether signals that stay between extremes, from a voltage, are within limits."""
+        (vt_low, vt_high), (efd_low, efd_high) = extremes["vt"], extremes["efd"]
+        deviation = max(vt_high - vt0, vt0 - vt_low)
+        within_efd = self.efd_min - ROUNDING <= efd_low and efd_high <= self.efd + ROUNDING
+        return deviation <= self.vt + ROUNDING and within_efd
+
+
+def extremes_of(run: Run) -> Extremes:
+    """Return the least and the largest value of each signal that has a limit, pu."""
+    return {
+        signal: (float(run.outputs[signal].min()), float(run.outputs[signal].max()))
+        for signal in ("vt", "efd")
+    }
 
 
 class ReferenceMove(NamedTuple):
@@ -134,19 +200,7 @@ class Bench:
         if information is None:
             return None
         recorded = [channel.signal in signals for channel in self.candidates]
-        slopes = slopes_of(self.problem, self.problem.start)
-        sizes = self._sizes() / slopes  # relative errors: the matrix is well scaled
-        whole = information[recorded].sum(axis=0) * np.outer(sizes, sizes)
-        for k, prior in self.problem.priors.items():
-            whole[k, k] += (self._sizes()[k] / prior.std) ** 2
-        values, vectors = np.linalg.eigh(whole)
-        if values[0] <= len(values) * np.finfo(float).eps * values[-1]:
-            return None
-        return np.asarray((vectors / values) @ vectors.T)
-
-    def _sizes(self) -> Array:
-        """Return the change of each parameter that counts as 100 %, (N,) in its own unit."""
-        return np.array(
+        sizes = np.array(  # the change of each that counts as 100 %, in its own unit
             [
                 abs(free.start)
                 if free.logarithmic
@@ -154,6 +208,14 @@ class Bench:
                 for free in self.problem.free
             ]
         )
+        scales = sizes / slopes_of(self.problem, self.problem.start)  # the matrix is well scaled
+        whole = information[recorded].sum(axis=0) * np.outer(scales, scales)
+        for k, prior in self.problem.priors.items():
+            whole[k, k] += (sizes[k] / prior.std) ** 2
+        values, vectors = np.linalg.eigh(whole)
+        if values[0] <= len(values) * np.finfo(float).eps * values[-1]:
+            return None
+        return np.asarray((vectors / values) @ vectors.T)
 
     def cost(self, moves: Moves, signals: Sequence[str], duration: float) -> float:
         """Return the criterion, infinite for a test that determines nothing or breaks a limit."""

@@ -6,34 +6,54 @@ small is an alphabetic criterion of the Cramer-Rao bound at the values of the ca
 Source: Atkinson, Donev & Tobias 2007, Optimum Experimental Designs, with SAS, chapters 10 and 17.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
-from typing import Any, NamedTuple
+from os import PathLike
+from typing import Any
 
 import numpy as np
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.features.design.candidates import LAST_DWELL, REST, Bench, Moves, Stage
-from exfit.features.design.exchange import best_moves, best_single_step, gains
+from exfit.features.design.candidates import (
+    LAST_DWELL,
+    REST,
+    Bench,
+    Extremes,
+    Limits,
+    Moves,
+    ReferenceMove,
+    Stage,
+    extremes_of,
+)
 from exfit.features.design.experiment_design import noise_levels, refuse_noise
-from exfit.features.design.limits import Extremes, Limits, extremes_of
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances.kinds import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
+from exfit.fitting.setup import with_enough_substeps
 from exfit.simulation.simulator import Run
 from exfit.util.text import near
 from exfit.util.typed import plain
+from exfit.workflows import loaded
 
 MOST_STEPS_OF_TEST, MOST_CHANNELS = 4, 3
 SHORTER = 0.5  # of the duration, for comparison
 LONGEST = 600.0  # s of a test: the search simulates it a thousand times
 SPREAD = 0.2  # by how much a parameter may be another than the case says
 CRITERIA = ("A", "D")
+DWELLS = (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)  # s between steps
+SHARES = tuple(k / 5.0 for k in range(-5, 6))  # of the limit of the reference
+REFINEMENTS = (0.1, 0.05, 0.025)  # of that limit, about the best of these
+FIRST_DWELLS = (0.2, 1.0, 3.0)  # s, of a further step
+MOST_SWEEPS = 6
+LEAST_GAIN = 0.01  # of the criterion, for which a step or a channel is added
+LEAST_GAIN_OF_SWEEP = 1e-3  # of the criterion
+
+Cost = Callable[[Moves], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,24 +124,38 @@ class DesignedTest:
         }
 
 
-def designed_test(
-    case: Case,
-    of: Sequence[str],
-    limits: Limits,
-    duration: float | None,
-    channels: Sequence[str],
-    criterion: str,
-    noise: Mapping[str, float],
+def design_test(
+    case: Case | str | PathLike[str],
+    of: Sequence[str] = (),
+    *,
+    limits: Mapping[str, float] | None = None,
+    duration: float | None = None,
+    channels: Sequence[str] = (),
+    criterion: str = "A",
+    noise: Mapping[str, float] | None = None,
 ) -> DesignedTest:
-    """Return the steps of the reference that make the parameters ``of`` a case best known.
+    """Return the steps of the reference that make parameters of a case best known.
 
-    All free parameters by default, while the others stay free. Of ``channels``, all signals of the
-    plant by default, up to three are chosen, those of the case first. Without ``duration`` (s) the
-    test is as long as that of the case. Raises ExfitError for input that cannot be used, and where
-    no single step within the limits determines the parameters.
+    Args:
+        case: a case, or the path of its file; it needs no record.
+        of: the parameters to be known best, all free ones by default; the others stay free.
+        limits: how far vt and vref may deviate from their start (default 0.05), the largest efd
+            and the least, efd_min; per unit.
+        duration: of the test, s; by default that of the case.
+        channels: what can be recorded, of which up to three are chosen; by default all signals.
+        criterion: what is made least: "A" the mean square of the relative standard errors, "D" the
+            volume of their confidence ellipsoid.
+        noise: as in `identify`.
+
+    The errors are those of linear theory at the values of the case. Raises ExfitError for input
+    that cannot be used.
+
+    Example:
+        >>> exfit.design_test("case.yaml", ["KA"], limits={"vt": 0.05, "efd": 4}).best.steps
     """
-    refuse_noise(noise)
-    bench = _bench(case, of, limits, channels, criterion, noise)
+    case, of = loaded(case), [of] if isinstance(of, str) else of
+    limits_of_test = Limits.of(limits or {})
+    bench = _bench(case, of, limits_of_test, channels, criterion, noise or {})
     times = bench.base.simulator.times
     duration = float(times[-1] - times[0]) if duration is None else duration
     shortest = REST + LAST_DWELL
@@ -129,91 +163,133 @@ def designed_test(
         limits_of_it = f"must exceed {shortest:g} s and be at most {LONGEST:g} s"
         raise CaseError([f"duration: {duration:g} s: {limits_of_it}"])
     stages = [*_stages(bench, duration)]
-    best = stages[-1].stage
-    moves = best_single_step(bench, best.channels, duration)
-    single = bench.stage("1 step", moves, best.channels, duration)
-    run = _checked_run(case, bench, stages[-1].moves, duration)
+    moves, best = stages[-1]
+    single = best_single_step(partial(bench.cost, signals=best.channels, duration=duration))
+    simulator = with_enough_substeps(bench.simulator(moves, duration), bench.values(), case.path)
+    run = simulator.run(bench.values())
     return DesignedTest(
         name=case.path.stem,
         of=bench.names,
         criterion=criterion,
-        limits=limits,
-        stages=tuple(candidate.stage for candidate in stages),
-        single=single,
+        limits=limits_of_test,
+        stages=tuple(stage for _, stage in stages),
+        single=bench.stage("1 step", single, best.channels, duration),
         best=best,
         noise={channel.signal: 1.0 / channel.weight for channel in bench.candidates},
         rate=1.0 / float(np.median(np.diff(times))),
         vt0=float(run.outputs["vt"][0]),
         extremes=extremes_of(run),
-        other_values=_at_other_values(bench, best, stages[-1].moves, moves),
+        other_values=_at_other_values(bench, best, moves, single),
         run=run,
     )
 
 
-class _Candidate(NamedTuple):
-    """The moves of a test, and what it would show."""
+def _bench(
+    case: Case,
+    of: Sequence[str],
+    limits: Limits,
+    channels: Sequence[str],
+    criterion: str,
+    noise: Mapping[str, float],
+) -> Bench:
+    """Prepare the basis of all candidates; raises CaseError for what the case does not have."""
+    refuse_noise(noise)
+    _refuse(case, of, channels, criterion)
+    free = free_parameters(case)
+    setups = build_experiments(case) if case.recordings else ()
+    own = setups[0].experiment if setups else planned(case)
+    noise_of = noise_levels(own, noise)
+    candidates = tuple(
+        Channel(signal, np.zeros(0), weight=1.0 / noise_of[signal])
+        for signal in case.kind.compared
+        if signal in (channels or case.kind.compared)
+    )
+    starts = {parameter.name: parameter.start for parameter in free}
+    fixed = {name: value for name, value in case.values().items() if name not in starts}
+    of_records = {row.name: row.start for setup in setups for row in setup.free}
+    base = _at_levels(case, own, of_records, {**fixed, **starts})
+    chosen = tuple(k for k, parameter in enumerate(free) if parameter.name in (of or starts))
+    problem = Residuals([base], free, fixed, case.ties)
+    return Bench(base, problem, candidates, chosen, criterion, limits)
 
-    moves: Moves
-    stage: Stage
+
+def _at_levels(
+    case: Case, own: Experiment, of_records: Mapping[str, float], values: Mapping[str, float]
+) -> Experiment:
+    """Return the test of a case with the levels that a fit would find, at their starts."""
+    levels = {
+        OF_SYSTEM[nuisance.kind]: of_records[nuisance.name]
+        for nuisance in own.nuisances
+        if nuisance.kind in OF_SYSTEM
+    }
+    parameters = own.parameters({**values, **of_records})
+    simulator = with_enough_substeps(own.simulator, parameters, case.path)
+    return Experiment(simulator, own.channels, {**own.own, **levels})
 
 
-def _stages(bench: Bench, duration: float) -> Iterator[_Candidate]:
+def _refuse(case: Case, of: Sequence[str], channels: Sequence[str], criterion: str) -> None:
+    """Raise CaseError for a plant without a reference, and for names that do not exist."""
+    if not case.kind.closed_loop:
+        text = "no test can be designed: the plant has no reference whose steps are simulated"
+        raise CaseError([f"{case.path}: plant {case.kind.name}: {text}"])
+    names = [*case.free()]
+    faults = [
+        f"{key}: {name}: must be one of {', '.join(known)}; {near(name, known)}"
+        for key, given, known in (("of", of, names), ("channels", channels, case.kind.compared))
+        for name in given
+        if name not in known
+    ]
+    if not names:
+        faults.append(f"{case.path}: parameters.free: empty: there is nothing to identify")
+    if criterion not in CRITERIA:
+        faults.append(f"criterion: {criterion}: must be one of {', '.join(CRITERIA)}")
+    if faults:
+        raise CaseError(faults)
+
+
+def _stages(bench: Bench, duration: float) -> Iterator[tuple[Moves, Stage]]:
     """Yield better and better tests: a longer one, with further channels, with further steps.
 
     Raises CaseError where no single step determines the parameters.
     """
-
-    def candidate(label: str, moves: Moves, signals: tuple[str, ...], span: float) -> _Candidate:
-        return _Candidate(moves, bench.stage(label, moves, signals, span))
-
-    signals = _first_channels(bench)
-    shorter = SHORTER * duration
-    moves = best_single_step(bench, signals, shorter)
-    if bench.cost(moves, signals, shorter) < inf:
-        yield candidate(f"1 step, {shorter:g} s", moves, signals, shorter)
-    moves = best_single_step(bench, signals, duration)
-    if bench.cost(moves, signals, duration) == inf:
+    names = tuple(channel.signal for channel in bench.candidates)
+    of_case = tuple(signal for signal in bench.base.signals if signal in names)
+    signals = of_case[:MOST_CHANNELS] or names[:1]
+    for span in (SHORTER * duration, duration):
+        moves = best_single_step(partial(bench.cost, signals=signals, duration=span))
+        cost = bench.cost(moves, signals, span)
+        if cost < inf:
+            yield moves, bench.stage(f"1 step, {span:g} s", moves, signals, span)
+    if cost == inf:
         reach = f"a single step of the reference of up to {bench.limits.of_vref:g} pu"
-        names = ", ".join(bench.names)
-        text = f"{reach} within the limits determines {names} from {', '.join(signals)}"
+        sought = ", ".join(bench.names)
+        text = f"{reach} within the limits determines {sought} from {', '.join(signals)}"
         raise CaseError([f"no design: not even {text}"])
-    yield candidate(f"1 step, {duration:g} s", moves, signals, duration)
     for more in _further_channels(bench, moves, signals, duration):
         signals = more
-        yield candidate(f"+ {signals[-1]}", moves, signals, duration)
-    pool = [best_single_step(bench, signals, duration)]
+        yield moves, bench.stage(f"+ {signals[-1]}", moves, signals, duration)
+    cost_of = partial(bench.cost, signals=signals, duration=duration)
+    pool = [best_single_step(cost_of)]
     for count in range(2, MOST_STEPS_OF_TEST + 1):
-        best, pool = pool[0], best_moves(bench, pool, signals, duration)
-        if not pool or not gains(*(bench.cost(m, signals, duration) for m in (best, pool[0]))):
+        best, pool = pool[0], best_moves(cost_of, pool, duration)
+        if not pool or not gains(cost_of(best), cost_of(pool[0])):
             return
-        yield candidate(f"{count} steps", pool[0], signals, duration)
-
-
-def _first_channels(bench: Bench) -> tuple[str, ...]:
-    """Return the channels of the case that can be recorded, or the first that can."""
-    names = tuple(channel.signal for channel in bench.candidates)
-    return tuple(s for s in bench.base.signals if s in names)[:MOST_CHANNELS] or names[:1]
+        yield pool[0], bench.stage(f"{count} steps", pool[0], signals, duration)
 
 
 def _further_channels(
-    bench: Bench, moves: Moves, first: tuple[str, ...], duration: float
+    bench: Bench, moves: Moves, signals: tuple[str, ...], duration: float
 ) -> Iterator[tuple[str, ...]]:
     """Yield the channels with one more each time, the one that adds most, while one does."""
-    signals, cost = first, bench.cost(moves, first, duration)
+    cost = bench.cost(moves, signals, duration)
     while len(signals) < MOST_CHANNELS:
         others = [c.signal for c in bench.candidates if c.signal not in signals]
-        costs = {signal: bench.cost(moves, (*signals, signal), duration) for signal in others}
+        costs = {other: bench.cost(moves, (*signals, other), duration) for other in others}
         if not costs or not gains(cost, min(costs.values())):
             return
-        added = min(costs, key=lambda signal: costs[signal])
+        added = min(costs, key=lambda other: costs[other])
         signals, cost = (*signals, added), costs[added]
         yield signals
-
-
-def _checked_run(case: Case, bench: Bench, moves: Moves, duration: float) -> Run:
-    """Return the response to a test, with sub-steps enough all along it."""
-    simulator = bench.simulator(moves, duration)
-    return with_enough_substeps(simulator, bench.values(), case.path).run(bench.values())
 
 
 def _at_other_values(bench: Bench, best: Stage, moves: Moves, single: Moves) -> OtherValues:
@@ -246,65 +322,79 @@ def _benches_beside(bench: Bench) -> Iterator[Bench]:
             yield replace(bench, problem=problem, limits=limits, tried={})
 
 
-def _bench(
-    case: Case,
-    of: Sequence[str],
-    limits: Limits,
-    channels: Sequence[str],
-    criterion: str,
-    noise: Mapping[str, float],
-) -> Bench:
-    """Prepare the basis of all candidates; raises CaseError for what the case does not have."""
-    _refuse(case, of, channels, criterion)
-    free = free_parameters(case)
-    setups = build_experiments(case) if case.recordings else ()
-    own = setups[0].experiment if setups else planned(case)
-    levels = noise_levels(own, noise)
-    candidates = tuple(
-        Channel(signal, np.zeros(0), weight=1.0 / levels[signal])
-        for signal in case.kind.compared
-        if signal in (channels or case.kind.compared)
-    )
-    starts = {parameter.name: parameter.start for parameter in free}
-    fixed = {name: value for name, value in case.values().items() if name not in starts}
-    base = _rested(case, own, {**fixed, **starts}, setups)
-    chosen = tuple(k for k, parameter in enumerate(free) if parameter.name in (of or starts))
-    problem = Residuals([base], free, fixed, case.ties)
-    return Bench(base, problem, candidates, chosen, criterion, limits)
+def best_single_step(cost: Cost) -> Moves:
+    """Return the best single step: all levels of the finest ladder, up and down."""
+    finest = REFINEMENTS[-1]
+    levels = [sign * k * finest for k in range(1, round(1.0 / finest) + 1) for sign in (1.0, -1.0)]
+    return min(((ReferenceMove(0.0, round(level, 6)),) for level in levels), key=cost)
 
 
-def _rested(
-    case: Case, own: Experiment, values: Mapping[str, float], setups: Sequence[ExperimentSetup]
-) -> Experiment:
-    """Return the test of a case with the levels that a fit would find, at their starts."""
-    of_records = {row.name: row.start for setup in setups for row in setup.free}
-    levels = {
-        OF_SYSTEM[nuisance.kind]: of_records[nuisance.name]
-        for nuisance in own.nuisances
-        if nuisance.kind in OF_SYSTEM
-    }
-    parameters = own.parameters({**values, **of_records})
-    simulator = with_enough_substeps(own.simulator, parameters, case.path)
-    return Experiment(simulator, own.channels, {**own.own, **levels})
+def best_moves(cost: Cost, fewer: Sequence[Moves], duration: float) -> list[Moves]:
+    """Return moves with one more than those given, the best first; none where none are allowed.
+
+    The best of ``fewer`` is what the search begins with; where a further move gains nothing from
+    there, as when it leaves no time for one, the others of them follow.
+    """
+    ends: list[Moves] = []
+    for before in fewer:
+        families = _later(before), _earlier(before), _pulses(len(before) + 1, duration)
+        starts = [min(family, key=cost) for family in families]
+        exchanged = [_exchanged(cost, start) for start in starts if cost(start) < inf]
+        ends = sorted(dict.fromkeys([*ends, *exchanged]), key=cost)
+        if ends and gains(cost(fewer[0]), cost(ends[0])):
+            break
+    return ends
 
 
-def _refuse(case: Case, of: Sequence[str], channels: Sequence[str], criterion: str) -> None:
-    """Raise CaseError for a plant without a reference, and for names that do not exist."""
-    if not case.kind.closed_loop:
-        text = "no test can be designed: the plant has no reference whose steps are simulated"
-        raise CaseError([f"{case.path}: plant {case.kind.name}: {text}"])
-    names = [*case.free()]
-    faults = [*_unknown("of", of, names), *_unknown("channels", channels, case.kind.compared)]
-    if not names:
-        faults.append(f"{case.path}: parameters.free: empty: there is nothing to identify")
-    if criterion not in CRITERIA:
-        faults.append(f"criterion: {criterion}: must be one of {', '.join(CRITERIA)}")
-    if faults:
-        raise CaseError(faults)
+def gains(before: float, after: float) -> bool:
+    """Tell whether a criterion is so much smaller that an addition is worth it."""
+    return after <= (1.0 - LEAST_GAIN) * before
 
 
-def _unknown(key: str, given: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    """Yield a fault for each name that is given and not among those that there are."""
-    for name in given:
-        if name not in names:
-            yield f"{key}: {name}: must be one of {', '.join(names)}; {near(name, names)}"
+def _later(fewer: Moves) -> Iterator[Moves]:
+    """Yield moves with one more behind those given."""
+    for dwell in FIRST_DWELLS:
+        for share in _levels(fewer[-1].share):
+            yield (*fewer, ReferenceMove(dwell, share))
+
+
+def _earlier(fewer: Moves) -> Iterator[Moves]:
+    """Yield moves with one more before those given."""
+    first, *others = fewer
+    for dwell in FIRST_DWELLS:
+        for share in _levels(first.share):
+            yield (ReferenceMove(0.0, share), ReferenceMove(dwell, first.share), *others)
+
+
+def _pulses(count: int, duration: float) -> Iterator[Moves]:
+    """Yield moves up and down in turn."""
+    even = (duration - REST) / count
+    for dwell in (max((d for d in DWELLS if d <= even), default=DWELLS[0]), DWELLS[1]):
+        for size in SHARES:
+            yield tuple(ReferenceMove(dwell if k else 0.0, size * (-1) ** k) for k in range(count))
+
+
+def _exchanged(cost: Cost, moves: Moves) -> Moves:
+    """Exchange coordinates, one at a time, for better ones until hardly any is."""
+    least = cost(moves)
+    for _ in range(MOST_SWEEPS):
+        before = least
+        for k in range(len(moves)):
+            others = [moves[k]._replace(share=share) for share in _levels(moves[k].share)]
+            if k > 0:
+                others += [moves[k]._replace(dwell=dwell) for dwell in DWELLS]
+            for other in others:
+                trial = (*moves[:k], other, *moves[k + 1 :])
+                if cost(trial) < least:
+                    moves, least = trial, cost(trial)
+        if least > (1.0 - LEAST_GAIN_OF_SWEEP) * before:
+            break
+    return moves
+
+
+def _levels(share: float) -> Iterator[float]:
+    """Yield the levels of the ladder, and finer ones about a level."""
+    near_by = (share + sign * part for part in REFINEMENTS for sign in (1.0, -1.0))
+    for level in (*SHARES, *near_by):
+        if abs(level) <= 1.0:
+            yield round(level, 6)

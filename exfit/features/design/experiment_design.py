@@ -6,10 +6,11 @@ Source: Walter & Pronzato 1997, Identification of Parametric Models from Experim
 chapter 6.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
 from exfit.util.typed import plain
 from exfit.verdict.diagnostics import search_range_notes
+from exfit.workflows import loaded
 
 Array = NDArray[np.float64]
 
@@ -76,21 +78,34 @@ class Design:
         }
 
 
-def identify(case: Case, noise: Mapping[str, float]) -> Design:
+def identify(case: Case | str | PathLike[str], noise: Mapping[str, float] | None = None) -> Design:
     """Predict the standard errors of a case's free parameters in tests, at their start values.
 
     The case's own test comes first, on the clock of its record if it has one; beside it steps of
-    2, 5 and 10 %, a test twice as long, and further signals. ``noise`` is that of signals, per
-    unit; else it is the case's, else the record's, else `NOISE`. Raises ExfitError for input that
-    cannot be used.
+    2, 5 and 10 %, a test twice as long, and further signals.
+
+    Args:
+        case: a case, or the path of its file; it needs no record.
+        noise: standard deviation of the noise by signal, per unit; what is missing: the case's
+            own, else that of its record, else a typical one.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
     """
+    case = loaded(case)
+    if case.has_no_equations:
+        text = "plant.twin: missing; identify needs the equations of a plant of exfit"
+        raise CaseError([f"{case.path}: {text}"])
+    given = noise or {}
     setups = build_experiments(case) if case.recordings else ()
     free = free_parameters(case, setups)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
+    refuse_noise(given)
     own = [setup.experiment for setup in setups] or [planned(case)]
-    refuse_noise(noise)
-    levels = [noise_levels(experiment, noise) for experiment in own]
+    levels = [noise_levels(experiment, given) for experiment in own]
     records = tuple(parameter.name for setup in setups for parameter in setup.free)
     uncertainty_after = partial(
         _uncertainty_after, case=case, free=free, levels=levels, records=records
@@ -99,21 +114,17 @@ def identify(case: Case, noise: Mapping[str, float]) -> Design:
         Plan(label, uncertainty_after(experiments).confidence)
         for label, experiments in _variants(case, own)
     ]
+    notes = [*search_range_notes(case)]
+    if case.external is not None:
+        twin, program = case.external.twin, case.external.simulator
+        notes.insert(0, f"these are the standard errors of the twin {twin}: {program} is not run")
     return Design(
         case.path.stem,
         uncertainty_after(own),
         tuple(plans),
         _noise_by_signal(case, own, levels),
-        (*_twin_notes(case), *search_range_notes(case)),
+        tuple(notes),
     )
-
-
-def _twin_notes(case: Case) -> Iterator[str]:
-    if case.external is not None:
-        yield (
-            f"these are the standard errors of the twin {case.external.twin}: "
-            f"{case.external.simulator} is not run"
-        )
 
 
 def _uncertainty_after(
@@ -125,18 +136,33 @@ def _uncertainty_after(
 ) -> UncertaintyAnalysis:
     """Predict the standard errors of experiments with these levels of noise.
 
-    ``records`` names what is found about the records themselves.
+    ``records`` names what is found about the records themselves. Steps whose sizes a fit would
+    find have those of the tests.
     """
     starts = {parameter.name: parameter.start for parameter in free}
     fixed = {name: value for name, value in case.values().items() if name not in starts}
-    at = {**fixed, **starts, **_steps(experiments)}
+    sizes = {
+        nuisance.name: experiment.simulator.inputs.steps[nuisance.step].step
+        for experiment in experiments
+        for nuisance in experiment.nuisances
+        if nuisance.kind == "step"
+    }
     pairs = [*zip(experiments, levels, strict=True)]
     finest = min(of_signal[name] for experiment, of_signal in pairs for name in experiment.signals)
-    expected = [
-        with_enough_substeps(_with_noise(experiment, of_signal, finest), at, case.path)
-        for experiment, of_signal in pairs
-    ]
-    problem = problem_of(Residuals(expected, _with_steps(free, experiments), fixed, case.ties))
+    expected = []
+    for experiment, of_signal in pairs:
+        channels = tuple(
+            replace(
+                channel,
+                noise=of_signal[channel.signal],
+                weight=finest / of_signal[channel.signal],
+            )
+            for channel in experiment.channels
+        )
+        noisy = replace(experiment, channels=channels)
+        expected.append(with_enough_substeps(noisy, {**fixed, **starts, **sizes}, case.path))
+    moved = [replace(row, start=sizes.get(row.name, row.start)) for row in free]
+    problem = problem_of(Residuals(expected, moved, fixed, case.ties))
     residuals = problem.residuals
     linear = linearisation(problem, residuals.start, records, np.zeros(residuals.count))
     # a start on its bound is no result
@@ -154,26 +180,6 @@ def refuse_noise(noise: Mapping[str, float]) -> None:
         raise CaseError(
             f"noise: {name}: {level:g}: must be finite and above 0" for name, level in wrong.items()
         )
-
-
-def _steps(experiments: Sequence[Experiment]) -> dict[str, float]:
-    """Return the sizes that the tests have of steps which a fit would find."""
-    return {
-        nuisance.name: experiment.simulator.inputs.steps[nuisance.step].step
-        for experiment in experiments
-        for nuisance in experiment.nuisances
-        if nuisance.kind == "step"
-    }
-
-
-def _with_steps(
-    free: Sequence[FreeParameter], experiments: Sequence[Experiment]
-) -> list[FreeParameter]:
-    """List the free parameters, with the sizes of the tests' steps to start from."""
-    sizes = _steps(experiments)
-    return [
-        replace(parameter, start=sizes.get(parameter.name, parameter.start)) for parameter in free
-    ]
 
 
 def noise_levels(experiment: Experiment, given: Mapping[str, float]) -> dict[str, float]:
@@ -203,43 +209,24 @@ def _noise_by_signal(
     return by_signal
 
 
-def _with_noise(experiment: Experiment, levels: Mapping[str, float], finest: float) -> Experiment:
-    """Return an experiment whose channels have the noise that is expected of them."""
-    channels = tuple(
-        replace(channel, noise=levels[channel.signal], weight=finest / levels[channel.signal])
-        for channel in experiment.channels
-    )
-    return replace(experiment, channels=channels)
-
-
-def _variants(
-    case: Case, own: Sequence[Experiment]
-) -> Iterator[tuple[str, tuple[Experiment, ...]]]:
+def _variants(case: Case, own: Sequence[Experiment]) -> Iterator[tuple[str, list[Experiment]]]:
     """Yield tests beside the case's own; those of several records are varied together."""
-    for label, vary in _variations(case, own):
-        yield label, tuple(vary(experiment) for experiment in own)
-
-
-def _variations(
-    case: Case, own: Sequence[Experiment]
-) -> Iterator[tuple[str, Callable[[Experiment], Experiment]]]:
-    """Yield by name how a test can be varied in the plant of a case."""
     if not case.kind.closed_loop:
         return
     for size in STEPS:
-        yield f"{100 * size:g} %", partial(_scaled, size=size)
-    yield "longer", _longer
-    present = {channel.signal for experiment in own for channel in experiment.channels}
+        yield f"{100 * size:g} %", [_scaled(experiment, size) for experiment in own]
+    yield "longer", [_longer(experiment) for experiment in own]
+    present = {signal for experiment in own for signal in experiment.signals}
     extra = [signal for signal in _signals(case, own) if signal not in present]
     for signal in extra:
-        yield f"+ {signal}", partial(_with_signals, signals=(signal,))
+        yield f"+ {signal}", [_with_signals(experiment, [signal]) for experiment in own]
     if len(extra) > 1:
-        yield "+ all", partial(_with_signals, signals=extra)
+        yield "+ all", [_with_signals(experiment, extra) for experiment in own]
 
 
 def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
     """Return the signals that are recorded, then those that could be."""
-    present = [channel.signal for experiment in own for channel in experiment.channels]
+    present = [signal for experiment in own for signal in experiment.signals]
     possible = case.kind.compared if case.kind.closed_loop else ()
     return tuple(dict.fromkeys([*present, *possible]))
 

@@ -12,8 +12,8 @@ from places import CONFIGS
 import exfit
 from exfit.case.load import load_case
 from exfit.errors import CaseError
+from exfit.features.design.candidates import Limits
 from exfit.features.design.experiment_design import identify
-from exfit.features.design.limits import Limits
 
 CASE = CONFIGS / "ac1a_typical.yaml"
 LIMITS = {"vt": 0.04, "efd": 2.6, "efd_min": 0.2}

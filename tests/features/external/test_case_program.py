@@ -11,7 +11,7 @@ import pytest
 import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.features.design.design import identify
+from exfit.features.design.experiment_design import identify
 from exfit.features.external.twin_descent import ProgramFunctions
 from exfit.results.tables import parameter_file
 from exfit.workflows import check, profile, validation_result
