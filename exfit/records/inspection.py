@@ -26,8 +26,13 @@ from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
 from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
 from exfit.records.formats import PLAY_IN
-from exfit.records.formats.memory import TooLargeError
-from exfit.records.formats.table import RecordTable, column_error, listed, refuse_uneven
+from exfit.records.formats.table import (
+    RecordTable,
+    StoppedError,
+    column_error,
+    listed,
+    refuse_uneven,
+)
 from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
@@ -244,7 +249,7 @@ def _columns_of_numbers(
     refused: dict[str, str] = {}
     try:
         columns = _numbers(table, names, clock, stamps)
-    except TooLargeError:
+    except StoppedError:
         raise
     except RecordError:
         columns = {}

@@ -1,6 +1,7 @@
 """What the tests of the readers share."""
 
 from contextlib import suppress
+from dataclasses import replace
 
 import pytest
 from hypothesis import strategies as st
@@ -16,12 +17,10 @@ def read_columns(path, names):
 
 def in_this_process(read):
     """Return a function that reads a file by a module of a binary format, without its child."""
-    from exfit.records.formats.columns import table_of
-    from exfit.records.formats.memory import memory_limit
+    from exfit.records.formats.table import memory_limit
 
     def table(path, *sheet):
-        limit = memory_limit(path, None)
-        return table_of(path, read(path, *sheet), limit)
+        return replace(read(path, *sheet), limit=memory_limit(path, None))
 
     return table
 

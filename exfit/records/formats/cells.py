@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 from exfit.records.units import unit_in, unit_of
 
@@ -13,13 +14,25 @@ MISSING = re.compile(r"|[+-]?nan|-+|\*+", re.IGNORECASE)
 MINUTES = re.compile(r"[0-9]{1,2}:[0-9]{2}[.,][0-9]+")
 THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
 # the types of channels in the second row of a JSIS file (WECC, 2013)
-CHANNEL_TYPES = frozenset(
-    ("T", "VMP", "VAP", "VMA", "VAA", "VMB", "VAB", "VMC", "VAC", "VMN", "VAN", "VP", "IMP", "IAP",
-     "IMA", "IAA", "IMB", "IAB", "IMC", "IAC", "IMN", "IAN", "IP", "F", "R", "P", "Q", "S", "Z",
-     "CP", "CQ", "D", "SC", "OTHER")
-)  # fmt: skip
+CHANNEL_TYPES = """
+    T VMP VAP VMA VAA VMB VAB VMC VAC VMN VAN VP IMP IAP IMA IAA IMB IAB IMC IAC IMN IAN IP
+    F R P Q S Z CP CQ D SC OTHER"""
 FEWEST_TYPES = 3
 NO_UNIT = ("", "-", "1", "[-]", "[1]")
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+# dates and times of day such as 2015-09-20T10:51:42.8589222Z or 20-Sep-2015 10:51:42 AM
+TIMESTAMP = (
+    r"[ \t]*"
+    r"(?:(?P<year>\d{4})(?P<iso>[-/.])(?P<month>\d{1,2})(?P=iso)(?P<day>\d{1,2})"
+    r"|(?P<left>\d{1,2})(?P<mark>[-/.])(?P<middle>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2})"
+    rf"|(?P<named>\d{{1,2}})(?P<dash>[- ])(?P<name>(?i:{'|'.join(MONTHS)}))"
+    r"(?P=dash)(?P<full>\d{4}|\d{2}))?"
+    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(left)[ \t]+|(?(named)[ \t]+|)))"
+    r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
+    r"(?:[ \t]*(?P<half>[AaPp])\.?[ \t]?[Mm]\.?)?"
+    r"[ \t]*(?P<zone>Z|(?P<sign>[+-])(?P<zonehour>\d{2}):?(?P<zoneminute>\d{2}))?)?"
+    r"[ \t]*"
+)
 
 
 def is_number(cell: str, comma: bool | None) -> bool:
@@ -28,6 +41,17 @@ def is_number(cell: str, comma: bool | None) -> bool:
     if NUMBER.fullmatch(cell):
         return ("." if comma else ",") not in cell
     return bool(INFINITE.fullmatch(cell)) or cell.lstrip("+-").lower() == "nan"
+
+
+def is_timestamp(cell: str) -> bool:
+    """Check for the form of a date, a time of day, or both."""
+    return cell.lstrip(" \t")[:1].isdigit() and timestamp_form().fullmatch(cell) is not None
+
+
+@cache
+def timestamp_form() -> re.Pattern[str]:
+    """Compile the form of a timestamp where a cell may be one: it takes milliseconds."""
+    return re.compile(TIMESTAMP, re.ASCII)
 
 
 def is_missing(cell: str) -> bool:
@@ -68,7 +92,7 @@ def is_units(cells: Sequence[str]) -> bool:
 def are_channel_types(cells: Sequence[str]) -> bool:
     """Check for the row of types of channels of a JSIS file."""
     filled = [cell.strip().upper() for cell in cells if cell.strip()]
-    return len(filled) >= FEWEST_TYPES and CHANNEL_TYPES.issuperset(filled)
+    return len(filled) >= FEWEST_TYPES and {*CHANNEL_TYPES.split()}.issuperset(filled)
 
 
 def units_of(names: Sequence[str], row: Sequence[str] = ()) -> dict[str, str]:

@@ -17,6 +17,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import fields
+from functools import partial
 from importlib import import_module
 from io import BufferedReader
 from pathlib import Path
@@ -31,13 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.columns import Columns, Contents, table_of
-from exfit.records.formats.memory import (
+from exfit.records.formats.columns import Columns
+from exfit.records.formats.table import (
     GIGABYTE,
     HOW_TO_RAISE,
     OWN,
     MemoryLimit,
-    TooLargeError,
+    StoppedError,
     memory_limit,
 )
 from exfit.util.ended_processes import ending, last_lines
@@ -54,6 +55,7 @@ OUT_OF_MEMORY = ("memory allocation", "MemoryError")  # as Rust and Python say i
 PANIC = "panicked"  # Rust's word for an end by a fault of its own
 ENDING = 5.0  # s that a process has to end after it closed its output
 LEAST = 0.3e9  # bytes: with fewer addresses some packages read no file at all
+KEPT = frozenset(("path", "fetch", "limit"))  # fields of a table that are no part of the answer
 
 
 def read_table(module: str, path: Path, sheet: str | None, memory: float | None) -> Columns:
@@ -64,13 +66,18 @@ def read_table(module: str, path: Path, sheet: str | None, memory: float | None)
     """
     limit = memory_limit(path, memory)
     child = _Child(limit, module, "read", sheet)
-    return table_of(path, Contents(fetch=child.column, **child.ask()), limit)
+    found: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in child.answer().items()
+    }
+    return Columns(path=path, fetch=child.column, limit=limit, **found)
 
 
 def texts_of_sheets(path: Path) -> dict[str, list[list[str]]]:
     """Read the cells of all sheets of a workbook as texts, by name; raises RecordError."""
-    child = _Child(memory_limit(path, None), "excel", "texts_of_sheets", None)
-    sheets: dict[str, list[list[str]]] = child.ask()
+    sheets: dict[str, list[list[str]]] = _Child(
+        memory_limit(path, None), "excel", "texts_of_sheets", None
+    ).answer()
     return sheets
 
 
@@ -78,10 +85,12 @@ class _Child:
     """The process that reads one file."""
 
     def __init__(self, limit: MemoryLimit, module: str, function: str, sheet: str | None) -> None:
-        _refuse_larger_archive(limit)
+        size = 0
+        with suppress(Exception), zipfile.ZipFile(on_disk(limit.path)) as archive:  # a workbook
+            size = sum(entry.file_size for entry in archive.filelist)
+        limit.check(size, f"{size} bytes, unpacked")
         self.limit = limit
         self.seconds = LONGEST[0] + LONGEST[1] * limit.size
-        self.first = [module, function, str(limit.path), sheet, limit.most, self.seconds]
         try:
             self.errors = TemporaryFile()  # noqa: SIM115 - it ends with the process
             self.process = Popen(
@@ -95,18 +104,19 @@ class _Child:
             text = f"{limit.path}: the process that reads it cannot be started: {fault}"
             raise RecordError(text) from fault
         finalize(self, _end, self.process, self.errors)
+        self.first = [module, function, str(limit.path), sheet, limit.most, self.seconds]
 
-    def ask(self, request: Any = None) -> Any:
-        """Send a request, the first time what to read; return the content of the answer."""
-        answer, _ = self._answer(self.first if request is None else request)
-        return answer
+    def answer(self) -> Any:
+        """Return what it finds in the file."""
+        found, _ = self._answered(self.first)
+        return found
 
     def column(self, at: int) -> NDArray[Any]:
         """Fetch a column by its place."""
-        kind, data = self._answer(at)
+        kind, data = self._answered(at)
         return data.view(kind)
 
-    def _answer(self, request: Any) -> tuple[Any, NDArray[np.uint8]]:
+    def _answered(self, request: Any) -> tuple[Any, NDArray[np.uint8]]:
         requests = cast(IO[bytes], self.process.stdin)
         answers = cast(BufferedReader, self.process.stdout)
         late, began = Timer(self.seconds, self.process.kill), monotonic()
@@ -137,7 +147,7 @@ class _Child:
         if taken >= self.seconds:
             self.process.kill()
             text = f"reading it took longer than {self.seconds:.3g} s"
-            raise RecordError(f"{self.limit.path}: {text}")
+            raise StoppedError(f"{self.limit.path}: {text}")
         try:
             code = self.process.wait(ENDING)
         except TimeoutExpired:
@@ -148,11 +158,11 @@ class _Child:
             raise self._too_large()
         what = "damaged: " if code < 0 or PANIC in said else ""
         why = ending(code, "the process that read it") + (f": {said}" if said else "")
-        raise RecordError(f"{self.limit.path}: {what}{why}")
+        raise StoppedError(f"{self.limit.path}: {what}{why}")
 
-    def _too_large(self) -> TooLargeError:
+    def _too_large(self) -> StoppedError:
         most = self.limit.most / GIGABYTE
-        return TooLargeError(
+        return StoppedError(
             f"{self.limit.path}: reading needs more than {most:.3g} GB of memory, the limit; "
             f"{HOW_TO_RAISE}"
         )
@@ -165,16 +175,6 @@ def _end(process: Popen[bytes], errors: IO[bytes]) -> None:
         if stream is not None:
             with suppress(OSError):  # of what the process did not take any more
                 stream.close()
-
-
-def _refuse_larger_archive(limit: MemoryLimit) -> None:
-    """Raise TooLargeError where the entries of an archive, as a workbook is, declare too much."""
-    try:
-        with zipfile.ZipFile(on_disk(limit.path)) as archive:
-            size = sum(entry.file_size for entry in archive.filelist)
-    except Exception:  # the package that reads it says what is wrong with it
-        return
-    limit.check(size, f"{size} bytes, unpacked")
 
 
 # ---- in the child
@@ -193,33 +193,29 @@ def serve() -> None:
         import_module(PACKAGES[module])
     _limit_memory(most)
     read = getattr(import_module(f"exfit.records.formats.{module}"), function)
-    found = _answered(answers, lambda: read(Path(path), *([] if sheet is None else [sheet])))
+    found = _answer(answers, partial(read, Path(path), *([] if sheet is None else [sheet])))
     lonely.cancel()
-    if isinstance(found, Contents):
+    if isinstance(found, Columns):
         for line in requests:
-            _answered(answers, lambda at=int(line): found.fetch(at))  # type: ignore[misc]
+            _answer(answers, partial(found.fetch, int(line)))
 
 
-def _answered(answers: IO[bytes], ask: Callable[[], Any]) -> Any:
+def _answer(answers: IO[bytes], ask: Callable[[], Any]) -> Any:
     """Answer with what a function returns, or why it does not."""
-    found: Any = None
-    content: Any
-    data = b""
+    found, data = None, b""
     try:
-        found = ask()
+        found = content = ask()
         if isinstance(found, np.ndarray):
             content, data = found.dtype.str, found.tobytes()
-        elif isinstance(found, Contents):
-            plain = (field.name for field in fields(found) if field.name != "fetch")
-            content = {name: getattr(found, name) for name in plain}
-        else:
-            content = found
-        head = json.dumps([None, False, content, len(data)]).encode()
+        elif isinstance(found, Columns):
+            names = {field.name for field in fields(found)} - KEPT
+            content = {name: getattr(found, name) for name in names}
+        head = json.dumps([None, False, content, len(data)])
     except RecordError as fault:
-        head = json.dumps([str(fault), False, None, 0]).encode()
+        head = json.dumps([str(fault), False, None, 0])
     except MemoryError:
-        head, data = json.dumps([None, True, None, 0]).encode(), b""
-    answers.write(head + b"\n")
+        head, data = json.dumps([None, True, None, 0]), b""
+    answers.write(head.encode() + b"\n")
     answers.write(data)
     answers.flush()
     return found

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.clock import are_soc, find_clock, in_seconds, soc_in_seconds
-from exfit.records.formats.memory import MemoryLimit
 from exfit.records.formats.table import (
     NONE,
     Array,
+    MemoryLimit,
     column_error,
     increases,
     positions,
@@ -33,20 +33,24 @@ class Columns:
 
     ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
     day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
-    ``where`` names the place of a sample, counted from 0; ``refuse_larger`` raises TooLargeError
-    where columns, by name, need too much memory. ``time_columns`` are those of the time
-    where the kind of file defines them, ``stamps`` those that hold timestamps.
+    ``lengths`` are the numbers of samples. ``sample`` is what messages call one; ``rows`` are the
+    numbers of the samples in the file, None where these are counted from 1. ``stamps`` are the
+    columns that hold timestamps, ``time_columns`` those of the time where the kind of file defines
+    them. ``limit`` is that of the memory, of which ``held`` bytes are taken.
     """
 
     path: Path
     sha256: str
     names: tuple[str, ...]
     units: Mapping[str, str]
+    lengths: Sequence[int]
     fetch: Callable[[int], NDArray[Any]]
-    where: Callable[[int], str]
-    refuse_larger: Callable[[Sequence[str]], None]
-    time_columns: tuple[str, ...] = ()
+    sample: str
+    rows: Sequence[int] | None = None
     stamps: tuple[str, ...] = ()
+    time_columns: tuple[str, ...] = ()
+    limit: MemoryLimit | None = None
+    held: int = 0
 
     @cached_property
     def clock(self) -> tuple[str, ...]:
@@ -59,17 +63,11 @@ class Columns:
         Raises RecordError for a column that is missing or there twice, that holds no numbers or
         lacks one, and for columns that are not equally long.
         """
-        names = [*names]
-        self.refuse_larger(names)
-        places = positions(self.path, self.names, names)
-        columns = {}
-        for name, at in places.items():
-            column = self.fetch(at) if name in gappy else self._whole(name, at)
+        columns = self._fetched([*names], gappy)
+        for name, column in columns.items():
             if column.dtype.kind != "f":
                 raise column_error(self.path, name, "timestamps, not numbers")
-            columns[name] = np.asarray(column, np.float64)
-        refuse_uneven(self.path, columns)
-        return columns
+        return {name: np.asarray(column, np.float64) for name, column in columns.items()}
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
         """Return the time (M,) in s; of timestamps and epochs, since the first of them.
@@ -79,73 +77,38 @@ class Columns:
         """
         if are_soc(columns):
             return soc_in_seconds(self.path, columns, self.numbers(columns))
-        self.refuse_larger(columns)
-        places = positions(self.path, self.names, columns)
-        whole = {name: self._whole(name, at) for name, at in places.items()}
-        refuse_uneven(self.path, whole)
+        whole = self._fetched(columns, NONE)
         first = columns[0]
-        if len(whole) == 1 and whole[first].dtype.kind == "f":
+        kinds = "".join(sorted(column.dtype.kind for column in whole.values()))
+        if kinds == "f":
             return in_seconds(self.path, first, whole[first], self.units.get(first), unit)
         if unit is not None:
             raise column_error(self.path, first, f"timestamps, not numbers of {unit}")
-        ticks = self._ticks(whole)
+        if kinds not in ("M", "m", "Mm"):
+            named = " and ".join(map(repr, whole))
+            raise RecordError(f"{self.path}: columns {named} are not a date and a time of day")
+        ticks, *times = whole.values()
+        for time in times:
+            ticks = ticks + time
         return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
 
     def place(self, row: int) -> str:
         """Return the place of a sample, counted from 0, as messages name it."""
-        return self.where(row)
+        return f"{self.sample} {row + 1 if self.rows is None else self.rows[row]}"
 
-    def _whole(self, name: str, at: int) -> NDArray[Any]:
-        """Return a column that lacks no sample."""
-        column = self.fetch(at)
-        lost = np.flatnonzero(np.isnan(column))  # NaT too
-        if lost.size:
-            raise column_error(self.where(int(lost[0])), name, "the sample is missing")
-        return column
-
-    def _ticks(self, columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-        """Return instants of one column, or of a date and a time of day."""
-        kinds = "".join(sorted(column.dtype.kind for column in columns.values()))
-        if kinds not in ("M", "m", "Mm"):
-            names = " and ".join(map(repr, columns))
-            raise RecordError(f"{self.path}: columns {names} are not a date and a time of day")
-        first, *rest = columns.values()
-        return first + rest[0] if rest else first
-
-
-@dataclass(frozen=True, eq=False)
-class Contents:
-    """Columns of a binary file as its reader finds them; ``fetch`` as that of `Columns`.
-
-    ``lengths`` are their numbers of samples. ``counted`` is what messages call a sample; ``rows``
-    are the numbers of samples in the file, None where these are counted from 1.
-    """
-
-    sha256: str
-    names: Sequence[str]
-    units: Mapping[str, str]
-    lengths: Sequence[int]
-    fetch: Callable[[int], NDArray[Any]]
-    counted: str
-    rows: Sequence[int] | None = None
-    stamps: Sequence[str] = ()
-
-
-def table_of(path: Path, contents: Contents, limit: MemoryLimit) -> Columns:
-    """Make a table of what was found in a file, whose columns take no more memory than allowed."""
-    rows, lengths = contents.rows, dict(zip(contents.names, contents.lengths, strict=True))
-    return Columns(
-        path=path,
-        sha256=contents.sha256,
-        names=tuple(contents.names),
-        units=contents.units,
-        fetch=contents.fetch,
-        where=lambda row: f"{path}: {contents.counted} {row + 1 if rows is None else rows[row]}",
-        refuse_larger=lambda columns: limit.check_columns(
-            [lengths.get(name, 0) for name in columns]
-        ),
-        stamps=tuple(contents.stamps),
-    )
+    def _fetched(self, names: Sequence[str], gappy: frozenset[str]) -> dict[str, NDArray[Any]]:
+        """Fetch columns of one length, which lack no sample where they are not ``gappy``."""
+        if self.limit is not None:
+            lengths = dict(zip(self.names, self.lengths, strict=True))
+            self.limit.check_columns([lengths.get(name, 0) for name in names], self.held)
+        columns = {}
+        for name, at in positions(self.path, self.names, names).items():
+            columns[name] = self.fetch(at)
+            lost = np.flatnonzero(np.isnan(columns[name]))  # NaT too
+            if lost.size and name not in gappy:
+                raise column_error(self.place(int(lost[0])), name, "the sample is missing")
+        refuse_uneven(self.path, columns)
+        return columns
 
 
 def missing_package(path: Path, package: str, extra: str) -> RecordError:

@@ -4,7 +4,6 @@ Without a row of names the columns are called 1, 2, 3 ... What could be read in 
 """
 
 import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,26 +19,17 @@ from exfit.records.formats.cells import (
     NUMBER,
     are_channel_types,
     is_missing,
+    is_timestamp,
     is_units,
     names_of,
     units_of,
 )
-from exfit.records.formats.decoding import Text
-from exfit.records.formats.memory import MemoryLimit
-from exfit.records.formats.timestamps import is_timestamp
 
-HEAD_LINES = 300  # within which the first row of numbers must be
-HEAD_BYTES = 1 << 22  # of very long lines the head has no more, but
-FEWEST_HEAD_LINES = 8  # so many
-CELL_BYTES = 600  # that a cell of the head takes while the dialect is found
 SEPARATORS: Mapping[str | None, str] = {
     ";": "semicolons", "\t": "tabs", ",": "commas", None: "spaces"
 }  # fmt: skip
 COMMENT_MARKS = ("//", "#", "%", "!", "'", ";")
-OPTIONAL_NAMES = (
-    "",
-    "comment",
-)  # names of a last column that rows may leave out; LabVIEW's is Comment
+OPTIONAL_NAMES = ("", "comment")  # of a last column that rows may leave out; LabVIEW's is Comment
 TOKEN = re.compile(r'"[^"]*"|\S+')
 TOKEN_WITH_UNIT = re.compile(r'"[^"]*"|\S+(?:[ \t]+(?:\[[^\[\]]*\]|\([^()]*\)))?')
 
@@ -52,6 +42,13 @@ class TextRow(NamedTuple):
     values: tuple[bool, ...]
     text: str
     comment: bool
+
+    @property
+    def known(self) -> list[bool]:
+        """Which cells are values, or say that there is none."""
+        return [
+            value or is_missing(cell) for cell, value in zip(self.cells, self.values, strict=True)
+        ]
 
 
 @dataclass(frozen=True)
@@ -70,14 +67,13 @@ class Dialect:
     first_line: int
 
 
-@dataclass(frozen=True)
-class _Layout:
+class _Layout(NamedTuple):
     """A reading of the head with one separator; ``share`` of its rows' cells are values."""
 
     dialect: Dialect
     share: float
     named: bool
-    fault: str | None = None
+    fault: str | None
 
     @property
     def rank(self) -> tuple[bool, bool, float, bool]:
@@ -133,15 +129,13 @@ def is_comment(text: str, separator: str | None) -> bool:
     return text.lstrip().startswith(tuple(mark for mark in COMMENT_MARKS if mark != separator))
 
 
-def head_of(text: Text, limit: MemoryLimit) -> list[str]:
-    """Return the first lines of a text; raises TooLargeError where they have too many cells."""
-    end = text.start_of(HEAD_LINES + 1)
-    if end > HEAD_BYTES:
-        end = max(text.data.rfind(b"\n", 0, HEAD_BYTES) + 1, text.start_of(FEWEST_HEAD_LINES + 1))
-    marks = [*(mark.encode() for mark in SEPARATORS if mark), b" "]
-    cells = max(text.data.count(mark, 0, end) for mark in marks) + 1
-    limit.check(len(text.data) + end + CELL_BYTES * cells, f"{cells} cells in its first lines")
-    return io.TextIOWrapper(io.BytesIO(text.data[:end]), text.encoding, newline="\n").readlines()
+def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
+    """Check the first number with a decimal mark for a comma; None where none has any."""
+    for row in rows:
+        for cell in map(str.strip, row):
+            if NUMBER.fullmatch(cell) and ("," in cell or "." in cell):
+                return "," in cell
+    return None
 
 
 def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
@@ -150,7 +144,17 @@ def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
     Raises RecordError where there are no rows of numbers, where their names do not fit them,
     and where two separators are possible.
     """
-    layouts = _layouts(path, head)
+    layouts: list[_Layout] = []
+    for separator in SEPARATORS:
+        if separator is not None and not any(separator in line for line in head):
+            continue
+        if separator is None and layouts:  # spaces may separate what no tabs do
+            tabs = any(layout.dialect.separator == "\t" for layout in layouts)
+            if tabs or not any(len(line.split(maxsplit=1)) > 1 or '"' in line for line in head):
+                continue
+        layout = _layout(path, head, separator)
+        if layout is not None and (layout.dialect.cells > 1 or separator is None):
+            layouts.append(layout)
     if not layouts:
         raise _no_numbers(path, head)
     best = max(layouts, key=lambda layout: layout.rank)
@@ -167,27 +171,6 @@ def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
     return best.dialect
 
 
-def _layouts(path: Path, head: Sequence[str]) -> list[_Layout]:
-    """Return the readings of the head with each separator that it has; spaces only without tabs."""
-    layouts: list[_Layout] = []
-    for separator in SEPARATORS:
-        if separator is None:
-            tabs = any(layout.dialect.separator == "\t" for layout in layouts)
-            if tabs or (layouts and not any(map(_may_have_spaces, head))):
-                continue
-        elif not any(separator in line for line in head):
-            continue
-        layout = _layout(path, head, separator)
-        if layout is not None and (layout.dialect.cells > 1 or separator is None):
-            layouts.append(layout)
-    return layouts
-
-
-def _may_have_spaces(line: str) -> bool:
-    """Check whether spaces may separate columns in a line; where it is quoted, they may."""
-    return len(line.split(maxsplit=1)) > 1 or '"' in line
-
-
 def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
     """Return the error of a file without rows of numbers."""
     filled = [line for line in head if line.strip()]
@@ -201,37 +184,36 @@ def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
 
 def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout | None:
     """Return the reading of the head with a separator, None where it has no row of numbers."""
-    rows = _filled_rows(path, head, separator)
+    split = split_rows(path, head, separator, 1)
+    rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
+    rows = [row for row in rows if any(row.cells)]
     plain = [row for row in rows if not row.comment]
     if not plain:
         return None
     cells = _width(plain)
-    columns = _value_columns(plain, cells)
+    complete = [row for row in plain if len(row.cells) == cells]
+    later = complete[len(complete) // 2 :]
+    counts = [sum(row.values[at] for row in later) for at in range(cells)]
+    columns = [at for at, count in enumerate(counts) if count and 2 * count >= len(later)]
     first = next((at for at, row in enumerate(rows) if _is_full(row, cells, columns)), None)
     if first is None:
         return None
     shape = _Shape(separator, cells, columns, ends_empty=not rows[first].cells[-1])
     damaged = [*takewhile(lambda row: _is_partial(row, shape), reversed(rows[:first]))]
     start = first - len(damaged)
-    names, units, fault = _heading(rows[:start], rows[start], shape)
+    heading = _heading(rows[:start], rows[start], shape)
     first_line = rows[start].line
     below = [row for row in plain if row.line >= first_line]
+    known = [cell for row in below for cell in row.known]
     dialect = Dialect(
         separator,
         has_comma(row.cells for row in below),
-        names_of(names or ("",) * cells),
-        units_of(names, units),
+        names_of(heading.names or ("",) * cells),
+        units_of(heading.names, heading.units),
         cells,
         first_line,
     )
-    return _Layout(dialect, _share_of_values(below), bool(names), fault)
-
-
-def _filled_rows(path: Path, head: Sequence[str], separator: str | None) -> list[TextRow]:
-    """Return the lines of the head that hold something."""
-    split = split_rows(path, head, separator, 1)
-    rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
-    return [row for row in rows if any(row.cells)]
+    return _Layout(dialect, sum(known) / len(known), bool(heading.names), heading.fault)
 
 
 def _row(line: int, cells: list[str], text: str, separator: str | None) -> TextRow:
@@ -248,7 +230,10 @@ def _row(line: int, cells: list[str], text: str, separator: str | None) -> TextR
 
 def _width(rows: Sequence[TextRow]) -> int:
     """Count the cells of most rows of numbers; there may be more rows of titles above."""
-    shares = [_share_of_full(row) for row in rows]
+    shares = []
+    for row in rows:  # the share of values in those cells that hold something
+        values, missing = sum(row.values), row.known.count(True) - sum(row.values)
+        shares.append(values / max(len(row.cells) - missing, 1))
     for least in (0.5, 0.0, -1.0):
         widths = [len(row.cells) for row, share in zip(rows, shares, strict=True) if share > least]
         if widths:
@@ -257,26 +242,12 @@ def _width(rows: Sequence[TextRow]) -> int:
     return max(counts, key=lambda width: (counts[width], width == len(rows[-1].cells)))
 
 
-def _share_of_full(row: TextRow) -> float:
-    """Return the share of values in those cells of a row that hold something."""
-    full = [value for cell, value in _cells(row) if value or not is_missing(cell)]
-    return sum(full) / len(full) if full else 0.0
-
-
-def _value_columns(rows: Sequence[TextRow], cells: int) -> list[int]:
-    """Return the columns in which at least half of the later rows have a value."""
-    complete = [row for row in rows if len(row.cells) == cells]
-    later = complete[len(complete) // 2 :]
-    counts = [sum(row.values[at] for row in later) for at in range(cells)]
-    return [at for at, count in enumerate(counts) if count and 2 * count >= len(later)]
-
-
 def _is_full(row: TextRow, cells: int, columns: Sequence[int]) -> bool:
+    """Check for a row with the values that belong there, or signs that one is missing."""
     if row.comment or len(row.cells) != cells:
         return False
-    return any(row.values[at] for at in columns) and all(
-        row.values[at] or is_missing(row.cells[at]) for at in columns
-    )
+    known = row.known
+    return any(row.values[at] for at in columns) and all(known[at] for at in columns)
 
 
 def _is_partial(row: TextRow, shape: _Shape) -> bool:
@@ -285,7 +256,7 @@ def _is_partial(row: TextRow, shape: _Shape) -> bool:
         return False
     if len(row.cells) == shape.cells:
         return any(row.values[at] for at in shape.columns)
-    return len(row.cells) > 1 and all(value or is_missing(cell) for cell, value in _cells(row))
+    return len(row.cells) > 1 and all(row.known)
 
 
 def _heading(above: Sequence[TextRow], first: TextRow, shape: _Shape) -> _Heading:
@@ -348,23 +319,3 @@ def _fitted(row: TextRow, shape: _Shape) -> tuple[str, ...]:
     if len(cells) == shape.cells - 1 and shape.ends_empty:
         cells = (*cells, "")
     return cells if len(cells) == shape.cells else ()
-
-
-def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
-    """Check the first number with a decimal mark for a comma; None where none has any."""
-    for row in rows:
-        for cell in map(str.strip, row):
-            if NUMBER.fullmatch(cell) and ("," in cell or "." in cell):
-                return "," in cell
-    return None
-
-
-def _share_of_values(rows: Sequence[TextRow]) -> float:
-    """Return the share of cells that are values, or say that there is none."""
-    known = [value or is_missing(cell) for row in rows for cell, value in _cells(row)]
-    return sum(known) / len(known)
-
-
-def _cells(row: TextRow) -> Iterator[tuple[str, bool]]:
-    """Return the cells of a row, each with whether it is a value."""
-    return zip(row.cells, row.values, strict=True)

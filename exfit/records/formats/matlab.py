@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.formats.cells import units_of
-from exfit.records.formats.columns import Contents, sound
-from exfit.records.formats.table import Array, column_error, read_bytes
+from exfit.records.formats.columns import Columns, sound
+from exfit.records.formats.table import column_error, read_bytes
 
 HEAD, TAG = 128, 8  # bytes of a file's head and of an element's, in version 5
 ORDERS = {b"IM": "<", b"MI": ">"}  # of bytes, by the last two of the head
@@ -22,11 +22,12 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_OFFSET = 512  # of the HDF5 signature in a file of version 7.3
 MATLAB = "a MATLAB file"
 DEEPEST = 8  # structs in structs
+REAL = "fiub"  # kinds of arrays of numbers
 
 NamedVector = tuple[str, NDArray[Any]]
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> Columns:
     """Read a .mat file: its vectors, and the columns of its matrices.
 
     Columns are called as in MATLAB: ``Ut`` for a vector, ``data(:,2)`` for a column of a matrix,
@@ -45,24 +46,45 @@ def read(path: Path) -> Contents:
     variables = _loaded(path, data).items()
     vectors = [vector for name, value in variables for vector in _vectors(name, value)]
     names = tuple(name for name, _ in vectors)
-    if not any(_is_real(values) for _, values in vectors):
+    if not any(values.dtype.kind in REAL for _, values in vectors):
         raise RecordError(f"{path}: no vector of numbers in it; objects such as timeseries are not")
-    return Contents(
+
+    def fetch(at: int) -> NDArray[Any]:
+        name, values = vectors[at]
+        if values.dtype.kind not in REAL:
+            kind = "complex numbers" if values.dtype.kind == "c" else "text"
+            raise column_error(path, name, f"{kind}, not numbers")
+        return np.asarray(values, np.float64)
+
+    return Columns(
+        path=path,
         sha256=hashlib.sha256(data).hexdigest(),
         names=names,
         units=units_of(names),
         lengths=[len(values) for _, values in vectors],
-        fetch=lambda at: _numbers(path, *vectors[at]),
-        counted="sample",
+        fetch=fetch,
+        sample=f"{path}: sample",
     )
 
 
 def _loaded(path: Path, data: bytes) -> dict[str, Any]:
+    """Return the variables of a file by name.
+
+    SciPy takes what it finds of a file of version 5 that is cut off; so its elements are counted
+    before. Source: MathWorks, "MAT-File Format", chapter 1.
+    """
     from scipy.io import loadmat
 
-    if b"\0" not in data[:4] and data[HEAD - 2 : HEAD] not in ORDERS:
-        raise RecordError(f"{path}: not {MATLAB}, or damaged: no head of version 4 to 7.2")
-    _refuse_cut_off(path, data)
+    if b"\0" not in data[:4]:
+        if data[HEAD - 2 : HEAD] not in ORDERS:
+            raise RecordError(f"{path}: not {MATLAB}, or damaged: no head of version 4 to 7.2")
+        at = HEAD
+        while at + TAG <= len(data):
+            kind, size = struct.unpack_from(ORDERS[data[HEAD - 2 : HEAD]] + "II", data, at)
+            # a small element has its size in the upper half
+            at += TAG if kind >> 16 else TAG + size
+        if at != len(data):
+            raise RecordError(f"{path}: not {MATLAB}, or damaged: its elements do not end with it")
     stream: Any = io.BytesIO(data)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of objects that SciPy cannot read
@@ -70,27 +92,22 @@ def _loaded(path: Path, data: bytes) -> dict[str, Any]:
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
-def _refuse_cut_off(path: Path, data: bytes) -> None:
-    """Raise RecordError where the elements of a file of version 5 do not end with it.
-
-    SciPy takes what it finds until then. Source: MathWorks, "MAT-File Format", chapter 1.
-    """
-    if data[HEAD - 2 : HEAD] not in ORDERS or b"\0" in data[:4]:
-        return
-    at = HEAD
-    while at + TAG <= len(data):
-        kind, size = struct.unpack_from(ORDERS[data[HEAD - 2 : HEAD]] + "II", data, at)
-        at += TAG if kind >> 16 else TAG + size  # a small element has its size in the upper half
-    if at != len(data):
-        raise RecordError(f"{path}: not {MATLAB}, or damaged: its elements do not end with it")
-
-
 def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
-    """Find the columns in a variable, by name."""
+    """Find the columns in a variable, by name; also those in the fields of structs."""
     if not isinstance(value, np.ndarray) or depth > DEEPEST:
         return
     if value.dtype.names:
-        yield from _of_structs(name, value, depth)
+        for own, fields in _structs(name, value):
+            signals = fields.pop("signals", None) if "time" in fields else None
+            for field, inner in fields.items():
+                yield from _vectors(f"{own}.{field}", inner, depth + 1)
+            if isinstance(signals, np.ndarray) and signals.dtype.names:
+                for numbered, signal in _structs(f"{own}.signals", signals):
+                    label = _text(signal.get("label"))
+                    called = f"{own}.{label}" if label else f"{numbered}.values"
+                    yield from _vectors(called, signal.get("values"), depth + 1)
+            else:
+                yield from _vectors(f"{own}.signals", signals, depth + 1)
     elif value.ndim == 2 and value.size > 1 and value.dtype.kind != "O":
         if 1 in value.shape:
             yield name, value.ravel()
@@ -100,45 +117,15 @@ def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
         yield name, value.ravel()
 
 
-def _of_structs(name: str, value: NDArray[Any], depth: int) -> Iterator[NamedVector]:
-    """Yield the columns in the fields of a struct, or of several."""
+def _structs(name: str, value: NDArray[Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the structs in an array, each with its name and its fields."""
     structs = value.ravel()
     for at, one in enumerate(structs):
         own = name if structs.size == 1 else f"{name}({at + 1})"
-        fields = {field: one[field] for field in value.dtype.names or ()}
-        signals = fields.pop("signals", None) if "time" in fields else None
-        for field, inner in fields.items():
-            yield from _vectors(f"{own}.{field}", inner, depth + 1)
-        if isinstance(signals, np.ndarray) and signals.dtype.names:
-            yield from _signals(own, signals, depth)
-        elif signals is not None:
-            yield from _vectors(f"{own}.signals", signals, depth + 1)
-
-
-def _signals(name: str, signals: NDArray[Any], depth: int) -> Iterator[NamedVector]:
-    """Yield the signals of a structure with time, by their labels where they have one."""
-    structs = signals.ravel()
-    for at, signal in enumerate(structs):
-        fields = signals.dtype.names or ()
-        label = _text(signal["label"]) if "label" in fields else ""
-        number = f"({at + 1})" if structs.size > 1 else ""
-        own = f"{name}.{label}" if label else f"{name}.signals{number}.values"
-        if "values" in fields:
-            yield from _vectors(own, signal["values"], depth + 1)
+        yield own, {field: one[field] for field in value.dtype.names or ()}
 
 
 def _text(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.size == 1:
         return str(value.ravel()[0]).strip()
     return ""
-
-
-def _is_real(values: NDArray[Any]) -> bool:
-    return values.dtype.kind in "fiub"
-
-
-def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:
-    if not _is_real(values):
-        kind = "complex numbers" if values.dtype.kind == "c" else "text"
-        raise column_error(path, name, f"{kind}, not numbers")
-    return np.asarray(values, np.float64)

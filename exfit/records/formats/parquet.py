@@ -1,7 +1,7 @@
 """Parquet files, by pyarrow; a column is read when it is requested."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,21 +10,19 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.formats.cells import stated
-from exfit.records.formats.columns import Contents, missing_package, sound
-from exfit.records.formats.memory import readable
-from exfit.records.formats.table import column_error
+from exfit.records.formats.columns import Columns, missing_package, sound
+from exfit.records.formats.table import column_error, readable
 from exfit.records.units import unit_in
 from exfit.util.root import on_disk
 
 if TYPE_CHECKING:
     import pyarrow as pa
-    from pyarrow.parquet import ParquetFile
 
 PARQUET = "a Parquet file"
 UNIT_KEYS = (b"unit", b"units")  # of a column's metadata
 
 
-def read(path: Path) -> Contents:
+def read(path: Path) -> Columns:
     """Read a Parquet file: its columns of numbers, timestamps and times of day.
 
     Nulls are missing samples; the unit is that of the column's metadata (unit or units), else of
@@ -32,61 +30,52 @@ def read(path: Path) -> Contents:
     missing.
     """
     try:
+        from pyarrow import types
         from pyarrow.parquet import ParquetFile
     except ImportError:
         raise missing_package(path, "pyarrow", "parquet") from None
     with readable(path), on_disk(path).open("rb") as data:
         sha256 = hashlib.file_digest(data, "sha256").hexdigest()
 
-    def opened() -> "ParquetFile":
-        return ParquetFile(on_disk(path), page_checksum_verification=True)
+    def outline() -> "tuple[pa.Schema, int]":
+        with ParquetFile(on_disk(path), page_checksum_verification=True) as file:
+            groups = (file.metadata.row_group(at) for at in range(file.num_row_groups))
+            rows = sum(group.num_rows for group in groups)
+            return file.schema_arrow, max(file.metadata.num_rows, rows)
 
-    schema, rows = sound(path, PARQUET, lambda: _outline(opened))
+    def column(name: str) -> "pa.ChunkedArray":
+        with ParquetFile(on_disk(path), page_checksum_verification=True) as file:
+            return file.read(columns=[name]).column(0)
+
+    def fetch(at: int) -> NDArray[Any]:
+        field = schema.field(at)
+        steps = _steps(field.type)
+        if not steps:
+            raise column_error(path, field.name, f"{field.type}, not numbers")
+        return _cast(path, field.name, sound(path, PARQUET, partial(column, field.name)), steps)
+
+    schema, rows = sound(path, PARQUET, outline)
     if rows == 0:
         raise RecordError(f"{path}: no samples in it")
-    return Contents(
+    units = {}
+    for field in schema:
+        own = [field.metadata[key] for key in UNIT_KEYS if key in (field.metadata or {})]
+        stated_unit = own[0].decode("utf-8", "replace") if own else ""
+        units[field.name] = stated_unit or unit_in(field.name)
+    return Columns(
+        path=path,
         sha256=sha256,
-        names=schema.names,
-        units=stated(
-            {field.name: _unit_of(field.metadata or {}) or unit_in(field.name) for field in schema}
-        ),
+        names=tuple(schema.names),
+        units=stated(units),
         lengths=[rows] * len(schema.names),
-        fetch=lambda at: _fetch(path, opened, schema.field(at)),
-        counted="row",
-        stamps=[field.name for field in schema if _is_stamp(field.type)],
+        fetch=fetch,
+        sample=f"{path}: row",
+        stamps=tuple(
+            field.name
+            for field in schema
+            if types.is_temporal(field.type) and not types.is_interval(field.type)
+        ),
     )
-
-
-def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
-    with opened() as file:
-        groups = (file.metadata.row_group(at) for at in range(file.num_row_groups))
-        rows = sum(group.num_rows for group in groups)
-        return file.schema_arrow, max(file.metadata.num_rows, rows)
-
-
-def _unit_of(metadata: Mapping[bytes, bytes]) -> str | None:
-    return next(
-        (metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), None
-    )
-
-
-def _is_stamp(kind: "pa.DataType") -> bool:
-    from pyarrow import types
-
-    return types.is_temporal(kind) and not types.is_interval(kind)
-
-
-def _fetch(path: Path, opened: "Callable[[], ParquetFile]", field: "pa.Field") -> NDArray[Any]:
-    """Return a column as float64, datetime64[ns] or timedelta64[ns]."""
-    steps = _steps(field.type)
-    if not steps:
-        raise column_error(path, field.name, f"{field.type}, not numbers")
-
-    def read() -> "pa.ChunkedArray":
-        with opened() as file:
-            return file.read(columns=[field.name]).column(0)
-
-    return _cast(path, field.name, sound(path, PARQUET, read), steps)
 
 
 def _cast(

@@ -1,6 +1,12 @@
-"""A recorder's file as a table: named columns of numbers, whatever kind of file it is."""
+"""A recorder's file as a table: named columns of numbers, whatever kind of file it is.
 
-from collections.abc import Iterable, Mapping, Sequence
+A file of a few kilobytes can declare, or unpack to, more than any computer holds: what reading it
+will need is estimated before it is read.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -8,13 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.memory import TooLargeError, readable
-from exfit.util.files import read_regular
+from exfit.util.files import read_regular, regular_size, why_unreadable
 
 Array = NDArray[np.float64]
 
 NONE: frozenset[str] = frozenset()
 COLUMNS_SHOWN = 30
+
+GIGABYTE = 1e9
+LEAST_LIMIT = 1.0  # GB, where a case gives none
+SHARE_OF_FILE = 4.0  # the limit is so many times the file's size, where that is more
+MOST_BY_SIZE = 4.0  # GB, that the size of a file alone may lift the limit to
+OWN = 0.15e9  # bytes, of Python and the libraries, without any file
+NUMBER = 8  # bytes of a float64
+WORKING_COLUMNS = 10  # as long as the record, which looking at a column takes at a time
+HOW_TO_RAISE = "memory, in GB, raises it: of the record in a case, --memory of a command"
+
+
+class StoppedError(RecordError):
+    """A file whose reading is given up: it needs too much memory or time, or ends its reader."""
 
 
 class RecordTable(Protocol):
@@ -57,25 +75,86 @@ class RecordTable(Protocol):
         """Return the place of a sample, counted from 0, as messages name it: record.csv:17."""
 
 
-def position(path: Path, names: Sequence[str], name: str) -> int:
-    """Return the position of a column; raises RecordError where it is missing or there twice."""
-    places = [at for at, other in enumerate(names) if other == name]
-    if not places:
-        raise RecordError(f"{path}: no column {name!r}{_near(name, names)}")
-    if len(places) > 1:
-        numbers = " and ".join(str(at + 1) for at in places)
-        raise RecordError(f"{path}: {name!r} names more than one column: {numbers}")
-    return places[0]
+@dataclass(frozen=True)
+class MemoryLimit:
+    """How much memory, in bytes, reading a file may take."""
+
+    path: Path
+    size: int
+    most: float
+
+    def check(self, needed: float, what: str) -> None:
+        """Raise StoppedError where ``what`` needs more bytes than are allowed."""
+        total = needed + OWN
+        if total > self.most:
+            raise StoppedError(
+                f"{self.path}: {what}: reading needs about {total / GIGABYTE:.3g} GB of memory, "
+                f"the limit is {self.most / GIGABYTE:.3g} GB; {HOW_TO_RAISE}"
+            )
+
+    def check_columns(self, lengths: Sequence[int], held: float = 0.0) -> None:
+        """Raise StoppedError where columns of such lengths, beside ``held`` bytes, need more."""
+        longest = max(lengths, default=0)
+        needed = NUMBER * (sum(lengths) + WORKING_COLUMNS * longest)
+        plural = "s" * (len(lengths) != 1)
+        self.check(needed + held, f"{longest} samples in {len(lengths)} column{plural}")
+
+
+def memory_limit(path: Path, memory: float | None, *beside: Path) -> MemoryLimit:
+    """Return the limit for a file and those ``beside`` it; ``memory`` in GB, None: the usual one.
+
+    Raises RecordError for what is no file, as a pipe or a device, which may never end, and for one
+    that is larger than the limit.
+    """
+    size = 0
+    for file in (path, *beside):
+        with readable(file):
+            size += regular_size(file)
+    usual = max(LEAST_LIMIT, min(SHARE_OF_FILE * size / GIGABYTE, MOST_BY_SIZE))
+    limit = MemoryLimit(path, size, GIGABYTE * (usual if memory is None else memory))
+    limit.check(size, f"{size} bytes")
+    return limit
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Raise RecordError for what keeps a file from being read."""
+    try:
+        yield
+    except (OSError, ValueError) as fault:
+        raise RecordError(f"{path}: cannot be read: {why_unreadable(fault)}") from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the bytes of a file; raises RecordError where it cannot be read."""
+    with readable(path):
+        return read_regular(path)
 
 
 def positions(path: Path, names: Sequence[str], wanted: Iterable[str]) -> dict[str, int]:
-    """Return the positions of many columns; raises RecordError as ``position`` does."""
-    places = {name: at for at, name in enumerate(names)}
-    if len(places) < len(names):
-        return {name: position(path, names, name) for name in wanted}
-    return {
-        name: places[name] if name in places else position(path, names, name) for name in wanted
-    }
+    """Return the positions of columns; raises RecordError for one that is missing or twice."""
+    places: dict[str, list[int]] = {}
+    for at, name in enumerate(names):
+        places.setdefault(name, []).append(at)
+    for name in (wanted := [*wanted]):
+        if name not in places:
+            raise RecordError(f"{path}: no column {name!r}; {_columns_like(name, names)}")
+        if len(places[name]) > 1:
+            numbers = " and ".join(str(at + 1) for at in places[name])
+            raise RecordError(f"{path}: {name!r} names more than one column: {numbers}")
+    return {name: places[name][0] for name in wanted}
+
+
+def _columns_like(name: str, names: Sequence[str]) -> str:
+    """Return all columns, and a hint at those of a similar name, or of one in other capitals."""
+    from difflib import get_close_matches
+
+    folded = [other.casefold() for other in names]
+    same = [other for other in names if other.casefold() == name.casefold()]
+    close = get_close_matches(name.casefold(), folded)
+    near = same or [other for other in names if other.casefold() in close]
+    hint = f"did you mean {' or '.join(map(repr, near))}? The" if near else "the"
+    return f"{hint} columns are {listed(names)}"
 
 
 def listed(names: Sequence[str]) -> str:
@@ -89,7 +168,7 @@ def increases(table: RecordTable, columns: Sequence[str]) -> bool:
     """Check whether columns can be the time, numbers or timestamps that increase throughout."""
     try:
         instants = table.instants(columns)
-    except TooLargeError:
+    except StoppedError:
         raise
     except RecordError:
         return False
@@ -98,36 +177,15 @@ def increases(table: RecordTable, columns: Sequence[str]) -> bool:
 
 def refuse_uneven(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
     """Raise a RecordError where columns, or a column and the time, differ in length."""
-    sizes = {name: len(column) for name, column in columns.items()}
-    if len(set(sizes.values())) > 1:
-        first, *rest = sizes
-        other = next(name for name in rest if sizes[name] != sizes[first])
-        raise RecordError(
-            f"{path}: column {first!r} has {sizes[first]} samples, {other!r} has {sizes[other]}"
-        )
+    first = next(iter(columns), "")
+    for name, column in columns.items():
+        if len(column) != len(columns[first]):
+            raise RecordError(
+                f"{path}: column {first!r} has {len(columns[first])} samples, {name!r} has "
+                f"{len(column)}"
+            )
 
 
 def column_error(place: Path | str, name: str, what: str) -> RecordError:
     """Return the error of a column or one of its cells: its place, its column, what is wrong."""
     return RecordError(f"{place}: column {name!r}: {what}")
-
-
-def read_bytes(path: Path) -> bytes:
-    """Return the bytes of a file; raises RecordError where it cannot be read."""
-    with readable(path):
-        return read_regular(path)
-
-
-def _near(name: str, names: Sequence[str]) -> str:
-    """Return a hint at similar column names, and all of them.
-
-    Where only capitals differ, that name alone is meant.
-    """
-    from difflib import get_close_matches
-
-    folded = [other.casefold() for other in names]
-    same = [other for other in names if other.casefold() == name.casefold()]
-    close = get_close_matches(name.casefold(), folded)
-    near = same or [other for other in names if other.casefold() in close]
-    hint = f"did you mean {' or '.join(map(repr, near))}? The" if near else "the"
-    return f"; {hint} columns are {listed(names)}"

@@ -1,6 +1,8 @@
 """Delimited text: what recorders, spreadsheets and simulators write as .csv, .txt, .tsv, .dat."""
 
+import codecs
 import hashlib
+import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,36 +16,63 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.clock import are_soc, find_clock, in_seconds, soc_in_seconds
-from exfit.records.formats.cells import is_missing, is_number, quoted, why_not
-from exfit.records.formats.decoding import Text, decoded
+from exfit.records.formats.cells import is_missing, is_number, is_timestamp, quoted, why_not
 from exfit.records.formats.dialect import (
+    SEPARATORS,
     Dialect,
     find_dialect,
     has_comma,
-    head_of,
     is_comment,
     split_rows,
 )
-from exfit.records.formats.memory import MemoryLimit, memory_limit
 from exfit.records.formats.table import (
     NONE,
     Array,
+    MemoryLimit,
     column_error,
     increases,
-    position,
+    memory_limit,
     positions,
     read_bytes,
 )
-from exfit.records.formats.timestamps import (
-    WIDEST,
-    WIDEST_OF_TWO,
-    StampError,
-    is_timestamp,
-    seconds_since_first,
-)
 
 SCANNED_BYTES = 1 << 22  # looked at together
+DECODED_BYTES = 1 << 20  # at a time, to see whether they are UTF-8
 STAMP_BYTES = 120  # of a row, while timestamps become numbers
+WIDEST = (40, 28)  # characters of a timestamp with all digits and a zone; of a time or a date alone
+HEAD_LINES = 300  # within which the first row of numbers must be
+HEAD_BYTES = 1 << 22  # of very long lines the head has no more, but
+FEWEST_HEAD_LINES = 8  # so many
+CELL_BYTES = 600  # that a cell of the head takes while the dialect is found
+BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+TEXT_BYTES = bytes({*b"\t\n\x0c\r", *range(0x20, 0x100)} - {0x7F, 0x81, 0x8D, 0x8F, 0x90, 0x9D})
+
+
+@dataclass(frozen=True)
+class Text:
+    r"""The bytes of a text in an encoding that keeps ASCII, with lines that end in \n."""
+
+    data: bytes
+    encoding: str
+
+    def lines(self, start: int = 0, end: int | None = None) -> Iterator[str]:
+        """Yield the lines from a byte on, one by one."""
+        stream = io.BytesIO(self.data[:end])
+        stream.seek(start)
+        return io.TextIOWrapper(stream, self.encoding, newline="\n")
+
+    def start_of(self, line: int) -> int:
+        """Return the byte at which a line starts, counted from 1; the end where there is none."""
+        at = 0
+        for _ in range(line - 1):
+            at = self.data.find(b"\n", at) + 1
+            if at == 0:
+                return len(self.data)
+        return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +110,24 @@ class TextTable:
         names = [*names]
         self.limit.check_columns([self._count] * len(names), len(self.text.data))
         places = positions(self.path, self.names, names)
+
+        def fault(name: str, cell: str) -> str:
+            known = is_number(cell, self.dialect.comma) or (name in gappy and is_missing(cell))
+            return "" if known else why_not(cell, self.dialect.comma)
+
         if not self._even:
-            self._find_fault(places, gappy)
-        data = self._load(places, gappy)
+            self._refuse_first(places, fault)
+        try:
+            data = self._loaded(self._numeric_lines(), places.values(), float)
+        except ValueError:
+            self._refuse_first(places, fault)
+            one_by_one: dict[int | str, Callable[[str], float]] = {
+                places[name]: _number_or_nan for name in gappy if name in places
+            }
+            try:
+                data = self._loaded(self._numeric_lines(), places.values(), float, one_by_one)
+            except ValueError as error:
+                raise RecordError(f"{self.path}: {error}") from None
         return {name: data[:, at] for at, name in enumerate(places)}
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
@@ -92,19 +136,19 @@ class TextTable:
         ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
         RecordError where it contradicts the file, or a cell is neither number nor timestamp.
         """
-        places = [position(self.path, self.names, name) for name in columns]
+        places = positions(self.path, self.names, columns)
         if are_soc(columns):
             return soc_in_seconds(self.path, columns, self.numbers(columns))
-        _, first = next(self.rows())
-        stamped = len(places) > 1 or (places[0] < len(first) and is_timestamp(first[places[0]]))
-        if not stamped:
+        _, row = next(self.rows())
+        first = "".join(row[places[columns[0]] :][:1])
+        if len(columns) == 1 and not is_timestamp(first):
             (name,) = columns
             numbers = self.numbers([name])[name]
             return in_seconds(self.path, name, numbers, self.units.get(name), unit)
         if unit is not None:
-            what = f"{quoted(first[places[0]])} is a timestamp, not a number of {unit}"
+            what = f"{quoted(first)} is a timestamp, not a number of {unit}"
             raise column_error(self.path, columns[0], what)
-        return self._stamps(columns, places)
+        return self._stamps(places)
 
     def place(self, row: int) -> str:
         """Return the place of a sample, counted from 0: file and line."""
@@ -163,17 +207,15 @@ class TextTable:
     def _lines(self) -> Iterator[str]:
         """Return the lines of the rows, as NumPy reads them."""
         lines = self.text.lines(self._start)
-        if self._even:
-            return lines
-        return (line for line in lines if not self._is_skipped(line))
+        return lines if self._even else filter(self._is_row, lines)
 
-    def _is_skipped(self, line: str) -> bool:
-        """Check for a comment, which is no row that begins with its mark."""
+    def _is_row(self, line: str) -> bool:
+        """Check for no comment; a row too may begin with the mark of one."""
         separator = self.dialect.separator
         if not is_comment(line, separator):
-            return False
+            return True
         _, cells = next(split_rows(self.path, [line], separator, 1))
-        return len(cells) != self.dialect.cells
+        return len(cells) == self.dialect.cells
 
     def _numeric_lines(self) -> Iterator[str]:
         """Return the lines of the rows with decimal points; what had one before is no number."""
@@ -181,39 +223,20 @@ class TextTable:
         if not self.dialect.comma:
             return lines
         if self.dialect.separator == ",":
-            quoted = re.compile(r'"([^",\n]*),([^",\n]*)"')
-            return (quoted.sub(r"\1.\2", line.replace(".", ":")) for line in lines)
+            quoted_number = re.compile(r'"([^",\n]*),([^",\n]*)"')
+            return (quoted_number.sub(r"\1.\2", line.replace(".", ":")) for line in lines)
         if self.text.data.find(b".", self._start) >= 0:
             return (line.replace(".", ":").replace(",", ".") for line in lines)
         return (line.replace(",", ".") for line in lines)
 
-    def _load(
-        self, places: Mapping[str, int], gappy: frozenset[str], cell_by_cell: frozenset[str] = NONE
-    ) -> Array:
-        """Return the columns as NumPy's C reader reads them; where it fails, say where and why.
-
-        Where only missing cells of the ``gappy`` columns stopped it, these are read one by one.
-        """
-        converters: dict[int | str, Callable[[str], float]] = {
-            places[name]: _number_or_nan for name in cell_by_cell if name in places
-        }
-        try:
-            return self._loaded(
-                self._numeric_lines(), tuple(places.values()), float, converters=converters
-            )
-        except ValueError as error:
-            self._find_fault(places, gappy)
-            if cell_by_cell != gappy:
-                return self._load(places, gappy, gappy)
-            raise RecordError(f"{self.path}: {error}") from None
-
     def _loaded(
         self,
         lines: Iterable[str],
-        places: Sequence[int],
+        places: Iterable[int],
         kind: Any,
         converters: Mapping[int | str, Callable[[str], float]] | None = None,
     ) -> NDArray[Any]:
+        """Return columns as NumPy's C reader reads them; raises ValueError where it fails."""
         return np.loadtxt(
             lines,
             dtype=kind,
@@ -225,47 +248,43 @@ class TextTable:
             converters=converters,
         )
 
-    def _find_fault(self, places: Mapping[str, int], gappy: frozenset[str]) -> None:
-        """Raise a RecordError for the first row that is ragged or holds text in a number."""
-        comma = self.dialect.comma
-        for line, row in self.rows():
-            self._check_width(line, row)
-            for name, place in places.items():
-                cell = row[place].strip()
-                if is_number(cell, comma) or (name in gappy and is_missing(cell)):
-                    continue
-                raise column_error(f"{self.path}:{line}", name, why_not(cell, comma))
-
-    def _check_width(self, line: int, row: Sequence[str]) -> None:
-        """Raise a RecordError for a row of more or fewer cells than there are columns."""
+    def _refuse_first(self, places: Mapping[str, int], fault: Callable[[str, str], str]) -> None:
+        """Raise a RecordError for the first row that is ragged or has a cell with a ``fault``."""
         named = len(self.names)
-        if len(row) == self.dialect.cells and not any(cell.strip() for cell in row[named:]):
-            return
-        cells = len(row) - (named < self.dialect.cells and not row[-1].strip())
-        raise RecordError(f"{self.path}:{line}: cells in this row: {cells}, columns: {named}")
+        for line, row in self.rows():
+            if len(row) != self.dialect.cells or any(cell.strip() for cell in row[named:]):
+                cells = len(row) - (named < self.dialect.cells and not row[-1].strip())
+                raise RecordError(
+                    f"{self.path}:{line}: cells in this row: {cells}, columns: {named}"
+                )
+            for name, place in places.items():
+                what = fault(name, row[place].strip())
+                if what:
+                    raise column_error(f"{self.path}:{line}", name, what)
 
-    def _stamps(self, columns: Sequence[str], places: Sequence[int]) -> Array:
+    def _stamps(self, places: Mapping[str, int]) -> Array:
         """Return timestamps of one column, or of two, in s since the first."""
+        from exfit.records.formats.timestamps import StampError, seconds_since_first
+
         needed = len(self.text.data) + STAMP_BYTES * self._count * len(places)
         self.limit.check(needed, f"{self._count} timestamps")
+
+        def fault(_: str, cell: str) -> str:
+            return "" if is_timestamp(cell) else f"{quoted(cell)} is not a timestamp"
+
         if not self._even:
-            for line, row in self.rows():
-                self._check_width(line, row)
+            self._refuse_first({}, fault)
         try:
-            width = WIDEST if len(places) == 1 else WIDEST_OF_TWO
-            cells = self._loaded(self._lines(), places, f"S{width}")
+            width = WIDEST[len(places) - 1]
+            cells = self._loaded(self._lines(), places.values(), f"S{width}")
         except ValueError as error:
-            for line, row in self.rows():
-                self._check_width(line, row)  # quoted cells may hold separators
-                for name, place in zip(columns, places, strict=True):
-                    if not is_timestamp(row[place]):
-                        what = f"{quoted(row[place])} is not a timestamp"
-                        raise column_error(f"{self.path}:{line}", name, what) from None
+            self._refuse_first(places, fault)  # quoted cells may hold separators
             raise RecordError(f"{self.path}: {error}") from None
         try:
             return seconds_since_first(cells)
         except StampError as error:
-            raise column_error(self.place(error.row), columns[error.column], str(error)) from None
+            name = [*places][error.column]
+            raise column_error(self.place(error.row), name, str(error)) from None
 
 
 def read_text_table(path: Path, memory: float | None = None) -> TextTable:
@@ -276,10 +295,15 @@ def read_text_table(path: Path, memory: float | None = None) -> TextTable:
     """
     limit = memory_limit(path, memory)
     data = read_bytes(path)
-    text = decoded(path, data)
+    text = _decoded(path, data)
     if not text.data or text.data.isspace():
         raise RecordError(f"{path}: the file is empty")
-    dialect = find_dialect(path, head_of(text, limit))
+    end = text.start_of(HEAD_LINES + 1)
+    if end > HEAD_BYTES:
+        end = max(text.data.rfind(b"\n", 0, HEAD_BYTES) + 1, text.start_of(FEWEST_HEAD_LINES + 1))
+    cells = max(text.data.count((mark or " ").encode(), 0, end) for mark in SEPARATORS) + 1
+    limit.check(len(text.data) + end + CELL_BYTES * cells, f"{cells} cells in its first lines")
+    dialect = find_dialect(path, [*text.lines(end=end)])
     table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect, limit)
     if next(table.rows(), None) is None:
         raise RecordError(f"{path}: no samples below the column names")
@@ -291,3 +315,50 @@ def read_text_table(path: Path, memory: float | None = None) -> TextTable:
 
 def _number_or_nan(cell: str) -> float:
     return np.nan if is_missing(cell) else float(cell)
+
+
+def _decoded(path: Path, data: bytes) -> Text:
+    """Return the text of a file: UTF-8, UTF-16 with its mark, else Windows-1252 (with latin-1).
+
+    Raises RecordError for bytes that are none of these, and for a null character.
+    """
+
+    def no_text(at: int, what: str) -> RecordError:
+        line = data.count(b"\n", 0, at) + 1
+        return RecordError(f"{path}:{line}: {what}: byte 0x{data[at]:02x}")
+
+    mark, encoding = next(
+        (known for known in BYTE_ORDER_MARKS if data.startswith(known[0])), (b"", "utf-8")
+    )
+    data = data[len(mark) :]
+    if encoding == "utf-8" and _is_utf8(data):
+        pass
+    elif mark:
+        try:
+            data, encoding = data.decode(encoding).encode(), "utf-8"
+        except UnicodeDecodeError as error:
+            what = f"not {encoding[:6].rstrip('-').upper()} text"
+            raise no_text(error.start, what) from None
+    else:
+        encoding = "cp1252"
+        strange = data.translate(None, TEXT_BYTES)
+        if strange:
+            raise no_text(data.index(strange[:1]), "neither UTF-8 nor Windows-1252 text")
+    if b"\0" in data:
+        raise no_text(data.index(b"\0"), "not text")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return Text(data, encoding)
+
+
+def _is_utf8(data: bytes) -> bool:
+    if data.isascii():
+        return True
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    try:
+        for at in range(0, len(data), DECODED_BYTES):
+            decoder.decode(data[at : at + DECODED_BYTES])
+        decoder.decode(b"", final=True)
+    except UnicodeDecodeError:
+        return False
+    return True

@@ -7,16 +7,15 @@ no digit of the file is lost.
 
 import re
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.records.formats.cells import CELL_SHOWN, MONTHS, timestamp_form
+
 Whole = NDArray[np.int64]
 Cells = NDArray[np.bytes_]
 
-WIDEST = 40  # characters of a timestamp; one with all digits and a zone has 38
-WIDEST_OF_TWO = 28  # of a time of day alone, or a date
 MOST_DIGITS = 12  # of a second's fraction
 CELLS_AT_A_TIME = 1 << 16
 DAY = 86_400  # s
@@ -25,19 +24,6 @@ CENTURY = 2000  # of a year in two digits
 EITHER = "dmy or mdy"  # order of a date whose first two parts may be either
 TO_ZERO = np.array([ord("0") if chr(at).isdigit() and at < 128 else at for at in range(256)], "u1")
 MONTHS_A_YEAR = 12
-MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-PATTERN = (
-    r"[ \t]*"
-    r"(?:(?P<year>\d{4})(?P<iso>[-/.])(?P<month>\d{1,2})(?P=iso)(?P<day>\d{1,2})"
-    r"|(?P<left>\d{1,2})(?P<mark>[-/.])(?P<middle>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2})"
-    rf"|(?P<named>\d{{1,2}})(?P<dash>[- ])(?P<name>(?i:{'|'.join(MONTHS)}))"
-    r"(?P=dash)(?P<full>\d{4}|\d{2}))?"
-    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(left)[ \t]+|(?(named)[ \t]+|)))"
-    r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
-    r"(?:[ \t]*(?P<half>[AaPp])\.?[ \t]?[Mm]\.?)?"
-    r"[ \t]*(?P<zone>Z|(?P<sign>[+-])(?P<zonehour>\d{2}):?(?P<zoneminute>\d{2}))?)?"
-    r"[ \t]*"
-)
 
 
 class StampError(ValueError):
@@ -59,17 +45,6 @@ class _Stamps:
     digits: int
 
 
-def is_timestamp(cell: str) -> bool:
-    """Check for the form of a date, a time of day, or both."""
-    return cell.lstrip(" \t")[:1].isdigit() and _any_form().fullmatch(cell) is not None
-
-
-@cache
-def _any_form() -> re.Pattern[str]:
-    """Return the form of a timestamp; compiled where a cell may be one: it takes milliseconds."""
-    return re.compile(PATTERN, re.ASCII)
-
-
 def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
     """Return the instants (M,) in s since the first, of cells (M, 1), or (M, 2) of date and time.
 
@@ -77,21 +52,25 @@ def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
     be two instants.
     """
     stamps = [_read(cells, column) for column in range(cells.shape[1])]
-    whole = stamps[0] if len(stamps) == 1 else _joined(cells[0], *stamps)
-    second = np.zeros(len(cells), np.int64) if whole.second is None else whole.second
+    dates, times = stamps[0], stamps[-1]
+    if len(stamps) > 1 and (dates.date is None or dates.second is not None):
+        raise StampError(0, 0, f"{_quoted(cells[0, 0])} is not a date alone")
+    if len(stamps) > 1 and (times.second is None or times.date is not None):
+        raise StampError(0, 1, f"{_quoted(cells[0, 1])} is not a time of day alone")
+    second = np.zeros(len(cells), np.int64) if times.second is None else times.second
     second = second - second[0]
-    if whole.date is not None:
-        days = _days(whole)
+    if dates.date is not None:
+        days = _days(dates.date, dates.order)
         second += (days - days[0]) * DAY
-    else:
-        _refuse_midnight(second)
-    unit = 10**whole.digits
-    fraction = whole.fraction // 10 ** (MOST_DIGITS - whole.digits)
+    elif (back := np.flatnonzero(np.diff(second) < -DAY // 2)).size:
+        what = "the time of day passes midnight, and there is no date beside it"
+        raise StampError(int(back[0]) + 1, 0, what)
+    unit = 10**times.digits
+    fraction = times.fraction // 10 ** (MOST_DIGITS - times.digits)
     if np.abs(second).max() > np.iinfo(np.int64).max // (2 * unit):
         row = int(np.abs(second).argmax())
-        raise StampError(
-            row, 0, f"{second[row] / DAY:.0f} days from the first timestamp are too many"
-        )
+        what = f"{second[row] / DAY:.0f} days from the first timestamp are too many"
+        raise StampError(row, 0, what)
     instants: NDArray[np.float64] = (second * unit + (fraction - fraction[0])) / unit
     return instants
 
@@ -136,7 +115,7 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
 
 
 def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
-    form = _any_form().fullmatch(cell.decode("latin-1")) if cell.strip() else None
+    form = timestamp_form().fullmatch(cell.decode("latin-1")) if cell.strip() else None
     if form is None:
         what = f"{_quoted(cell)} is not a timestamp" if cell.strip() else "an empty cell"
         raise StampError(row, column, what)
@@ -187,40 +166,17 @@ def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDAr
     return hour * 3600 + minute * 60 + second - zone * 60, wrong
 
 
-def _joined(first: Cells, date: _Stamps, time: _Stamps) -> _Stamps:
-    """Return dates and times of day of two columns as timestamps."""
-    if date.date is None or date.second is not None:
-        raise StampError(0, 0, f"{_quoted(first[0])} is not a date alone")
-    if time.second is None or time.date is not None:
-        raise StampError(0, 1, f"{_quoted(first[1])} is not a time of day alone")
-    return _Stamps(date.date, date.order, time.second, time.fraction, time.digits)
+def _days(date: NDArray[np.int32], order: str) -> Whole:
+    """Return the days (M,) since 1970 of dates (M, 3).
 
-
-def _days(stamps: _Stamps) -> Whole:
-    """Return the days (M,) since 1970."""
-    assert stamps.date is not None
-    year, left, middle = (part.astype(np.int64) for part in stamps.date.T)
-    day_first = _is_day_first(stamps.order, left, middle)
-    if day_first is None:
-        return _daily(stamps.date)
-    return _valid_days(year, middle, left) if day_first else _valid_days(year, left, middle)
-
-
-def _is_day_first(order: str, left: Whole, middle: Whole) -> bool | None:
-    """Check whether the first of two parts of the dates is the day; None if it may be either."""
-    if order != EITHER:
-        return order == "dmy"
-    if (left > MONTHS_A_YEAR).any():
-        return True
-    return False if (middle > MONTHS_A_YEAR).any() else None
-
-
-def _daily(date: NDArray[np.int32]) -> Whole:
-    """Return the days of dates (M, 3) in the order in which every change is to the next day.
-
-    Raises StampError where that holds for both orders, or for none.
+    Where the first two parts may be day and month or month and day, it is the order in which every
+    change is to the next day. Raises StampError where that holds for both, or for none.
     """
     year, left, middle = (part.astype(np.int64) for part in date.T)
+    if order == "dmy" or (order == EITHER and (left > MONTHS_A_YEAR).any()):
+        return _valid_days(year, middle, left)
+    if order != EITHER or (middle > MONTHS_A_YEAR).any():
+        return _valid_days(year, left, middle)
     readings = [_valid_days(year, middle, left), _valid_days(year, left, middle)]
     changes = np.flatnonzero(np.any(np.diff(date, axis=0) != 0, axis=1))
     if not changes.size:
@@ -229,11 +185,8 @@ def _daily(date: NDArray[np.int32]) -> Whole:
     if len(daily) == 1:
         return daily[0]
     row = int(changes[0]) + 1
-    raise StampError(
-        row,
-        0,
-        f"{left[row]}, {middle[row]} could be day and month, or month and day; write ISO dates",
-    )
+    either = f"{left[row]}, {middle[row]} could be day and month, or month and day"
+    raise StampError(row, 0, f"{either}; write ISO dates")
 
 
 def _valid_days(year: Whole, month: Whole, day: Whole) -> Whole:
@@ -244,20 +197,10 @@ def _valid_days(year: Whole, month: Whole, day: Whole) -> Whole:
     wrong |= day > length
     if wrong.any():
         row = int(wrong.argmax())
-        raise StampError(
-            row, 0, f"year {year[row]}, month {month[row]}, day {day[row]} is not a date"
-        )
+        what = f"year {year[row]}, month {month[row]}, day {day[row]} is not a date"
+        raise StampError(row, 0, what)
     return first + day - 1
 
 
-def _refuse_midnight(second: Whole) -> None:
-    """Raise StampError where times of day without a date begin anew."""
-    back = np.flatnonzero(np.diff(second) < -DAY // 2)
-    if back.size:
-        raise StampError(
-            int(back[0]) + 1, 0, "the time of day passes midnight, and there is no date beside it"
-        )
-
-
 def _quoted(cell: bytes) -> str:
-    return repr(cell.decode("latin-1")[:WIDEST].strip())
+    return repr(cell.decode("latin-1")[:CELL_SHOWN].strip())

@@ -4,7 +4,7 @@ import oversized_files
 import pytest
 from limited_memory import inspected_in_a_process
 
-from exfit.records.formats.memory import GIGABYTE
+from exfit.records.formats.table import GIGABYTE
 
 pytest.importorskip("resource", reason="the system limits no memory")
 pytestmark = pytest.mark.long
