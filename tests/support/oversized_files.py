@@ -305,19 +305,23 @@ def parquet_of_zeros():
     return parquet(VALUES, groups=128)
 
 
+ZSTD = b"\x28\xb5\x2f\xfd"  # with which what is packed so begins
+
+
 def parquet_that_lies(unpacked=2**31 - 1, rows=1000):
     """Return a file whose page declares to unpack to far more than the footer states."""
     import pyarrow as pa
     from pyarrow import parquet as files
 
     stream = io.BytesIO()
-    schema = pa.schema([pa.field("t", pa.float64(), nullable=False)])
-    table = pa.table({"t": np.arange(float(rows))}, schema)
-    files.write_table(table, stream, compression="none", use_dictionary=False)
+    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in ("vt", "t")])
+    table = pa.table({name: np.arange(float(rows)) for name in schema.names}, schema)
+    files.write_table(table, stream, compression="zstd", use_dictionary=False)
     data = stream.getvalue()
     chunk = files.ParquetFile(stream).metadata.row_group(0).column(0)
-    start, packed = chunk.data_page_offset, 8 * rows
-    length = chunk.total_compressed_size - packed  # of the header of its only page
+    start = chunk.data_page_offset
+    length = data.index(ZSTD, start) - start  # of the header of its only page
+    packed = chunk.total_compressed_size - length
     sizes = b"".join(b"\x15" + varint(2 * size) for size in (0, unpacked, packed))
     values = b"\x2c\x15" + varint(2 * rows) + b"\x15\x00\x15\x06\x15\x06\x00"
     filled = length - len(sizes) - len(values) - 3  # of the statistics' room

@@ -3,6 +3,7 @@
 import gc
 import hashlib
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -13,6 +14,7 @@ from scipy.io import savemat
 from tables import everything, in_this_process, refused
 
 from exfit.records.formats import child, excel, matlab, open_table, parquet
+from exfit.records.inspection import inspect
 
 T = np.arange(50) / 100.0
 READERS = {".xlsx": excel, ".mat": matlab, ".parquet": parquet}
@@ -52,21 +54,39 @@ def test_a_column_that_is_refused_costs_no_other(written):
     assert table.numbers(["t"])["t"].tolist() == T.tolist()
 
 
-def test_a_child_ends_with_its_table(written, monkeypatch):
-    started = []
+@pytest.fixture
+def started(monkeypatch):
+    """Return the processes that are started, in a list that grows."""
+    processes = []
 
     class Noted(subprocess.Popen):
         def __init__(self, *args, **options):
             super().__init__(*args, **options)
-            started.append(self)
+            processes.append(self)
 
     monkeypatch.setattr(child, "Popen", Noted)
+    return processes
+
+
+def test_a_child_ends_with_its_table(written, started):
     table = open_table(written[".mat"])
     (process,) = started
     assert process.poll() is None
     del table
     gc.collect()
     assert process.poll() is not None
+
+
+def test_inspection_says_why_a_child_ended_at_a_later_column(written, started):
+    table = open_table(written[".mat"])
+
+    def fetch(at):
+        if table.names[at] == "vt":
+            started[0].kill()
+        return table.fetch(at)
+
+    message = refused(lambda: inspect(replace(table, fetch=fetch)), "bump.mat", "damaged")
+    assert "the process that read it" in message
 
 
 def test_a_file_that_takes_too_long_is_refused(written, monkeypatch):
