@@ -27,7 +27,7 @@ from exfit.estimate.problem import (
     Steps,
     TriangleOf,
 )
-from exfit.util.threads import processors
+from exfit.util.processes import processors
 
 Done = TypeVar("Done")
 

@@ -6,7 +6,7 @@ from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from exfit.errors import ModelError
-from exfit.util.magnitude import magnitude_fault
+from exfit.util.text import magnitude_fault
 
 Limits = tuple[float, float]
 

@@ -10,8 +10,8 @@ import numpy as np
 from exfit.errors import RecordError
 from exfit.records.formats.table import Array, column_error
 from exfit.records.units import SECONDS, alike, bare, usual
-from exfit.util.magnitude import LARGEST
 from exfit.util.sorting import median
+from exfit.util.text import LARGEST
 
 TIMESTAMP_NAMES = frozenset(  # date and time of day in one column
     ("timestamp", "zeitstempel", "zeitpunkt", "datetime", "date_time", "date_&_time",

@@ -40,7 +40,7 @@ from exfit.records.status import Status, bad_rows
 from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
 from exfit.records.units import unit_in, usual
 from exfit.signals import OF_EVENT
-from exfit.util.magnitude import LARGEST
+from exfit.util.text import LARGEST
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from exfit.records.formats.table import NONE, RecordTable, column_error, read_by
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
 from exfit.records.units import alike, needs_base, unit_of, usual
 from exfit.signals import unit_of_signal
-from exfit.util.magnitude import LARGEST, SMALLEST
+from exfit.util.text import LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from exfit.dsp.three_phase import Connection

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from exfit.errors import RecordError
 from exfit.records.clock import check_increasing, check_steps, why_unusable
-from exfit.util.magnitude import LARGEST
+from exfit.util.text import LARGEST
 
 Array = NDArray[np.float64]
 

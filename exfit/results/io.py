@@ -9,7 +9,7 @@ from exfit.errors import ExfitError
 from exfit.results.model import FitResult
 from exfit.results.thinning import thinned, thinned_validation
 from exfit.util.file_names import VALIDATION, WHOLE_FIT
-from exfit.util.json_files import read_json
+from exfit.util.files import read_json
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, plain, read
 

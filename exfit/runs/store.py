@@ -12,9 +12,7 @@ from typing import Any, TypeVar
 
 from exfit import __version__
 from exfit.errors import ExfitError
-from exfit.util.files import regular_size
-from exfit.util.json_files import read_json
-from exfit.util.root import on_disk
+from exfit.util.files import on_disk, read_json, regular_size
 from exfit.util.text import to_json
 from exfit.util.typed import plain, read
 

@@ -234,7 +234,7 @@ def _figure_of_series(series: "FitSeries") -> PlannedFigures:
 
 def _of_records(main: Path) -> set[str]:
     """Return the names of the files that a former run wrote for its records, by its main file."""
-    from exfit.util.json_files import read_json
+    from exfit.util.files import read_json
 
     try:
         content = read_json(main)

@@ -479,7 +479,7 @@ def _in_blocks(
     code: TangentKernel, p: Array, courses: Courses, tangents: Array, rates: Array | None
 ) -> tuple[Array, Array, Array | None]:
     """Return samples with derivatives; of a single set each block of directions in a thread."""
-    from exfit.util.threads import in_threads
+    from exfit.util.processes import in_threads
 
     width = code.directions
     firsts = range(0, tangents.shape[-1], width)

@@ -1,5 +1,11 @@
-"""Files that are read up to a size, and that appear whole or not at all."""
+"""Files that are read up to a size, and that appear whole or not at all; those of JSON, too.
 
+A worker of a cluster lays the files of a case out in a folder of its own, which stands for the
+root: it reads them there by the paths that the user gave, so that no result and no message names
+another.
+"""
+
+import json
 import os
 import re
 import stat
@@ -9,15 +15,37 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from errno import EINVAL, EISDIR, ENOTDIR
 from pathlib import Path
+from typing import Any, NoReturn
 from zlib import crc32
 
 from exfit.errors import ExfitError, FileError
 from exfit.util.interrupts import deferred_interrupts
-from exfit.util.root import on_disk
 
+ROOT = "EXFIT_LAID_OUT"  # the variable of the environment that names the folder; its real path
+LARGEST_FILE = 128_000_000  # bytes; a result of a hundred long records has about as many
+MOST_PARTS = 2_000_000  # texts, lists and mappings; a result has some thousand
+LONGEST_INTEGER = 400  # digits; a longer one takes long to read, and no double is as large
+HALF_CHARACTER = re.compile(r"\\u[dD][89a-fA-F]")
 # of a file that is still to be renamed: computer, process, and which of its files
 TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
 ABANDONED = 86_400.0  # s: so old, a temporary file of any computer is of a run that was killed
+
+
+def on_disk(path: Path) -> Path:
+    """Find the place of a file that a case names: the path itself by default."""
+    root = os.environ.get(ROOT)
+    return below(Path(root), path) if root else path
+
+
+def below(root: Path, path: Path) -> Path:
+    """Return the place of a path below a root.
+
+    A relative one begins in the current folder, as far as this lies below the root. A path above
+    the root is one at the root, as everywhere. Drives become folders.
+    """
+    working = Path(os.sep, os.path.relpath(Path.cwd(), root))
+    drive, rest = os.path.splitdrive(os.path.normpath(working / path))
+    return root / re.sub(r"[^\w.-]+", "_", drive).strip("_") / rest.lstrip(os.sep)
 
 
 def regular_size(path: Path) -> int:
@@ -45,7 +73,11 @@ def refuse_bytes(path: Path) -> None:
     try:
         str(path).encode()
     except UnicodeEncodeError:
-        raise ExfitError(f"{path}: {_why_no_text(os.fsencode(path))}") from None
+        try:
+            why = _what_lacks(os.fsencode(path).decode())
+        except UnicodeDecodeError:
+            why = "the name of the file is not UTF-8 text; rename it"
+        raise ExfitError(f"{path}: {why}") from None
 
 
 def why_unreadable(fault: OSError | ValueError) -> str:
@@ -54,14 +86,6 @@ def why_unreadable(fault: OSError | ValueError) -> str:
         return _what_lacks(fault.object)
     # a ValueError is that of a name with a null character
     return str(fault.strerror if isinstance(fault, OSError) else fault)
-
-
-def _why_no_text(name: bytes) -> str:
-    """Give the reason why the name of a file is no text."""
-    try:
-        return _what_lacks(name.decode())
-    except UnicodeDecodeError:
-        return "the name of the file is not UTF-8 text; rename it"
 
 
 def _what_lacks(name: str) -> str:
@@ -98,6 +122,53 @@ def utf8(data: bytes, path: Path) -> str:
         raise ExfitError(f"{path}:{line}: not UTF-8 text: {byte}") from None
 
 
+def read_json(path: Path) -> dict[str, Any]:
+    """Return the mapping that a file of JSON holds.
+
+    Raises ExfitError, with the place where there is one, for a file that cannot be read, is too
+    large, is no JSON in UTF-8, has a key twice in a mapping, or whose top is no mapping.
+    """
+    text = utf8(read_limited(path, LARGEST_FILE), path)
+    if sum(map(text.count, '"[{')) > MOST_PARTS:
+        raise ExfitError(f"{path}: more than {MOST_PARTS:,} texts, lists and mappings")
+    try:
+        content = json.loads(
+            text,
+            object_pairs_hook=_mapping,
+            parse_constant=_refuse_constant,
+            parse_int=_integer,
+        )
+        if HALF_CHARACTER.search(text):
+            json.dumps(content, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise ExfitError(f"{path}: not JSON: a text with half a character (\\ud8..)") from None
+    except RecursionError:
+        raise ExfitError(f"{path}: not JSON: nested too deep") from None
+    except ValueError as error:
+        raise ExfitError(f"{path}: not JSON: {error}") from None
+    if not isinstance(content, dict):
+        raise ExfitError(f"{path}: not a mapping (key: value) at the top")
+    return content
+
+
+def _mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    mapping = dict(pairs)
+    if len(mapping) < len(pairs):
+        keys = [key for key, _ in pairs]
+        duplicate = next(key for k, key in enumerate(keys) if key in keys[:k])
+        raise ValueError(f"duplicate key {duplicate!r}")
+    return mapping
+
+
+def _integer(text: str) -> int | str:
+    """Return a whole number; one that no double holds as its text, which is refused in place."""
+    return int(text) if len(text) <= LONGEST_INTEGER else text
+
+
+def _refuse_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not a number of JSON")
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file beside its place and rename it, its folder made where it is missing.
 
@@ -117,7 +188,8 @@ def write(path: Path, content: str | bytes) -> None:
     """
     data = content.encode() if isinstance(content, str) else content
     try:
-        if _takes_bytes(path):
+        kind = path.stat().st_mode if path.exists() else stat.S_IFREG
+        if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):  # as /dev/stdout
             path.write_bytes(data)
         else:
             write_whole(path.resolve() if path.is_symlink() else path, data)
@@ -177,6 +249,7 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
     ExfitError too, but hinders no other: the numbers of a long run are not lost for it.
     """
     beside: dict[Path, Path] = {}
+    faults: list[str] = []
     with deferred_interrupts():
         try:
             _make_folder(folder)
@@ -189,10 +262,18 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
                 with temporary.open("rb+") as file:
                     # a rename that outlives a power failure has all of the file then
                     os.fsync(file.fileno())
-            faults = [
-                *_removed(folder / name for name in {*obsolete} - {*contents}),
-                *_replaced(beside),
-            ]
+            for path in (folder / name for name in {*obsolete} - {*contents}):
+                try:
+                    if path.is_file():
+                        path.unlink()
+                except OSError as fault:
+                    why = f"of a former run, cannot be removed: {fault.strerror}"
+                    faults.append(f"{path}: {why}")
+            for path, temporary in beside.items():
+                try:
+                    temporary.replace(path)
+                except OSError as fault:
+                    faults.append(_message(path, fault))
         except OSError as fault:
             raise ExfitError(_message(folder, fault)) from fault
         finally:
@@ -226,15 +307,6 @@ def _make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError as fault:
         raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR), str(folder)) from fault
-
-
-def _takes_bytes(path: Path) -> bool:
-    """Check for a path to something that cannot be replaced by a file, as /dev/stdout."""
-    try:
-        kind = path.stat().st_mode
-    except OSError:
-        return False
-    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
 
 
 def _temporary(folder: Path) -> Path:
@@ -275,29 +347,6 @@ def _write_and_rename(path: Path, data: bytes) -> None:
 def _write_new(path: Path, data: bytes) -> None:
     with path.open("xb") as file:
         file.write(data)
-
-
-def _removed(paths: Iterable[Path]) -> list[str]:
-    """Remove files that are there, and return what hindered it."""
-    faults = []
-    for path in paths:
-        try:
-            if path.is_file():
-                path.unlink()
-        except OSError as fault:
-            faults.append(f"{path}: of a former run, cannot be removed: {fault.strerror}")
-    return faults
-
-
-def _replaced(beside: Mapping[Path, Path]) -> list[str]:
-    """Rename files to their places, and return what hindered it."""
-    faults = []
-    for path, temporary in beside.items():
-        try:
-            temporary.replace(path)
-        except OSError as fault:
-            faults.append(_message(path, fault))
-    return faults
 
 
 def _message(path: Path, fault: OSError) -> str:

@@ -35,21 +35,12 @@ def _json(content: Any, encode: Callable[[Any], str], line: str) -> str:
         return f"{{{','.join(entries)}{line}}}"
     if isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
         return f"[{','.join(inner + _json(value, encode, inner) for value in content)}{line}]"
-    return _plain(content, encode)
-
-
-def _plain(content: Any, encode: Callable[[Any], str]) -> str:
-    """Return a text of JSON in one line: of a single value, or of a list of numbers."""
     if isinstance(content, float):
         return repr(float(content)) if isfinite(content) else "null"
     try:
         return encode(content)
-    except ValueError:
-        return encode([_finite(x) for x in content])
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not isfinite(value) else value
+    except ValueError:  # a list with numbers that are not finite
+        return encode([None if isinstance(x, float) and not isfinite(x) else x for x in content])
 
 
 def yaml_number(value: float) -> str:
@@ -60,6 +51,8 @@ def yaml_number(value: float) -> str:
     return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"
 
 
+LARGEST = 1e100  # of numbers to compute with: its squares and cubes are numbers still
+SMALLEST = 1e-100  # but 0: of a smaller one the square loses its digits
 DIGITS = 5  # of a number without an error
 DIGITS_OF_ERROR = 2  # that a number is printed to
 LEAST_DIGITS = 3  # of a number, however large its error
@@ -179,3 +172,14 @@ def show_value(value: Any) -> str:
         return "a list" if isinstance(value, list) else "a mapping"
     text = repr(value)
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
+
+
+def magnitude_fault(value: float) -> str | None:
+    """Give the fault of a number that is too large or too near 0, None where it has none."""
+    if not isfinite(value):
+        return f"{value:g} is not a finite number"
+    if abs(value) > LARGEST:
+        return f"{value:g} exceeds {LARGEST:g}"
+    if 0.0 < abs(value) < SMALLEST:
+        return f"{value:g} is not 0, but below {SMALLEST:g}"
+    return None

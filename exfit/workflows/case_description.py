@@ -41,7 +41,7 @@ from exfit.results.description import (
 from exfit.results.model import FittedParameter
 from exfit.signals import COMPARED_IN_EVENT, unit_of_signal
 from exfit.util.criteria import Criteria
-from exfit.util.root import on_disk
+from exfit.util.files import on_disk
 from exfit.util.text import rounded_value, show
 
 RESTING = ("vt", *COMPARED_IN_EVENT)  # in the order in which a rest is described

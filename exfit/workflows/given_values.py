@@ -16,9 +16,8 @@ from exfit.fitting.recorded.references import with_recorded_steps
 from exfit.fitting.recorded.switchings import names_of_switchings
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
-from exfit.util.magnitude import magnitude_fault
 from exfit.util.sources import SOURCES
-from exfit.util.text import near
+from exfit.util.text import magnitude_fault, near
 
 if TYPE_CHECKING:
     from exfit.results.description import GivenInPlace

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from exfit.errors import ExfitError
-from exfit.util import json_files
-from exfit.util.files import read_limited
-from exfit.util.json_files import read_json
+from exfit.util import files as json_files
+from exfit.util.files import read_json, read_limited
 
 
 def test_a_file_is_read_up_to_its_limit(tmp_path):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from exfit.util.root import ROOT, below, on_disk
+from exfit.util.files import ROOT, below, on_disk
 
 
 def test_without_a_root_a_file_lies_where_its_path_says(monkeypatch):

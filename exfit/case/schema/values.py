@@ -18,8 +18,8 @@ from pydantic_core import PydanticCustomError
 
 from exfit.case.messages import MAGNITUDE, PERCENT
 from exfit.case.ties import is_tie
-from exfit.util.magnitude import magnitude_fault
 from exfit.util.sources import NOT_STATED, SOURCES
+from exfit.util.text import magnitude_fault
 
 if TYPE_CHECKING:
     Source = str

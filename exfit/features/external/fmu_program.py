@@ -20,7 +20,7 @@ from exfit.features.external.fmu_file import (
 )
 from exfit.features.external.program import ExternalProgram, running
 from exfit.simulation.simulator import Simulator
-from exfit.util.root import on_disk
+from exfit.util.files import on_disk
 from exfit.util.text import near
 
 Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared

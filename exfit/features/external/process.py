@@ -13,7 +13,7 @@ from tempfile import TemporaryFile
 from threading import Thread
 from typing import IO, Any
 
-from exfit.util.ended_processes import ending, last_lines
+from exfit.util.processes import ending, last_lines
 from exfit.util.text import show_value
 
 NAME = "the program"

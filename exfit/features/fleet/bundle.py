@@ -14,8 +14,7 @@ from exfit.errors import ExfitError
 from exfit.features.fleet.folder import CaseOutcome, Failure
 from exfit.features.fleet.task import CaseTask, run_case
 from exfit.util.cache import CACHE
-from exfit.util.files import read_regular, why_unreadable
-from exfit.util.root import ROOT, below
+from exfit.util.files import ROOT, below, read_regular, why_unreadable
 
 QUICKLY = 1  # the level of compression: the next ones gain little and take several times as long
 PAYS = 0.9  # of the length: what compression leaves, or less

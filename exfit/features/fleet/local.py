@@ -26,9 +26,8 @@ from exfit.errors import ExfitError
 from exfit.features.fleet.folder import CaseOutcome, Failure
 from exfit.features.fleet.plan import PlannedCase
 from exfit.features.fleet.worker import BEGUN, READY
-from exfit.util.ended_processes import ending, last_lines
 from exfit.util.interrupts import ENDING
-from exfit.util.threads import THREADS
+from exfit.util.processes import THREADS, ending, last_lines
 
 LISTENING = 0.1  # s: on Windows an interruption reaches only what returns from waiting
 MOST_FAILED_STARTS = 3  # one after the other: something is wrong with all workers

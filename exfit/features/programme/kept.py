@@ -18,8 +18,7 @@ from exfit.runs import store
 from exfit.runs.runner import AS_CASES_SAY, FitSettings
 from exfit.runs.store import digest_of
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
-from exfit.util.files import write
-from exfit.util.json_files import read_json
+from exfit.util.files import read_json, write
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, plain, read
 

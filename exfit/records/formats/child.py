@@ -41,8 +41,8 @@ from exfit.records.formats.table import (
     StoppedError,
     memory_limit,
 )
-from exfit.util.ended_processes import ending, last_lines
-from exfit.util.root import on_disk
+from exfit.util.files import on_disk
+from exfit.util.processes import ending, last_lines
 
 BOOT = (
     "import sys; sys.path[:] = sys.argv[1:]; from exfit.records.formats.child import serve; serve()"

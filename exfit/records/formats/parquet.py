@@ -13,7 +13,7 @@ from exfit.records.formats.cells import stated
 from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.table import column_error, readable
 from exfit.records.units import unit_in
-from exfit.util.root import on_disk
+from exfit.util.files import on_disk
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -17,7 +17,7 @@ from exfit.errors import CaseError, ExfitError
 from exfit.features.fleet.bundle import bundle_of, laid_out
 from exfit.models.exciters import first_order
 from exfit.results.io import result_text
-from exfit.util.root import ROOT
+from exfit.util.files import ROOT
 
 NOISE = 1e-3
 SAMPLES = TRUTH + NOISE * np.random.default_rng(3).standard_normal(len(TIME))

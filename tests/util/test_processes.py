@@ -5,7 +5,7 @@ import os
 import pytest
 
 from exfit.errors import ExfitError
-from exfit.util.threads import in_threads, processors
+from exfit.util.processes import in_threads, processors
 
 
 def test_the_environment_says_how_many_threads_compute(monkeypatch):
