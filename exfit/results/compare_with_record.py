@@ -1,34 +1,39 @@
-"""A simulated response beside its record."""
+"""A simulated response beside its record, and whether one that was not fitted is accepted."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import nan, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, RemovedLine, features
 from exfit.dsp.recorded_features import FoundByRecord, RecordedResponse, recorded_features
+from exfit.fitting.channels import noise_shape
 from exfit.fitting.experiment import Channel
+from exfit.fitting.residuals import noise_of
 from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.comparisons import (
     Comparison,
+    DrivingSignal,
+    Excursion,
+    LeftOut,
     Overlay,
+    PlayedErrors,
+    PlayedRecord,
     StepFeatures,
     match_of,
 )
-from exfit.results.played_records import (
-    LeftOut,
-    PlayedRecord,
-    driving_signals,
-    left_out_of,
-    played_errors,
-)
+from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limit_hits import limiter_actions
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
+FREQUENCY, HERTZ = "frequency", "Hz"
+FROM_ANGLE = "frequency less rated (Hz)"
+MUCH_WORSE = 3.0  # times the error of the fit, or the noise of the record where that is larger
 SMALL = 1e-6  # of a move: the instant of a step is linear in what moves it
 
 
@@ -91,18 +96,14 @@ def _played(
         signal: played_errors(time, begins, overlay.measured, overlay.simulated)
         for signal, overlay in overlays.items()
     }
-    left_out = dict(_left_out(setup, samples))
+    left_out = {}
+    if setup.whole is not None:
+        for k, signal in enumerate(overlays):
+            whole, kept = setup.whole.signals[signal], setup.record.signals[signal]
+            masked = left_out_of(whole, kept, samples[:, k])
+            if masked is not None:
+                left_out[signal] = masked
     return PlayedRecord(begins, driving_signals(time, begins, recorded), errors, left_out)
-
-
-def _left_out(setup: ExperimentSetup, samples: Array) -> Iterator[tuple[str, LeftOut]]:
-    """Yield the signals of which masks leave something out, with that."""
-    for k, channel in enumerate(setup.channels):
-        if setup.whole is not None:
-            whole = setup.whole.signals[channel.signal]
-            left_out = left_out_of(whole, setup.record.signals[channel.signal], samples[:, k])
-            if left_out is not None:
-                yield channel.signal, left_out
 
 
 def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | None:
@@ -134,9 +135,12 @@ def _step_features(
     alone = samples[:, k] - setup.experiment.disturbances(values)[:, k]
     simulated = compared(channel, alone)
     measured = vt.measured - (vt.simulated - simulated)
+    kept = np.isfinite(simulated)
+    time = setup.record.time[kept]
+    window = _first_move(setup, time, values)
     return StepFeatures(
         _measured_features(setup, channel, Overlay(measured, simulated), values, moves),
-        _simulated_features(setup, simulated, values),
+        None if window is None else features(time, simulated[kept], *window),
     )
 
 
@@ -149,7 +153,15 @@ def _measured_features(
     window = _first_move(setup, time, values)
     if window is None:
         return None
-    found = _found_by_record(setup, channel, time, values, moves)
+    found = None
+    if moves:
+        curve, errors = setup.experiment.undisturbed_slopes(channel.signal, values, moves)
+        moved = [{**values, **{n: values[n] + SMALL * d for n, d in m.items()}} for m in moves]
+        instants = [window, *(_first_move(setup, time, each) for each in moved)]
+        at = np.array([np.nan if instant is None else instant[0] for instant in instants])
+        found = FoundByRecord(curve, errors, (at[1:] - at[0]) / SMALL)
+        if not all(np.isfinite(each).all() for each in vars(found).values()):
+            found = None
     response = RecordedResponse(time, vt.measured[kept], vt.simulated[kept], *window, found)
     measured = recorded_features(response)
     if measured is None:
@@ -162,35 +174,19 @@ def _measured_features(
     return replace(measured, without=(*removed, *measured.without))
 
 
-def _found_by_record(
-    setup: ExperimentSetup, channel: Channel, time: Array, values: Values, moves: Sequence[Values]
-) -> FoundByRecord | None:
-    """Compute the dependence of the response on what the record gave; None on nothing."""
-    if not moves:
-        return None
-    curve, errors = setup.experiment.undisturbed_slopes(channel.signal, values, moves)
-    instants = [_first_move(setup, time, values)] + [
-        _first_move(setup, time, {**values, **{n: values[n] + SMALL * d for n, d in move.items()}})
-        for move in moves
-    ]
-    at = np.array([np.nan if window is None else window[0] for window in instants])
-    found = FoundByRecord(curve, errors, (at[1:] - at[0]) / SMALL)
-    return found if all(np.isfinite(each).all() for each in vars(found).values()) else None
-
-
-def _simulated_features(
-    setup: ExperimentSetup, simulated: Array, values: Values
-) -> Features | None:
-    """Return the features of the response."""
-    kept = np.isfinite(simulated)
-    time = setup.record.time[kept]
-    window = _first_move(setup, time, values)
-    return None if window is None else features(time, simulated[kept], *window)
-
-
 def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[float, float] | None:
-    """Find the instants between which the reference stays after its first move, s."""
-    inside = [change for change in _changes(setup, values) if change.at >= time[0]]
+    """Find the instants between which the reference stays after its first move, s.
+
+    They are as the recorder shows them. A recorded reference may move before it jumps, from the end
+    of the steady part on.
+    """
+    simulator = setup.experiment.with_inputs(values)
+    changes = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
+    steady = setup.test.steady
+    jumps = changes[0].at if changes else float(setup.record.time[-1])
+    if "vref" in simulator.inputs.recorded and steady is not None and steady < jumps:
+        changes = [InputStep(steady, 0.0), *changes]
+    inside = [change for change in changes if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
         return None
     first = Inputs(float(time[0]), float(time[-1]), tuple(inside)).moves("vref")[0]
@@ -198,15 +194,145 @@ def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[fl
     return inside[0].at, later[0] if later else float(time[-1])
 
 
-def _changes(setup: ExperimentSetup, values: Values) -> list[InputStep]:
-    """List the changes of a test, as the recorder shows them, in the order of time.
+def left_out_of(whole: Array, compared: Array, simulated: Array) -> LeftOut | None:
+    """Collect the samples of a recorded signal (M,) that masks leave out, None for nothing.
 
-    A recorded reference may move before it jumps, from the end of the steady part on.
+    A sample of what is compared comes with it on each side, so that lines meet.
     """
-    simulator = setup.experiment.with_inputs(values)
-    steps = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
-    steady = setup.test.steady
-    if "vref" in simulator.inputs.recorded and steady is not None:
-        first = steps[0].at if steps else float(setup.record.time[-1])
-        return [InputStep(steady, 0.0), *steps] if steady < first else steps
-    return steps
+    masked = np.isfinite(whole) & ~np.isfinite(compared)
+    if not masked.any():
+        return None
+    wider = masked.copy()
+    wider[:-1] |= masked[1:]
+    wider[1:] |= masked[:-1]
+    return LeftOut(np.where(masked, whole, nan), np.where(wider, simulated, nan))
+
+
+def driving_signals(
+    time: Array, begins: float, recorded: Mapping[str, Array]
+) -> dict[str, DrivingSignal]:
+    """Return the signals that drive a simulation as figures show them: of an angle its frequency.
+
+    ``time`` (M,) is in s, the ``recorded`` signals (M,) are those of the plant; ``begins`` is the
+    end of their rest, s.
+    """
+    signals = {}
+    for signal, samples in recorded.items():
+        label, unit, drawn = label_of(signal), unit_of_signal(signal), samples
+        if signal == "angle":
+            signal, label, unit = FREQUENCY, FROM_ANGLE, HERTZ
+            drawn = np.gradient(np.unwrap(samples), time) / (2.0 * pi)
+        signals[signal] = DrivingSignal(label, unit, drawn, excursion(time, begins, drawn))
+    return signals
+
+
+def excursion(time: Array, begins: float, samples: Array) -> Excursion | None:
+    """Largest departure of a signal (M,) from its mean before ``begins`` (s); None of gaps."""
+    rest = _mean_before(time, begins, samples)
+    if not np.isfinite(samples).any():
+        return None
+    departure = samples - (samples[np.isfinite(samples)][0] if np.isnan(rest) else rest)
+    k = int(np.nanargmax(np.abs(departure)))
+    return Excursion(float(departure[k]), float(time[k]))
+
+
+def played_errors(time: Array, begins: float, measured: Array, simulated: Array) -> PlayedErrors:
+    """Compute the errors of simulated samples (M,); nan is left out of both."""
+    error = simulated - measured
+    compared = np.isfinite(error)
+    if not compared.any():
+        return PlayedErrors(nan, nan, nan, None, None)
+    k = int(np.nanargmax(np.abs(error)))
+    return PlayedErrors(
+        largest=float(error[k]),
+        largest_at=float(time[k]),
+        at_rest=_mean_before(time, begins, error),
+        measured=excursion(time, begins, np.where(compared, measured, nan)),
+        simulated=excursion(time, begins, np.where(compared, simulated, nan)),
+    )
+
+
+def _mean_before(time: Array, begins: float, samples: Array) -> float:
+    """Return the mean of a signal (M,) before an instant (s); nan where it has no sample there."""
+    rest = samples[(time < begins) & np.isfinite(samples)]
+    return float(np.mean(rest)) if len(rest) else nan
+
+
+def judged(
+    validation: Comparison,
+    fitted: Sequence[Comparison],
+    channels: Sequence[Channel],
+    accept: float | None = None,
+) -> Comparison:
+    """Return a validation with its verdict: the limit of its rmse, and why it is not accepted.
+
+    Args:
+        validation: the comparison with a record that was not fitted.
+        fitted: those with the records of the fit.
+        channels: those of the validation's record; they give its noise.
+        accept: the limit of the case (pu), which judges alone. Without it a validation must match
+            better than a constant would, and its rmse must not exceed three times the largest one
+            of the fit in the same signal, or three times the noise of its own record where that is
+            larger: no model comes below the noise. Of a grid event that was played in, P and Q
+            are judged so.
+    """
+    limits: dict[str, float | None] = {}
+    for channel in channels:
+        if channel.signal in validation.judging:
+            fit_error = _error_of_fit(channel.signal, fitted)
+            if accept is None and fit_error is not None:
+                noise = noise_of(channel) * noise_shape(channel).gain
+                limits[channel.signal] = MUCH_WORSE * max(fit_error, noise)
+            else:
+                limits[channel.signal] = accept
+    reasons = (
+        _why_not(validation, signal, fitted, limits[signal], accept is not None)
+        for signal in validation.judging
+    )
+    reason = "; ".join(filter(None, reasons))
+    limit = limits[validation.judging[0]]
+    return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
+
+
+def _error_of_fit(signal: str, fitted: Sequence[Comparison]) -> float | None:
+    """Return the largest rmse (pu) of the fit in a signal."""
+    errors = [match.channels[signal].rmse for match in fitted if signal in match.channels]
+    return max(errors, default=None)
+
+
+def _why_not(
+    validation: Comparison,
+    signal: str,
+    fitted: Sequence[Comparison],
+    limit: float | None,
+    given: bool,
+) -> str:
+    """Give the reason to reject a signal of a validation, "" where it is accepted.
+
+    ``given``: the case sets the limit. An error that is not a number is not accepted.
+    """
+    name, rmse = validation.name, validation.channels[signal].rmse
+    of_signal = f" of {signal}" if len(validation.judging) > 1 else ""
+    within = limit is None or rmse <= limit
+    if given:
+        error = f"on {name} the error{of_signal}, rmse {rmse:.3e} pu"
+        return "" if within else f"{error}, exceeds the limit of accept, {limit:g} pu"
+    if not validation.channels[signal].describes:
+        if validation.played is not None:
+            return (
+                f"{signal} of {name} is matched no better than by a constant: check its sign, base "
+                "and unit, the state of rest, and whether it is a record of this unit"
+            )
+        return (
+            f"the response matches {name} no better than a constant would: check vt0 and the "
+            "sign, size and instant of its step, and whether it is a record of this unit"
+        )
+    if within:
+        return ""
+    fit_error = _error_of_fit(signal, fitted)
+    times = np.inf if not fit_error else rmse / fit_error
+    return (
+        f"on {name} the error{of_signal} is {times:.1f} times that of the fit, more than "
+        f"{MUCH_WORSE:g} times: the fitted record does not determine what matters there, or the "
+        "record is of another unit or test"
+    )

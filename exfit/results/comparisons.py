@@ -1,4 +1,4 @@
-"""A simulated response beside a record: its samples, and how well they match."""
+"""A simulated response beside a record: its samples, and how well they match; what drove it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features
-from exfit.results.played_records import PlayedRecord
 from exfit.simulation.limit_hits import LimiterAction
-from exfit.util.typed import IN_FILE
+from exfit.util.text import rounded
+from exfit.util.typed import IN_FILE, KEY
 
 Array = NDArray[np.float64]
 
@@ -103,6 +103,19 @@ class StepFeatures:
     measured: Features | None
     simulated: Features | None
 
+    def cells(self, key: str) -> tuple[str, str, str]:
+        """Write a feature measured, half of its 95 % interval, and simulated, for a table.
+
+        The simulated one has the digits that the error of the measured one allows.
+        """
+        measured, simulated = self.measured, self.simulated
+        half = None if measured is None else measured.errors.get(key)
+        return (
+            "-" if measured is None else rounded(getattr(measured, key), half),
+            "-" if half is None else f"{half:.2g}",
+            "-" if simulated is None else rounded(getattr(simulated, key), half),
+        )
+
 
 class ValidatedStep(NamedTuple):
     """A step of a record that was given by hand: when (s) and by how much (pu).
@@ -131,6 +144,67 @@ class ValidatedStep(NamedTuple):
         if self.best_at is None or self.best_rmse is None:
             return judged
         return f"{judged}, and {self.best_rmse:.3e} pu fitted, at {self.best_at:.4g} s, not judged"
+
+
+class Excursion(NamedTuple):
+    """The largest departure of a signal from its rest, with its sign, and when it is reached."""
+
+    value: float
+    at: float
+
+    def text(self, unit: str) -> str:
+        """Return the departure in words; ``unit`` is that of the signal."""
+        return f"{self.value:+.3g} {unit} at {self.at:.4g} s"
+
+
+@dataclass(frozen=True)
+class PlayedErrors:
+    """How a simulated signal departs from its record, per unit, and when, in s.
+
+    ``largest`` is the error of greatest magnitude, ``at_rest`` its mean before the event; the
+    excursions are those of record and simulation, each from its own rest.
+    """
+
+    largest: Annotated[float, nan]
+    largest_at: Annotated[float, nan]
+    at_rest: Annotated[float, nan]
+    measured: Excursion | None
+    simulated: Excursion | None
+
+
+@dataclass(frozen=True, eq=False)
+class DrivingSignal:
+    """A recorded signal (M,) that drove the simulation; ``label`` is that of an axis.
+
+    The samples are in its ``unit``.
+    """
+
+    label: str
+    unit: str
+    samples: Array
+    excursion: Excursion | None
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """What of a signal was recorded and simulated but is not compared (M,); nan elsewhere."""
+
+    measured: Array
+    simulated: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedRecord:
+    """What of a record drove a simulation, and how what it gave departs from the rest of it.
+
+    ``begins`` is the end of its state of rest, s; ``left_out`` has the signals of which masks leave
+    something out.
+    """
+
+    begins: float
+    driving: Mapping[str, DrivingSignal]
+    errors: Mapping[str, PlayedErrors]
+    left_out: Mapping[str, LeftOut] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,3 +283,44 @@ class Comparison:
     def fit_percent(self) -> float:
         """Its fit percentage; not above zero where a constant would match as well."""
         return self.judged.fit_percent
+
+
+@dataclass(frozen=True, eq=False)
+class AsFound:
+    """The model before the test and its responses; ``source`` is "" for the case's own start.
+
+    ``bus``, ``machine_id`` and ``file``, whose path is relative to the case, are its place in a
+    planner's base, None where the case does not say it.
+    ``values`` are all of its parameters, named as in the system; ``comparisons`` those with the
+    fitted records and then with the others, empty for the reason ``why``.
+    """
+
+    source: str
+    model: str
+    values: Mapping[str, float]
+    comparisons: tuple[Comparison, ...] = field(default=(), metadata={KEY: "records"})
+    why: str = ""
+    bus: int | None = None
+    machine_id: str | None = field(default=None, metadata={KEY: "id"})
+    file: str | None = None
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the case says what was in the planner's base."""
+        return bool(self.source)
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseEnd:
+    """Where a phase of the descent from the start of the case handed over to the next.
+
+    ``iteration`` is its number in the history, ``values`` are those of the free parameters and of
+    all others of the exciter there, ``comparisons`` the response to them beside each record.
+    """
+
+    phase: str
+    next_phase: str
+    iteration: int
+    cost: Annotated[float, nan]
+    values: Mapping[str, float]
+    comparisons: tuple[Comparison, ...] = field(default=(), metadata={KEY: "records"})

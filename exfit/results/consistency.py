@@ -1,63 +1,68 @@
 """Whether the parts of a result that is read fit together: lengths of samples, names."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.results.comparisons import Comparison, IterationResponses
-from exfit.results.description import Behaviour
+from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
-from exfit.results.played_records import PlayedRecord
 from exfit.results.validation_result import Reported, ValidationResult
 
 Array = NDArray[np.float64]
+
+UNEVEN = "not one sample for each instant"
 
 
 def contradictions(result: FitResult) -> Iterator[str]:
     """Yield the contradictions within a result, each with its place."""
     if not result.comparisons:
         yield "records: empty"
-    for place, match in _comparisons(result):
-        yield from (f"{place}: {match.name}: {text}" for text in _of_comparison(match))
-    yield from _of_search(result)
+    for end in result.phase_ends:
+        yield from _of_comparisons(f"phase_ends: {end.phase}", end.comparisons)
+    yield from _of_both(result)
+    points = [line.values for line in result.history]
+    if result.minima is not None:
+        points += [minimum.values for minimum in result.minima.minima]
+    if any(values.keys() != result.parameters.keys() for values in points):
+        yield "history: its parameters are not those of the fit"
     if any(
         not {*typical.matters_to} <= typical.shifts.keys() <= result.parameters.keys()
         for typical in result.typical_values.values()
     ):
         yield "typical_values: what they move are not the parameters of the fit"
     if result.knowledge is not None:
-        yield from (f"knowledge: {text}" for text in _of_uncertainty(result.knowledge))
-    if result.behaviour is not None:
-        yield from (f"behaviour: {text}" for text in _of_behaviour(result.behaviour))
+        confidence = result.knowledge.confidence
+        count = len(confidence.names)
+        if confidence.correlation.matrix.shape != (count, count):
+            yield "knowledge: confidence.correlation: not one row and column for each parameter"
+        for channel in result.knowledge.sensitivity:
+            if any(line.shape != channel.time.shape for line in channel.moved.values()):
+                yield f"knowledge: sensitivity: {channel.label}: {UNEVEN}"
+            if not _increases(channel.time):
+                yield f"knowledge: sensitivity: {channel.label}: time: does not increase"
 
 
 def validation_contradictions(result: ValidationResult) -> Iterator[str]:
     """Yield the contradictions within a validation, each with its place."""
     if not result.matches:
         yield "validation: empty"
-    for place, match in _comparisons(result):
-        yield from (f"{place}: {match.name}: {text}" for text in _of_comparison(match))
-    if result.behaviour is not None:
-        yield from (f"behaviour: {text}" for text in _of_behaviour(result.behaviour))
+    yield from _of_both(result)
 
 
-def _comparisons(result: Reported) -> Iterator[tuple[str, Comparison]]:
-    """Yield all comparisons with a record that a result holds, each with its place."""
-    yield from (("records", match) for match in (*result.comparisons, *result.validation))
-    for end in result.phase_ends if isinstance(result, FitResult) else ():
-        yield from ((f"phase_ends: {end.phase}", match) for match in end.comparisons)
+def _of_both(result: Reported) -> Iterator[str]:
+    yield from _of_comparisons("records", (*result.comparisons, *result.validation))
     if result.as_found is not None:
-        yield from (("as_found", match) for match in result.as_found.comparisons)
+        yield from _of_comparisons("as_found", result.as_found.comparisons)
+    for of_tests in () if result.behaviour is None else result.behaviour.small_signal:
+        for bode in () if of_tests.view is None else (of_tests.view.closed, of_tests.view.open):
+            if bode is not None and bode.response.shape != bode.frequency.shape:
+                yield "behaviour: small_signal: not one response for each frequency"
 
 
-def _of_search(result: FitResult) -> Iterator[str]:
-    points = [line.values for line in result.history]
-    if result.minima is not None:
-        points += [minimum.values for minimum in result.minima.minima]
-    if any(values.keys() != result.parameters.keys() for values in points):
-        yield "history: its parameters are not those of the fit"
+def _of_comparisons(place: str, matches: Iterable[Comparison]) -> Iterator[str]:
+    for match in matches:
+        yield from (f"{place}: {match.name}: {text}" for text in _of_comparison(match))
 
 
 def _of_comparison(match: Comparison) -> Iterator[str]:
@@ -70,49 +75,23 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
         if signal not in match.channels:
             yield f"overlays: {signal} is none of its channels"
         if any(line is not None and line.shape != match.time.shape for line in lines):
-            yield f"overlays: {signal}: not one sample for each instant"
+            yield f"overlays: {signal}: {UNEVEN}"
     if match.played is not None:
-        yield from _of_played(match.played, match)
-    if match.iteration_responses is not None:
-        yield from _of_responses(match.iteration_responses)
-
-
-def _of_responses(responses: IterationResponses) -> Iterator[str]:
-    shape = (len(responses.numbers), len(responses.time))
-    if responses.samples.shape != shape or responses.measured.shape != shape[1:]:
-        yield "iteration_responses: not one sample for each instant"
-    if not _increases(responses.time):
-        yield "iteration_responses: time: does not increase"
-
-
-def _of_played(played: PlayedRecord, match: Comparison) -> Iterator[str]:
-    for signal, driving in played.driving.items():
-        if driving.samples.shape != match.time.shape:
-            yield f"played: {signal}: not one sample for each instant"
-    for signal, left_out in played.left_out.items():
-        if not left_out.measured.shape == left_out.simulated.shape == match.time.shape:
-            yield f"played: left_out: {signal}: not one sample for each instant"
-    if not played.errors.keys() <= match.channels.keys():
-        yield "played: its errors are not those of the channels"
-
-
-def _of_uncertainty(uncertainty: UncertaintyAnalysis) -> Iterator[str]:
-    confidence = uncertainty.confidence
-    count = len(confidence.names)
-    if confidence.correlation.matrix.shape != (count, count):
-        yield "confidence.correlation: not one row and column for each parameter"
-    for channel in uncertainty.sensitivity:
-        if any(line.shape != channel.time.shape for line in channel.moved.values()):
-            yield f"sensitivity: {channel.label}: not one sample for each instant"
-        if not _increases(channel.time):
-            yield f"sensitivity: {channel.label}: time: does not increase"
-
-
-def _of_behaviour(behaviour: Behaviour) -> Iterator[str]:
-    views = [of_tests.view for of_tests in behaviour.small_signal if of_tests.view is not None]
-    for bode in (bode for view in views for bode in (view.closed, view.open)):
-        if bode is not None and bode.response.shape != bode.frequency.shape:
-            yield "small_signal: not one response for each frequency"
+        for signal, driving in match.played.driving.items():
+            if driving.samples.shape != match.time.shape:
+                yield f"played: {signal}: {UNEVEN}"
+        for signal, left_out in match.played.left_out.items():
+            if not left_out.measured.shape == left_out.simulated.shape == match.time.shape:
+                yield f"played: left_out: {signal}: {UNEVEN}"
+        if not match.played.errors.keys() <= match.channels.keys():
+            yield "played: its errors are not those of the channels"
+    responses = match.iteration_responses
+    if responses is not None:
+        shape = (len(responses.numbers), len(responses.time))
+        if responses.samples.shape != shape or responses.measured.shape != shape[1:]:
+            yield f"iteration_responses: {UNEVEN}"
+        if not _increases(responses.time):
+            yield "iteration_responses: time: does not increase"
 
 
 def _increases(time: Array) -> bool:

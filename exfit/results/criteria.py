@@ -59,8 +59,13 @@ class CriteriaVerdict:
         if not count:
             return "no record could be judged by the criteria"
         if self.failed:
-            missed = "; ".join(_missed(criterion) for criterion in self.failed)
-            return f"{len(self.failed)} of {count} criteria are not met: {missed}"
+            missed = [
+                f"{each.label} of {each.record}: "
+                + ("is not reached" if each.difference is None else f"{each.difference:+.2g}")
+                + f", the limit is {each.limit:.2g} {each.unit}"
+                for each in self.failed
+            ]
+            return f"{len(missed)} of {count} criteria are not met: {'; '.join(missed)}"
         if met < count:
             return f"{met} of {count} criteria are met, the noise of the records leaves the others"
         return f"all {count} criteria are met"
@@ -68,41 +73,42 @@ class CriteriaVerdict:
 
 def judged_by_criteria(result: Reported) -> CriteriaVerdict:
     """Judge the responses of a fit, and of its validations, by the criteria."""
-    every = [(match, True) for match in result.comparisons]
-    every += [(match, False) for match in result.validation]
     return CriteriaVerdict(
-        tuple(
-            criterion
-            for match, fitted in every
-            for criterion in _judged(match, fitted, result.criteria)
+        (
+            *(each for match in result.comparisons for each in _judged(match, True, result)),
+            *(each for match in result.validation for each in _judged(match, False, result)),
         )
     )
 
 
-def _judged(match: Comparison, fitted: bool, criteria: Criteria) -> Iterator[JudgedCriterion]:
+def _judged(match: Comparison, fitted: bool, result: Reported) -> Iterator[JudgedCriterion]:
     """Yield the criteria that a record can be judged by."""
+    criteria = result.criteria
     measured, simulated = match.features.measured, match.features.simulated
     changes = {signal: _change(match, signal, measured) for signal in match.judging}
     for signal, change in changes.items():
         if change > 0.0:
-            yield _rmse(match, fitted, signal, change, criteria.rmse)
+            rmse = 100.0 * match.channels[signal].rmse / change
+            label, unit = f"rms of the difference, {signal}", "% of the change"
+            within = bool(rmse <= criteria.rmse)
+            yield JudgedCriterion(match.name, fitted, label, rmse, criteria.rmse, unit, within)
     change = changes[match.judging[0]]
     if measured is None or simulated is None or not change > 0.0:
         return
     for name in ("final_value", "overshoot_percent", *TIMES):
         limit = _limit(name, measured, change, criteria)
-        if limit is not None:
-            yield _feature(match.name, fitted, name, (measured, simulated), limit)
-
-
-def _rmse(
-    match: Comparison, fitted: bool, signal: str, change: float, limit: float
-) -> JudgedCriterion:
-    """Judge the rms of a signal's difference by a limit, in % of its change."""
-    rmse = 100.0 * match.channels[signal].rmse / change
-    label = f"rms of the difference, {signal}"
-    unit = "% of the change"
-    return JudgedCriterion(match.name, fitted, label, rmse, limit, unit, bool(rmse <= limit))
+        if limit is None:
+            continue
+        (label, unit), response = NAMES[name], getattr(simulated, name)
+        difference: float | None = None
+        met: bool | None = False
+        why, half = NOT_REACHED, measured.errors.get(name, 0.0)
+        if response is not None and isfinite(response):
+            difference = response - getattr(measured, name)
+            met, why = bool(abs(difference) <= limit), ""
+            if half > limit:
+                met, why = None, f"its noise leaves the recorded one ±{half:.2g} {unit}"
+        yield JudgedCriterion(match.name, fitted, label, difference, limit, unit, met, why)
 
 
 def _change(match: Comparison, signal: str, measured: Features | None) -> float:
@@ -130,25 +136,3 @@ def _limit(name: str, measured: Features, change: float, criteria: Criteria) -> 
     if name == "peak_time" and measured.overshoot_percent <= criteria.overshoot:
         return None
     return max(0.01 * float(getattr(criteria, name) * value), criteria.time)
-
-
-def _feature(
-    record: str, fitted: bool, name: str, features: tuple[Features, Features], limit: float
-) -> JudgedCriterion:
-    measured, simulated = features
-    label, unit = NAMES[name]
-    value, response = getattr(measured, name), getattr(simulated, name)
-    if response is None or not isfinite(response):
-        return JudgedCriterion(record, fitted, label, None, limit, unit, False, NOT_REACHED)
-    difference, half = response - value, measured.errors.get(name, 0.0)
-    if half > limit:
-        why = f"its noise leaves the recorded one ±{half:.2g} {unit}"
-        return JudgedCriterion(record, fitted, label, difference, limit, unit, None, why)
-    met = bool(abs(difference) <= limit)
-    return JudgedCriterion(record, fitted, label, difference, limit, unit, met)
-
-
-def _missed(criterion: JudgedCriterion) -> str:
-    by = "is not reached" if criterion.difference is None else f"{criterion.difference:+.2g}"
-    limit = f"the limit is {criterion.limit:.2g} {criterion.unit}"
-    return f"{criterion.label} of {criterion.record}: {by}, {limit}"

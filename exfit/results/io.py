@@ -1,14 +1,32 @@
-"""The file of a fit, result.json: written and read by the description that its classes are."""
+"""The files of a fit: its tables, its parameters, and result.json, which is read back, too."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exfit.errors import ExfitError
+from exfit.fitting.nuisances.parameters import prefix_from
+from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
+from exfit.results.tables import (
+    comparison_table,
+    effects_table,
+    history_table,
+    iteration_responses_table,
+    parameter_file,
+    phase_end_file,
+)
 from exfit.results.thinning import thinned, thinned_validation
-from exfit.util.file_names import VALIDATION, WHOLE_FIT
+from exfit.util.file_names import (
+    HISTORY,
+    ITERATIONS,
+    PARAMETERS,
+    RESPONSE,
+    SENSITIVITIES,
+    VALIDATION,
+    WHOLE_FIT,
+)
 from exfit.util.files import read_json
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, plain, read
@@ -17,6 +35,33 @@ if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult
 
 VERSION = 10  # of the files; others are refused
+
+
+def files_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
+    """Yield the names and contents of a fit's tables, and last of its result."""
+    yield PARAMETERS, parameter_file(result)
+    for end in result.phase_ends:
+        yield f"parameters_{end.phase}.yaml", phase_end_file(result, end)
+    yield HISTORY, history_table(result)
+    if not prefix_from(result.comparison.name):  # the only record
+        yield RESPONSE, comparison_table(result.comparison)
+    else:
+        yield from comparison_files(result.comparisons)
+    yield from comparison_files(result.validation)
+    for match in result.comparisons:
+        if match.iteration_responses is not None:
+            record = prefix_from(match.name).removesuffix(".")
+            name = f"{record}-{ITERATIONS}" if record else ITERATIONS
+            yield name, iteration_responses_table(match.iteration_responses)
+    if result.knowledge is not None:
+        yield SENSITIVITIES, effects_table(result.knowledge.effects)
+    yield WHOLE_FIT, result_text(result)
+
+
+def comparison_files(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, str]]:
+    """Yield the samples of each comparison under its name."""
+    for match in comparisons:
+        yield f"{match.name}.csv", comparison_table(match)
 
 
 def result_text(result: FitResult) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval, IntervalMethod, closed
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import (
     Behaviour,
     GivenInPlace,
@@ -24,10 +24,8 @@ from exfit.results.description import (
     source_in_words,
     values_of_part,
 )
-from exfit.results.other_values import AsFound, PhaseEnd
-from exfit.results.typical_values import TypicalValue
+from exfit.results.influences import TypicalValue, WindowSpread
 from exfit.results.verdict import NO_MATCH, Verdict
-from exfit.results.windows import WindowSpread
 from exfit.util.criteria import Criteria
 from exfit.util.sources import TYPICAL
 from exfit.util.text import error_of_interval, rounded_value
@@ -38,6 +36,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+NEAR = 2.0  # times a cost: below it another one is given to a thousandth
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
 
 
@@ -151,6 +150,16 @@ class Minimum(NamedTuple):
     refuted: bool | None = None
     valley: int | None = None
 
+    def height(self, cost: float) -> str:
+        """Word its cost as a multiple of another one."""
+        return f"{multiple(self.cost / cost)} as high" if cost > 0.0 else f"at {self.cost:.3g}"
+
+
+def multiple(ratio: float) -> str:
+    """Write the ratio of two costs in as many digits as tell them apart."""
+    digits = max(0, 3 - len(f"{ratio:.0f}")) if ratio >= NEAR else 3
+    return f"{ratio:.{digits}f} times"
+
 
 @dataclass(frozen=True, eq=False)
 class Minima:
@@ -182,6 +191,34 @@ class Minima:
     def failed(self) -> int:
         """How many starts have no response, and led nowhere."""
         return int(np.count_nonzero(np.isinf(self.start_costs) & np.isnan(self.end_costs)))
+
+    def summary(self, cost: float) -> str:
+        """Say from where the search went, and where its descents led; ``cost`` is the result's."""
+        further = self.starts - max(1, self.ways.count("strategy"))
+        others = [minimum for minimum in self.minima if minimum.cost != cost]
+        here = sum(minimum.starts for minimum in self.minima if minimum.cost == cost)
+        along = sum(minimum.starts for minimum in others if minimum.valley == 0)
+        refuted = [minimum for minimum in others if minimum.refuted]
+        unfinished = int(np.count_nonzero(np.isnan(self.end_costs))) - self.failed
+        ends = [f"{here} of {self.starts} descents lead to this {'minimum' if here else 'point'}"]
+        if along:
+            ends.append(f"{along} to others in its flat valley")
+        for minimum in others:
+            if minimum.valley != 0 and not minimum.refuted:
+                verdict = "" if minimum.refuted is None else " (not refuted)"
+                ends.append(f"{minimum.starts} to one {minimum.height(cost)}{verdict}")
+        if len(refuted) == 1:
+            ends.append(f"{refuted[0].starts} to one {refuted[0].height(cost)} (refuted)")
+        elif refuted:
+            descents = sum(minimum.starts for minimum in refuted)
+            height = f"{refuted[0].height(cost)} or more"
+            ends.append(f"{descents} to {len(refuted)} others, {height} (refuted)")
+        if self.failed:
+            ends.append(f"{self.failed} to none: no response")
+        if unfinished > 0:
+            ends.append(f"{unfinished} not done")
+        starts = "1 further start" if further == 1 else f"{further} further starts"
+        return f"from the start of the case and {starts}: {', '.join(ends)}"
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from exfit.results.model import FitResult
+from exfit.results.tables import DIGITS
 from exfit.util.text import rounded_value
 
 INTERRUPTED, NOT_ACCEPTED = "interrupted", "not accepted"  # beside the verdicts
-DIGITS = 9  # significant digits of a number in the table
 
 
 class ParameterValue(NamedTuple):
@@ -52,22 +52,22 @@ def parameters_beside(
     every = [item for result in results for item in result.parameters.items()]
     names = dict.fromkeys(name for name, parameter in every if not parameter.of_record)
     names |= dict.fromkeys(name for name, _ in every)
-    values = [result.values for result in results]
-    return {
-        name: tuple(_value(result, own, name) for result, own in zip(results, values, strict=True))
-        for name in names
-    }
-
-
-def _value(result: FitResult, values: Mapping[str, float], name: str) -> ParameterValue | None:
-    if name not in values:
-        return None
-    parameter = result.parameters.get(name)
-    if parameter is None:
-        return ParameterValue(values[name], False, None, True, rounded_value(values[name]))
-    resolved = result.knowledge is None or parameter.determined
-    text = parameter.rounded(parameter.value)
-    return ParameterValue(parameter.value, True, parameter.at_bound, resolved, text)
+    beside: dict[str, list[ParameterValue | None]] = {name: [] for name in names}
+    for result in results:
+        values = result.values
+        for name, column in beside.items():
+            parameter = result.parameters.get(name)
+            if parameter is not None:
+                value, bound = parameter.value, parameter.at_bound
+                resolved = result.knowledge is None or parameter.determined
+                text = parameter.rounded(value)
+                column.append(ParameterValue(value, True, bound, resolved, text))
+            elif name in values:
+                text = rounded_value(values[name])
+                column.append(ParameterValue(values[name], False, None, True, text))
+            else:
+                column.append(None)
+    return {name: tuple(column) for name, column in beside.items()}
 
 
 def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
@@ -77,49 +77,41 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
     """
     fits = [fit for _, fit in results.values()]
     parameters = parameters_beside(fits)
-    figures = [{"run": run, "case": case, **_figures(fit)} for run, (case, fit) in results.items()]
-    validations = [
-        {f"rmse {match.name}": _number(match.rmse) for match in fit.validation} for fit in fits
-    ]
-    rows = [
-        {**row, **rmses, **_values({name: column[k] for name, column in parameters.items()})}
-        for k, (row, rmses) in enumerate(zip(figures, validations, strict=True))
-    ]
-    header = dict.fromkeys(
-        name for part in (figures, validations, rows) for row in part for name in row
-    )
+    validations = dict.fromkeys(match.name for fit in fits for match in fit.validation)
+    rows = []
+    for k, (run, (case, fit)) in enumerate(results.items()):
+        errors = {match.name: _number(match.rmse) for match in fit.validation}
+        own = {name: column[k] for name, column in parameters.items()}
+        known = {name: value for name, value in own.items() if value is not None}
+        rows.append(
+            {
+                "run": run,
+                "case": case,
+                "model": fit.model,
+                "strategy": fit.strategy,
+                "outcome": outcome_of(fit),
+                "explanation": explanation_of(fit),
+                "f_start": _number(fit.start_cost),
+                "f": _number(fit.cost),
+                "rmse": _number(fit.rmse),
+                "fit_percent": _number(fit.comparison.fit_percent),
+                "iterations": f"{fit.nit}",
+                "nfev": f"{fit.nfev}",
+                "njev": f"{fit.njev}",
+                "simulations": f"{fit.simulations}",
+                "seconds": f"{fit.seconds:.3f}",
+                **{f"rmse {name}": errors.get(name, "") for name in validations},
+                **dict.fromkeys(own, ""),
+                **{name: _number(value.value) for name, value in known.items()},
+                "at_bound": " ".join(name for name, value in known.items() if value.at_bound),
+                "unresolved": " ".join(name for name, value in known.items() if not value.resolved),
+            }
+        )
     out = io.StringIO()
-    writer = csv.DictWriter(out, [*header], restval="", lineterminator="\n")
+    writer = csv.DictWriter(out, rows[0] if rows else (), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return out.getvalue()
-
-
-def _figures(fit: FitResult) -> dict[str, str]:
-    return {
-        "model": fit.model,
-        "strategy": fit.strategy,
-        "outcome": outcome_of(fit),
-        "explanation": explanation_of(fit),
-        "f_start": _number(fit.start_cost),
-        "f": _number(fit.cost),
-        "rmse": _number(fit.rmse),
-        "fit_percent": _number(fit.comparison.fit_percent),
-        "iterations": f"{fit.nit}",
-        "nfev": f"{fit.nfev}",
-        "njev": f"{fit.njev}",
-        "simulations": f"{fit.simulations}",
-        "seconds": f"{fit.seconds:.3f}",
-    }
-
-
-def _values(values: Mapping[str, ParameterValue | None]) -> dict[str, str]:
-    own = {name: value for name, value in values.items() if value is not None}
-    return {
-        **{name: _number(own[name].value) if name in own else "" for name in values},
-        "at_bound": " ".join(name for name, value in own.items() if value.at_bound),
-        "unresolved": " ".join(name for name, value in own.items() if not value.resolved),
-    }
 
 
 def _number(value: float) -> str:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import floor, log10
 from typing import TYPE_CHECKING
 
@@ -15,10 +15,15 @@ from exfit.util.text import yaml_number
 
 if TYPE_CHECKING:
     from exfit.inference.sensitivity import ParameterEffect
+    from exfit.results.comparisons import PhaseEnd
     from exfit.results.model import FitResult
-    from exfit.results.other_values import PhaseEnd
 
 Array = NDArray[np.float64]
+
+HISTORY = (
+    "iteration", "phase", "f", "gradient_norm", "step_norm", "damping", "inner", "nfev", "njev",
+    "quality", "capped", "trials",
+)  # fmt: skip
 
 MOST_ROWS = 100_000  # of a table of samples: of more, those of all extremes
 ROWS_AT_ONCE = 20_000  # of a table, as text: more at a time need much memory
@@ -45,7 +50,7 @@ def whole_table(header: Sequence[str], columns: Sequence[Array]) -> str:
     The time has as many digits as its instants need to stay apart.
     """
     out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerow(header)
+    out.write(_csv([header]))
     clock = f"%.{clock_digits(columns[0], DIGITS)}g"
     line = ",".join([clock, *[f"%.{DIGITS}g"] * (len(columns) - 1)]) + "\n"
     for first in range(0, len(columns[0]), ROWS_AT_ONCE):
@@ -87,39 +92,19 @@ def iteration_responses_table(responses: IterationResponses) -> str:
 
 def history_table(result: "FitResult") -> str:
     """Return the history as CSV, a line per iteration."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    first = (
-        "iteration",
-        "phase",
-        "f",
-        "gradient_norm",
-        "step_norm",
-        "damping",
-        "inner",
-        "nfev",
-        "njev",
-        "quality",
-        "capped",
-        "trials",
-    )
-    writer.writerow([*first, *result.parameters])
-    for line in result.history:
-        numbers = (line.cost, line.gradient_norm, line.step_norm, line.damping)
-        counts = (line.inner, line.nfev, line.njev)
-        writer.writerow(
-            [
-                line.number,
-                line.phase,
-                *(f"{number:.{DIGITS}g}" for number in numbers),
-                *counts,
-                f"{line.quality:.4g}",
-                yes_or_no(line.capped),
-                line.trials,
-                *(f"{line.values[name]:.{DIGITS}g}" for name in result.parameters),
-            ]
-        )
-    return out.getvalue()
+    rows: list[list[object]] = [
+        [
+            line.number,
+            line.phase,
+            *map(_digits, (line.cost, line.gradient_norm, line.step_norm, line.damping)),
+            *(line.inner, line.nfev, line.njev, f"{line.quality:.4g}"),
+            yes_or_no(line.capped),
+            line.trials,
+            *(_digits(line.values[name]) for name in result.parameters),
+        ]
+        for line in result.history
+    ]
+    return _csv([[*HISTORY, *result.parameters], *rows])
 
 
 def yes_or_no(value: bool | None) -> str:
@@ -129,78 +114,69 @@ def yes_or_no(value: bool | None) -> str:
 
 def effects_table(effects: "Sequence[ParameterEffect]") -> str:
     """Write the changes of the records for 1 % of each parameter as CSV, the strongest first."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     labels = [*effects[0].rms] if effects else []
     columns = [f"{label.replace(' ', '_')}_rms" for label in labels]
-    writer.writerow(["parameter", *columns, "of_noise", "percent_of"])
-    for effect in effects:
-        numbers = (*effect.rms.values(), effect.of_noise)
-        cells = (f"{number:.{DIGITS}g}" for number in numbers)
-        writer.writerow([effect.parameter, *cells, effect.percent_of])
+    rows = [
+        [each.parameter, *map(_digits, (*each.rms.values(), each.of_noise)), each.percent_of]
+        for each in effects
+    ]
+    return _csv([["parameter", *columns, "of_noise", "percent_of"], *rows])
+
+
+def _csv(rows: Iterable[Iterable[object]]) -> str:
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows(rows)
     return out.getvalue()
+
+
+def _digits(value: float) -> str:
+    return f"{value:.{DIGITS}g}"
 
 
 def parameter_file(result: "FitResult") -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
     from exfit.results.side_by_side import outcome_of
 
-    state = outcome_of(result)
-    matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in result.comparisons)
-    lines = [
-        f"# {result.model} fitted to {', '.join(matches)}; {state}",
-        f"model: {result.model}",
-        *_code_hashes(result),
-        "parameters:",
-    ]
-    for name, value in result.own_values.items():
-        remark = _remark(result, name)
-        lines.append(f"  {name}: {yaml_number(value)}" + (f"  # {remark}" if remark else ""))
-    lines += _sources(result, result.own_values)
+    remarks = {**result.ties}
+    for name, parameter in result.parameters.items():
+        bound = f"on its {parameter.at_bound}" if parameter.at_bound else ""
+        doubt = "" if parameter.physical else "not physical"
+        remarks[name] = ", ".join(filter(None, (bound, doubt)))
+    head = f"{result.model} fitted to {_matches(result.comparisons)}; {outcome_of(result)}"
+    lines = _lines_of_unit(result, head, result.own_values, remarks)
     if result.of_records:
         lines += ["records:  # identified with the parameters"]
         lines += [f"  {name}: {yaml_number(value)}" for name, value in result.of_records.items()]
     return "\n".join(lines) + "\n"
 
 
-def _code_hashes(result: "FitResult") -> list[str]:
-    """Return the lines with the hashes of code that was run: of a user's model, of a program."""
-    labels = (label for label in ("model", "program") if label in result.inputs)
-    return [f"{label}_sha256: {result.inputs[label]}" for label in labels]
-
-
 def phase_end_file(result: "FitResult", end: "PhaseEnd") -> str:
     """Return the values at the end of a phase as YAML, to be read as those of `parameter_file`."""
-    matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in end.comparisons)
-    own = [name for name in result.own_values if name in end.values]
-    lines = [
-        f"# {result.model}, {', '.join(matches)}; end of {end.phase}, iteration {end.iteration}, "
-        f"where {end.next_phase} went on",
-        f"model: {result.model}",
-        *_code_hashes(result),
-        "parameters:",
-        *(f"  {name}: {yaml_number(end.values[name])}" for name in own),
-        *_sources(result, own),
-    ]
+    place = f"end of {end.phase}, iteration {end.iteration}, where {end.next_phase} went on"
+    own = {name: end.values[name] for name in result.own_values if name in end.values}
+    lines = _lines_of_unit(result, f"{result.model}, {_matches(end.comparisons)}; {place}", own, {})
     if result.of_records:
         lines += ["records:"]
         lines += [f"  {name}: {yaml_number(end.values[name])}" for name in result.of_records]
     return "\n".join(lines) + "\n"
 
 
-def _remark(result: "FitResult", name: str) -> str:
-    """Word the remarks on a value beside its source."""
-    parameter = result.parameters.get(name)
-    if parameter is None:
-        return result.ties.get(name, "")
-    marks = [f"on its {parameter.at_bound}"] if parameter.at_bound else []
-    return ", ".join([*marks, *([] if parameter.physical else ["not physical"])])
+def _matches(comparisons: "Iterable[Comparison]") -> str:
+    return ", ".join(f"{match.record}: rmse {match.rmse:.4g} pu" for match in comparisons)
 
 
-def _sources(result: "FitResult", names: Iterable[str]) -> Iterator[str]:
-    """Yield the lines that say where values come from, as far as that is stated."""
-    stated = {name: result.sources.get(name, NOT_STATED) for name in names}
-    lines = [f"  {name}: {word}" for name, word in stated.items() if word in SOURCES]
-    if lines:
-        yield "sources:"
-        yield from lines
+def _lines_of_unit(
+    result: "FitResult", head: str, values: Mapping[str, float], remarks: Mapping[str, str]
+) -> list[str]:
+    """Write the model, the hashes of code that was run, values of the unit and their sources."""
+    lines = [f"# {head}", f"model: {result.model}"]
+    for label in ("model", "program"):
+        if label in result.inputs:
+            lines.append(f"{label}_sha256: {result.inputs[label]}")
+    lines.append("parameters:")
+    for name, value in values.items():
+        remark = remarks.get(name)
+        lines.append(f"  {name}: {yaml_number(value)}" + (f"  # {remark}" if remark else ""))
+    stated = {name: result.sources.get(name, NOT_STATED) for name in values}
+    sources = [f"  {name}: {word}" for name, word in stated.items() if word in SOURCES]
+    return [*lines, "sources:", *sources] if sources else lines

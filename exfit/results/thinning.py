@@ -1,27 +1,32 @@
 """What of a fit's samples a file holds: of long ones their extremes, in nine digits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import kept_rows
-from exfit.fitting.uncertainty import Sensitivity, UncertaintyAnalysis
-from exfit.results.comparisons import Comparison, IterationResponses, Overlay
-from exfit.results.description import Behaviour, SmallSignalView
+from exfit.fitting.uncertainty import Sensitivity
+from exfit.results.comparisons import (
+    Comparison,
+    IterationResponses,
+    LeftOut,
+    Overlay,
+)
+from exfit.results.description import Behaviour
 from exfit.results.model import FitResult
-from exfit.results.other_values import AsFound
-from exfit.results.played_records import LeftOut, PlayedRecord
 from exfit.results.tables import DIGITS, clock_digits
-from exfit.simulation.small_signal import Bode, SmallSignal
+from exfit.simulation.small_signal import Bode
 from exfit.util.sorting import distinct
 
 if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Lines = TypeVar("Lines", Overlay, LeftOut)
 
 MOST_ROWS = 20_000  # of the samples of a comparison
 MOST_NUMBERS = 100_000  # of the iterations' responses, and of the sensitivities of a signal
@@ -35,32 +40,37 @@ MOST_RESPONSES = 12  # of iterations in one figure that can be distinguished
 def thinned(result: FitResult) -> FitResult:
     """Return a fit with its samples as a file holds them."""
     count = len(result.history)
+
+    def each(comparisons: Iterable[Comparison]) -> tuple[Comparison, ...]:
+        return tuple(_comparison(match, count) for match in comparisons)
+
+    found, known = result.as_found, result.knowledge
     return replace(
         result,
-        comparisons=tuple(_comparison(match, count) for match in result.comparisons),
-        validation=tuple(_comparison(match, count) for match in result.validation),
+        comparisons=each(result.comparisons),
+        validation=each(result.validation),
         phase_ends=tuple(
-            replace(end, comparisons=tuple(_comparison(match, count) for match in end.comparisons))
-            for end in result.phase_ends
+            replace(end, comparisons=each(end.comparisons)) for end in result.phase_ends
         ),
-        as_found=None if result.as_found is None else _as_found(result.as_found, count),
-        knowledge=None if result.knowledge is None else _knowledge(result.knowledge),
-        behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
+        as_found=found and replace(found, comparisons=each(found.comparisons)),
+        knowledge=known and replace(known, sensitivity=tuple(map(_sensitivity, known.sensitivity))),
+        behaviour=_behaviour(result.behaviour),
     )
 
 
 def thinned_validation(result: "ValidationResult") -> "ValidationResult":
     """Return a validation with its samples as a file holds them."""
+
+    def each(comparisons: Iterable[Comparison]) -> tuple[Comparison, ...]:
+        return tuple(_comparison(match, 0) for match in comparisons)
+
+    found = result.as_found
     return replace(
         result,
-        matches=tuple(_comparison(match, 0) for match in result.matches),
-        as_found=None if result.as_found is None else _as_found(result.as_found, 0),
-        behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
+        matches=each(result.matches),
+        as_found=found and replace(found, comparisons=each(found.comparisons)),
+        behaviour=_behaviour(result.behaviour),
     )
-
-
-def _as_found(unit: AsFound, count: int) -> AsFound:
-    return replace(unit, comparisons=tuple(_comparison(match, count) for match in unit.comparisons))
 
 
 def drawn_responses(responses: IterationResponses, iterations: int) -> IterationResponses:
@@ -80,72 +90,50 @@ def drawn_responses(responses: IterationResponses, iterations: int) -> Iteration
 
 
 def _comparison(comparison: Comparison, iterations: int) -> Comparison:
+    """Thin the samples of a comparison, those of a played record with them."""
     signals = [
         samples
         for overlay in comparison.overlays.values()
-        for samples in (
-            overlay.measured,
-            overlay.simulated,
-            overlay.start,
-            overlay.reference,
-            overlay.error,
-        )
+        for samples in (*vars(overlay).values(), overlay.error)
         if samples is not None
     ]
-    played = comparison.played
+    played, responses = comparison.played, comparison.iteration_responses
     if played is not None and signals:
         signals += [driving.samples for driving in played.driving.values()]
         signals += [signal.measured for signal in played.left_out.values()]
     rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
-    responses = comparison.iteration_responses
+    if played is not None:
+        driving = {
+            name: replace(signal, samples=rounded(signal.samples[rows]))
+            for name, signal in played.driving.items()
+        }
+        left_out = {name: _at(rows, signal) for name, signal in played.left_out.items()}
+        played = replace(played, driving=driving, left_out=left_out)
+    if responses is not None:
+        responses = drawn_responses(responses, iterations)
+        lines = [responses.measured, *responses.samples]
+        at = _rows(lines, MOST_NUMBERS // len(lines))
+        responses = replace(
+            responses,
+            time=_instants(responses.time, at),
+            measured=rounded(responses.measured[at]),
+            samples=np.stack([rounded(samples[at]) for samples in responses.samples]),
+        )
     return replace(
         comparison,
         time=_instants(comparison.time, rows),
-        overlays={
-            signal: _overlay(overlay, rows) for signal, overlay in comparison.overlays.items()
-        },
-        iteration_responses=None if responses is None else _responses(responses, iterations),
-        played=None if played is None else _played(played, rows),
+        overlays={signal: _at(rows, overlay) for signal, overlay in comparison.overlays.items()},
+        iteration_responses=responses,
+        played=played,
     )
 
 
-def _played(played: PlayedRecord, rows: NDArray[np.intp]) -> PlayedRecord:
-    driving = {
-        name: replace(signal, samples=rounded(signal.samples[rows]))
-        for name, signal in played.driving.items()
+def _at(rows: Rows, lines: Lines) -> Lines:
+    """Return the samples of some rows of each line, as far as it has that line."""
+    kept: dict[str, Any] = {
+        k: line if line is None else rounded(line[rows]) for k, line in vars(lines).items()
     }
-    left_out = {
-        name: LeftOut(rounded(signal.measured[rows]), rounded(signal.simulated[rows]))
-        for name, signal in played.left_out.items()
-    }
-    return replace(played, driving=driving, left_out=left_out)
-
-
-def _overlay(overlay: Overlay, rows: NDArray[np.intp]) -> Overlay:
-    return Overlay(
-        rounded(overlay.measured[rows]),
-        rounded(overlay.simulated[rows]),
-        None if overlay.start is None else rounded(overlay.start[rows]),
-        None if overlay.reference is None else rounded(overlay.reference[rows]),
-    )
-
-
-def _responses(responses: IterationResponses, iterations: int) -> IterationResponses:
-    drawn = drawn_responses(responses, iterations)
-    signals = [drawn.measured, *drawn.samples]
-    rows = _rows(signals, MOST_NUMBERS // len(signals))
-    return replace(
-        drawn,
-        time=_instants(drawn.time, rows),
-        measured=rounded(drawn.measured[rows]),
-        samples=np.stack([rounded(samples[rows]) for samples in drawn.samples]),
-    )
-
-
-def _knowledge(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
-    return replace(
-        uncertainty, sensitivity=tuple(_sensitivity(channel) for channel in uncertainty.sensitivity)
-    )
+    return replace(lines, **kept)
 
 
 def _sensitivity(channel: Sensitivity) -> Sensitivity:
@@ -157,17 +145,17 @@ def _sensitivity(channel: Sensitivity) -> Sensitivity:
     return Sensitivity(channel.label, _instants(channel.time, rows), moved)
 
 
-def _behaviour(behaviour: Behaviour) -> Behaviour:
-    return replace(behaviour, small_signal=tuple(map(_small_signal, behaviour.small_signal)))
-
-
-def _small_signal(of_tests: SmallSignalView) -> SmallSignalView:
-    view = of_tests.view
-    if view is None:
-        return of_tests
-    opened = None if view.open is None else _bode(view.open)
-    rounded: SmallSignal = replace(view, closed=_bode(view.closed), open=opened)
-    return replace(of_tests, view=rounded)
+def _behaviour(behaviour: Behaviour | None) -> Behaviour | None:
+    """Round the responses over frequency."""
+    if behaviour is None:
+        return None
+    views = []
+    for of_tests in behaviour.small_signal:
+        view = of_tests.view
+        if view is not None:
+            view = replace(view, closed=_bode(view.closed), open=view.open and _bode(view.open))
+        views.append(replace(of_tests, view=view))
+    return replace(behaviour, small_signal=tuple(views))
 
 
 def _bode(bode: Bode) -> Bode:
@@ -175,12 +163,12 @@ def _bode(bode: Bode) -> Bode:
     return Bode(rounded(bode.frequency), np.asarray(response, dtype=np.complex128))
 
 
-def _rows(signals: Sequence[Array], most: int) -> NDArray[np.intp]:
+def _rows(signals: Sequence[Array], most: int) -> Rows:
     """Return the rows that are kept of signals (M,): of more than ``most`` the extremes."""
     return kept_rows(signals, max(1, most // (2 * len(signals))))
 
 
-def _instants(time: Array, rows: NDArray[np.intp]) -> Array:
+def _instants(time: Array, rows: Rows) -> Array:
     return rounded(time[rows], clock_digits(time, DIGITS)) if len(rows) else time[rows]
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import AsFound, Comparison
 from exfit.results.description import (
     Behaviour,
     GivenInPlace,
@@ -14,9 +14,8 @@ from exfit.results.description import (
     source_in_words,
     values_of_part,
 )
+from exfit.results.influences import TypicalValue
 from exfit.results.model import FitResult, FittedParameter
-from exfit.results.other_values import AsFound
-from exfit.results.typical_values import TypicalValue
 from exfit.util.criteria import Criteria
 from exfit.util.typed import IN_FILE, KEY
 

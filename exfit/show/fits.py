@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from exfit.inference.sensitivity import ParameterEffect
 from exfit.results.model import FitResult, FittedParameter
-from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.show.blocks import (
     NO_BREAK,
@@ -119,7 +118,7 @@ def whole(
         text = ", ".join(f"{len(names)}{NO_BREAK}{source}" for source, names in counts)
         yield Note(text, label="sources of the values:")
     if result.minima is not None:
-        yield Note(search_summary(result.minima, result.cost), label="search:", mark="strong")
+        yield Note(result.minima.summary(result.cost), label="search:", mark="strong")
     if result.knowledge is not None:
         yield from remarks("sensitivity:", ranking(result.knowledge.effects), "strong")
         yield from unresolved(result.knowledge.sentences)

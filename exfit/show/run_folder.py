@@ -108,7 +108,7 @@ def write_fit(result: "FitResult", folder: Path) -> FigureFiles:
     Raises ExfitError where the folder cannot be written, and KeyboardInterrupt at an interruption:
     the numbers are whole then.
     """
-    from exfit.results.fit_files import files_of_fit
+    from exfit.results.io import files_of_fit
 
     with deferred_interrupts():
         numbers = dict(files_of_fit(result))
@@ -255,8 +255,7 @@ def write_validation(result: "ValidationResult", folder: Path) -> FigureFiles:
 
     As every function here: raises ExfitError where the folder cannot be written.
     """
-    from exfit.results.fit_files import comparison_files
-    from exfit.results.io import validation_text
+    from exfit.results.io import comparison_files, validation_text
 
     main = folder / VALIDATION
     with deferred_interrupts():

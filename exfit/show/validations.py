@@ -3,9 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from exfit.dsp.features import LABELS
-from exfit.results.comparisons import Comparison
-from exfit.results.feature_digits import feature_cells
-from exfit.results.played_records import Excursion
+from exfit.results.comparisons import Comparison, Excursion
 from exfit.show.blocks import (
     Block,
     Cell,
@@ -124,7 +122,7 @@ def _features(matches: Sequence[Comparison]) -> Table:
         row(
             label,
             unit,
-            *(cell for match in matches for cell in feature_cells(match.features, key)),
+            *(cell for match in matches for cell in match.features.cells(key)),
         )
         for label, key, unit in LABELS
     )

@@ -8,8 +8,7 @@ import numpy as np
 from exfit.estimate import Stop
 from exfit.inference.wording import digits, listed
 from exfit.results.comparisons import Overlay
-from exfit.results.recorder_averages import RecorderAverages
-from exfit.results.typical_values import first_of
+from exfit.results.influences import RecorderAverages, first_of
 from exfit.results.verdict import (
     GOOD,
     MATCHES,

@@ -16,7 +16,7 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import BREAKER, GOVERNOR, NETWORK, SPEED, acts_without_load
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
-from exfit.results.typical_values import typical_values_used
+from exfit.results.influences import typical_values_used
 from exfit.results.verdict import Cause
 from exfit.signals import unit_of_signal
 from exfit.simulation.inputs import Inputs

@@ -16,7 +16,7 @@ from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
-from exfit.results.typical_values import parameters_of
+from exfit.results.influences import parameters_of
 from exfit.results.verdict import REJECTED, Cause
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found

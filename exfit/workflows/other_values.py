@@ -18,9 +18,8 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.models import find
 from exfit.results.compare_with_record import compare_with_record
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.model import Iteration
-from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.util.strategies import PHASES
 from exfit.workflows.case_description import fixed_values
 

@@ -22,7 +22,7 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference.confidence import LEVEL, Interval
 from exfit.results.compare_with_record import compare_with_record
-from exfit.results.intervals.profile_hull import (
+from exfit.results.intervals.determination import (
     FoundMinimum,
     ProfilesAboutMinima,
     limits_of,

@@ -21,25 +21,21 @@ from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Uncertainty
-from exfit.results.acceptance import judged
-from exfit.results.compare_with_record import compare_with_record
-from exfit.results.comparisons import Comparison
+from exfit.results.compare_with_record import compare_with_record, judged
+from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import Behaviour
+from exfit.results.influences import RecorderAverages, TypicalValue, WindowSpread, by_weight
 from exfit.results.intervals.averages import allowing_for_averages, recorder_averages
 from exfit.results.intervals.determination import Determination
-from exfit.results.intervals.typical_values import influence_of_typical_values
 from exfit.results.intervals.value_errors import (
     allowing_for,
     allowing_for_bias,
     errors_of_values,
     given_error_notes,
+    influence_of_typical_values,
 )
 from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FittedParameter, Iteration
-from exfit.results.other_values import AsFound, PhaseEnd
-from exfit.results.recorder_averages import RecorderAverages
-from exfit.results.typical_values import TypicalValue, by_weight
-from exfit.results.windows import WindowSpread
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tolerance_notes
 from exfit.verdict.run_quality import speed_notes, switching_notes

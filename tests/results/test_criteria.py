@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from exfit.dsp.features import features
-from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
+from exfit.results.comparisons import Comparison, Overlay, PlayedRecord, StepFeatures, match_of
 from exfit.results.criteria import judged_by_criteria
-from exfit.results.played_records import PlayedRecord
 from exfit.util.criteria import Criteria
 
 TIME = np.arange(0.0, 10.0, 0.01)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.results.played_records import driving_signals, excursion, left_out_of, played_errors
+from exfit.results.compare_with_record import driving_signals, excursion, left_out_of, played_errors
 
 TIME = np.arange(0.0, 10.0, 0.02)
 BEGINS = 2.0

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.results.model import Minima, Minimum
-from exfit.results.search_summary import multiple, search_summary
+from exfit.results.model import Minima, Minimum, multiple
 
 
 def minima(*others, best=(1.0, 9), unfinished=0, failed=0, own=1):
@@ -36,13 +35,12 @@ def minima(*others, best=(1.0, 9), unfinished=0, failed=0, own=1):
     ],
 )  # fmt: skip
 def test_the_sentence_counts_every_descent(found, words):
-    assert words in search_summary(found, 1.0)
+    assert words in found.summary(1.0)
 
 
 def test_a_point_that_is_no_minimum_is_not_called_one():
-    assert "0 of 9 descents lead to this point, 9 to one 2.00 times as high" in search_summary(
-        minima(), 0.5
-    )
+    words = "0 of 9 descents lead to this point, 9 to one 2.00 times as high"
+    assert words in minima().summary(0.5)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,16 @@ import pytest
 from matplotlib.figure import Figure
 from tiers import few_of
 
-from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
+from exfit.results.compare_with_record import driving_signals
+from exfit.results.comparisons import (
+    Comparison,
+    LeftOut,
+    Overlay,
+    PlayedRecord,
+    StepFeatures,
+    match_of,
+)
 from exfit.results.model import FitResult, FittedParameter, Iteration
-from exfit.results.played_records import LeftOut, PlayedRecord, driving_signals
 from exfit.results.verdict import GOOD, Verdict
 from exfit.show import figures as plots
 from exfit.simulation.simulator import Response

@@ -18,7 +18,7 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.report.page import html
-from exfit.results import fit_files
+from exfit.results import io as fit_files
 from exfit.results.io import load_result
 from exfit.results.tables import DIGITS, parameter_file, table
 from exfit.show import figure_files, run_folder

@@ -93,7 +93,7 @@ def _outcome(task: CaseTask, began: float) -> CaseOutcome:
     from exfit.case.load import parse_case
     from exfit.case.peek import content_of
     from exfit.case.yaml import decoded
-    from exfit.results.fit_files import files_of_fit
+    from exfit.results.io import files_of_fit
 
     path, settings = task.files[0], task.settings
     try:

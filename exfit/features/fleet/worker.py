@@ -72,7 +72,7 @@ def _answer(answers_to: BinaryIO, answer: Any) -> None:
 
 def _import_all() -> None:
     """Import what every fit needs, and keep the collector of garbage from looking through it."""
-    import exfit.results.fit_files
+    import exfit.results.io
     import exfit.workflows  # noqa: F401
 
     gc.set_threshold(100_000)

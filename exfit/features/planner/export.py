@@ -31,9 +31,9 @@ from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import DynamicsRecord
+from exfit.results.influences import by_weight, first_of
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
-from exfit.results.typical_values import by_weight, first_of
 from exfit.util.sources import NOT_STATED, TYPICAL, by_source
 from exfit.util.text import near, show
 

@@ -13,8 +13,8 @@ from exfit.features.rank.ranking import RankedModel, ranked, ranking_sentences
 from exfit.models import MODELS, find
 from exfit.models.families import FAMILIES, members, relatives, without_doubles
 from exfit.plants import MACHINE
+from exfit.results.influences import typical_values_used
 from exfit.results.model import FitResult
-from exfit.results.typical_values import typical_values_used
 from exfit.runs.fits import FitRun, FitSeries, PlannedFit, Progress, run_all
 from exfit.util.typed import plain
 from exfit.workflows import loaded

@@ -18,7 +18,6 @@ from exfit.features.report.sections.against import against
 from exfit.features.report.sections.matches import MatchView, OverlayChart, live_data
 from exfit.features.report.sections.texts import number
 from exfit.features.report.verdict import Headline, headline, headline_of_validation
-from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported, ValidationResult
 from exfit.show.blocks import Block
@@ -154,7 +153,6 @@ def environment() -> "Environment":
         "blocks": _blocks,
         "rounded": rounded,
         "percentage": percentage,
-        "feature_cells": feature_cells,
     }
     shared.filters |= {"drawing": drawing, "command": shlex.join}
     shared.tests |= {"finite": _is_finite}

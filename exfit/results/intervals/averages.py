@@ -25,8 +25,8 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval
+from exfit.results.influences import STRONG, RecorderAverages
 from exfit.results.intervals.minima import own_values, variance_of
-from exfit.results.recorder_averages import STRONG, RecorderAverages
 from exfit.util.sorting import median
 
 Array = NDArray[np.float64]

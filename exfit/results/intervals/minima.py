@@ -185,7 +185,7 @@ def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
 
 def times(cost: float, other: float) -> str:
     """Return a cost in words, as a multiple of another one."""
-    from exfit.results.search_summary import multiple
+    from exfit.results.model import multiple
 
     return multiple(cost / other) if other > 0.0 else f"{cost:.3g} pu² above"
 

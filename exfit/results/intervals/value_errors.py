@@ -1,4 +1,4 @@
-"""Intervals that allow for the errors of the values that a fit takes as given."""
+"""Values that a fit takes as given: what they move, and intervals that allow for their errors."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,10 +16,12 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation, slopes_of
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.inference.wording import digits, listed
+from exfit.results.influences import DEVIATION, TypicalValue, typical_values_used
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals
 
 Array = NDArray[np.float64]
 
+IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
 UNSEEN = 1e-9  # of the largest singular value: rounding
 TINY = float(np.finfo(float).tiny)  # where the errors given leave nothing of a variance
 
@@ -249,3 +251,43 @@ def _in_own_units(
     except SimulationError:
         return None
     return jacobian if np.isfinite(jacobian).all() else None
+
+
+def influence_of_typical_values(
+    case: Case, residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
+) -> dict[str, TypicalValue]:
+    """Estimate the effect of each typical value that is not 0, were it DEVIATION larger.
+
+    To first order, by `shifts_by_values`: nothing where a derivative is not finite. What matters
+    are shifts of parameters of the unit by more than half their interval or, without one that has
+    both ends, by more than two standard errors.
+    """
+    typical = {name: value for name, value in typical_values_used(case).items() if value}
+    if not typical:
+        return {}
+    deviations = {name: DEVIATION * value for name, value in typical.items()}
+    by_value = shifts_by_values(residuals, theta, deviations)
+    if by_value is None:
+        return {}
+    of_records = {nuisance.name for each in residuals.experiments for nuisance in each.nuisances}
+    half_widths = {}
+    for name, own in uncertainty.confidence.parameters.items():
+        low, high = own.interval or (None, None)
+        if name in of_records:
+            continue
+        if low is not None and high is not None:
+            half_widths[name] = 0.5 * (high - low)
+        elif own.std_error is not None:
+            half_widths[name] = IN_STANDARD_ERRORS * own.std_error
+    influence = {}
+    for (name, value), column in zip(typical.items(), by_value.T, strict=True):
+        moved = zip(residuals.free, column.tolist(), strict=True)
+        shifts = {free.name: shift for free, shift in moved}
+        shares = {
+            symbol: abs(shifts[symbol]) / half_width
+            for symbol, half_width in half_widths.items()
+            if abs(shifts[symbol]) > half_width > 0.0
+        }
+        largest_first = dict(sorted(shares.items(), key=lambda each: -each[1]))
+        influence[name] = TypicalValue(value, shifts, largest_first)
+    return influence

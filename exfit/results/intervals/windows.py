@@ -28,7 +28,7 @@ from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
 from exfit.records.record import Record, read_only
-from exfit.results.windows import WindowEstimate, WindowKind, WindowSpread
+from exfit.results.influences import WindowEstimate, WindowKind, WindowSpread
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

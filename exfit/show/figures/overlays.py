@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import envelope
-from exfit.results.comparisons import REFERENCE, Comparison, Overlay
-from exfit.results.played_records import DrivingSignal, LeftOut
+from exfit.results.comparisons import REFERENCE, Comparison, DrivingSignal, LeftOut, Overlay
 from exfit.show.figures.style import (
     LIMIT,
     MEASURED,

@@ -15,9 +15,8 @@ from exfit.fitting.residuals import Residuals, noise_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
+from exfit.results.influences import RecorderAverages, TypicalValue
 from exfit.results.intervals.determination import NEEDS_PROFILE
-from exfit.results.recorder_averages import RecorderAverages
-from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import Cause
 
 LEAST_TIME = 30.0  # s

@@ -12,7 +12,7 @@ from exfit.estimate import Stop
 from exfit.fitting.parameters import FreeParameter
 from exfit.inference.wording import listed
 from exfit.plants import MACHINE
-from exfit.results.typical_values import DEVIATION, first_of, moved_parameters
+from exfit.results.influences import DEVIATION, first_of, moved_parameters
 from exfit.results.verdict import Cause
 from exfit.simulation.limit_hits import Extreme, extremes
 from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, likelihood

@@ -8,7 +8,7 @@ from batches import case_file, files_of_case, record_file
 
 import exfit
 from exfit.features.fleet.task import CHANGED, CaseTask, key_of, run_case
-from exfit.results.fit_files import files_of_fit
+from exfit.results.io import files_of_fit
 from exfit.runs.runner import FitSettings
 
 LOCAL = FitSettings(search="local")

@@ -31,8 +31,8 @@ from exfit.features.planner.records import (
 )
 from exfit.features.planner.units import read_units
 from exfit.models.sheet import typical
+from exfit.results.comparisons import AsFound
 from exfit.results.model import FittedParameter
-from exfit.results.other_values import AsFound
 from exfit.util.sources import FITTED, TYPICAL
 
 DEFINITIONS = {

@@ -31,8 +31,8 @@ from exfit.features.report.sections.matches import fitted_matches, live_data
 from exfit.features.report.verdict import headline
 from exfit.features.report.writing import write_report
 from exfit.models import from_file
+from exfit.results.comparisons import AsFound
 from exfit.results.io import load_result, result_file
-from exfit.results.other_values import AsFound
 from exfit.show import run_folder
 from exfit.show.blocks import Chart, Panel, Series
 from exfit.util.text import rounded, rounded_value

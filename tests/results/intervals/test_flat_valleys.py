@@ -6,7 +6,6 @@ from records import case_of, config, write
 
 from exfit import workflows
 from exfit.results.intervals.minima import is_way, valleys
-from exfit.results.search_summary import search_summary
 from exfit.util.text import rounded_value
 
 NOISE = 1e-2  # pu: a tenth of the step hides in it, and most parameters with it
@@ -48,7 +47,7 @@ def test_minima_in_one_flat_valley_are_named_once_with_what_moves_along_it(vague
         values = [minimum.values[name] for minimum in along]
         least, most = (rounded_value(end) for end in (min(values), max(values)))
         assert f"{name} {least} ... {most}" in note
-    summary = search_summary(vague.minima, vague.cost)
+    summary = vague.minima.summary(vague.cost)
     assert summary.count("valley") == 1
     assert "not refuted" not in summary
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from coverage_cases import HARD_CASES, noisy, truth_of
 
-from exfit.results.intervals.instants import (
+from exfit.results.intervals.determination import (
     decided_by_few_samples,
     intervals_near,
     minima_between_samples,

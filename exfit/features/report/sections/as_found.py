@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from exfit.dsp.decimation import envelope
 from exfit.features.report.layout import BINS, LEVEL, LOW, MILLI, TALL, TIME
-from exfit.results.comparisons import Comparison
-from exfit.results.other_values import AsFound
+from exfit.results.comparisons import AsFound, Comparison
 from exfit.results.validation_result import Reported, ValidationResult
 from exfit.show.blocks import Chart, Panel, Series
 from exfit.signals import label_of

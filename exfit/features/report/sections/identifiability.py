@@ -10,8 +10,8 @@ from exfit.features.report.layout import BINS, LEVEL, MILLI, TALL, TIME, line_st
 from exfit.fitting.uncertainty import Sensitivity
 from exfit.inference.confidence import Correlation
 from exfit.inference.sensitivity import ParameterEffect
+from exfit.results.influences import by_weight
 from exfit.results.model import FitResult
-from exfit.results.typical_values import by_weight
 from exfit.show.blocks import Chart, Panel, Series
 
 PERCENT = 1e-2

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.decimation import envelope, kept_rows
 from exfit.features.report.layout import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
-from exfit.results.comparisons import REFERENCE, Comparison
-from exfit.results.played_records import LeftOut
+from exfit.results.comparisons import REFERENCE, Comparison, LeftOut
 from exfit.results.tables import clock_digits
 from exfit.results.validation_result import Reported
 from exfit.show.blocks import Chart, Panel, Series

@@ -6,8 +6,8 @@ from exfit.case.saturation import MEANINGS
 from exfit.features.report.sections.texts import DASH, number
 from exfit.inference.confidence import Interval
 from exfit.results.description import SheetRow
+from exfit.results.influences import DEVIATION, by_weight, moved_parameters
 from exfit.results.model import FitResult, FittedParameter
-from exfit.results.typical_values import DEVIATION, by_weight, moved_parameters
 from exfit.results.validation_result import Reported
 from exfit.show.blocks import Block, Cell, Mark, Note, Table, TableColumn, columns, row
 

@@ -11,7 +11,6 @@ from exfit.features.report.charts import SMALL
 from exfit.features.report.layout import BINS, HALF, LOW, TALL, TIME
 from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult, FittedParameter, Iteration, Minima, Minimum
-from exfit.results.search_summary import search_summary
 from exfit.results.thinning import drawn_responses
 from exfit.show.blocks import Chart, Panel, Rule, Series
 from exfit.signals import label_of
@@ -78,7 +77,7 @@ def _facts(result: FitResult) -> Iterator[tuple[str, str]]:
     yield "residuals and Jacobians", f"{result.nfev:g} and {result.njev:g}"
     yield "simulations", show(result.simulations)
     if result.minima is not None:
-        yield "search", search_summary(result.minima, result.cost)
+        yield "search", result.minima.summary(result.cost)
     yield "sub-steps of a step", show(result.substeps)
 
 
@@ -122,7 +121,7 @@ def waterfall(search: Minima, cost: float) -> Chart:
     return Chart(
         key="waterfall",
         title="Where the descents of the search ended, in the order of their costs",
-        text=search_summary(search, cost),
+        text=search.summary(cost),
         x_title="descent, by the cost that it led to",
         panels=(Panel("cost f (pu²)", series, HALF, logarithmic=True),),
         whole=True,
