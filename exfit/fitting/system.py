@@ -178,3 +178,15 @@ def values_of(case: Case, changed: Values) -> dict[str, float]:
     """Return every value of a case: as it has them, with changes upon them, and what follows."""
     following = {name: tie for name, tie in case.ties.by_name.items() if name not in changed}
     return Ties(following).apply({**case.values(), **changed})
+
+
+def parameters_of(case: Case) -> set[str]:
+    """Return the parameters that a response of any of the records depends on."""
+    own = [system_of(case.seen_from(recording), recording) for recording in case.recordings]
+    return {name for system in own or [system_of(case)] for name in parameters_used(system)}
+
+
+def typical_values_used(case: Case) -> dict[str, float]:
+    """Return the typical values that a response of any of the records depends on."""
+    used, values = parameters_of(case), case.values()
+    return {name: values[name] for name in case.typical() if name in used}

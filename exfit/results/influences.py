@@ -4,10 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from exfit.case.case import Case
-from exfit.fitting.system import system_of
 from exfit.results.verdict import REJECTED, Cause
-from exfit.simulation.kernels import parameters_used
 from exfit.util.text import rounded_value
 
 WindowKind = Literal["step", "first half", "second half"]
@@ -30,18 +27,6 @@ class TypicalValue:
     value: float
     shifts: Mapping[str, float]
     matters_to: Mapping[str, float]
-
-
-def parameters_of(case: Case) -> set[str]:
-    """Return the parameters that a response of any of the records depends on."""
-    own = [system_of(case.seen_from(recording), recording) for recording in case.recordings]
-    return {name for system in own or [system_of(case)] for name in parameters_used(system)}
-
-
-def typical_values_used(case: Case) -> dict[str, float]:
-    """Return the typical values that a response of any of the records depends on."""
-    used, values = parameters_of(case), case.values()
-    return {name: values[name] for name in case.typical() if name in used}
 
 
 def moved_parameters(typical: TypicalValue, fitted: Mapping[str, float]) -> str:

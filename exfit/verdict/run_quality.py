@@ -13,10 +13,10 @@ from exfit.dsp.noise import drift_at_rest
 from exfit.fitting.experiment import Channel
 from exfit.fitting.recorded.switchings import MASKED
 from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.system import typical_values_used
 from exfit.plants import BREAKER, GOVERNOR, NETWORK, SPEED, acts_without_load
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
-from exfit.results.influences import typical_values_used
 from exfit.results.verdict import Cause
 from exfit.signals import unit_of_signal
 from exfit.simulation.inputs import Inputs

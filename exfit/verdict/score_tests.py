@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from exfit.errors import SimulationError
 from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slopes_of
 from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
-from exfit.results.influences import parameters_of
 from exfit.results.verdict import REJECTED, Cause
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found

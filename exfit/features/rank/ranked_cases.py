@@ -10,10 +10,10 @@ from exfit.case.load import CaseOrPath
 from exfit.case.other_model import with_exciter
 from exfit.errors import CaseError
 from exfit.features.rank.ranking import RankedModel, ranked, ranking_sentences
+from exfit.fitting.system import typical_values_used
 from exfit.models import MODELS, find
 from exfit.models.families import FAMILIES, members, relatives, without_doubles
 from exfit.plants import MACHINE
-from exfit.results.influences import typical_values_used
 from exfit.results.model import FitResult
 from exfit.runs.fits import FitRun, FitSeries, PlannedFit, Progress, run_all
 from exfit.util.typed import plain

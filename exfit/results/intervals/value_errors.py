@@ -13,10 +13,11 @@ from exfit.errors import SimulationError
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.system import typical_values_used
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation, slopes_of
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.inference.wording import digits, listed
-from exfit.results.influences import DEVIATION, TypicalValue, typical_values_used
+from exfit.results.influences import DEVIATION, TypicalValue
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals
 
 Array = NDArray[np.float64]

@@ -12,14 +12,9 @@ from exfit.case.case import Case
 from exfit.features.report.page import html
 from exfit.features.report.sections.parameters import parameters
 from exfit.fitting.search import fitted
+from exfit.fitting.system import typical_values_used
 from exfit.fitting.uncertainty import uncertainty_at
-from exfit.results.influences import (
-    DEVIATION,
-    by_weight,
-    first_of,
-    moved_parameters,
-    typical_values_used,
-)
+from exfit.results.influences import DEVIATION, by_weight, first_of, moved_parameters
 from exfit.results.intervals.value_errors import influence_of_typical_values
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.show.blocks import Table
