@@ -29,7 +29,7 @@ from exfit.util.file_names import (
 )
 from exfit.util.files import read_json
 from exfit.util.text import show_value, to_json
-from exfit.util.typed import FormError, plain, read
+from exfit.util.typed import plain
 
 if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult
@@ -81,6 +81,7 @@ def load_validation(source: Path) -> "ValidationResult":
     """
     from exfit.results.consistency import validation_contradictions
     from exfit.results.validation_result import ValidationResult
+    from exfit.util.typed_reading import FormError, read
 
     content = read_json(source)
     _refuse_other_version(source, content, "validate again")
@@ -100,6 +101,7 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     fit: with the place in it, and what is wrong there.
     """
     from exfit.results.consistency import contradictions
+    from exfit.util.typed_reading import FormError, read
 
     source = result_file(Path(path))
     if not source.exists() and source.with_name(VALIDATION).is_file():

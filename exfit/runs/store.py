@@ -14,7 +14,8 @@ from exfit import __version__
 from exfit.errors import ExfitError
 from exfit.util.files import on_disk, read_json, regular_size
 from exfit.util.text import to_json
-from exfit.util.typed import plain, read
+from exfit.util.typed import plain
+from exfit.util.typed_reading import read
 
 Content = TypeVar("Content")
 

@@ -69,8 +69,8 @@ class FigureFiles:
         planned = self.planned()
         left += planned
         with ThreadPoolExecutor(1) as pool:
-            drawn = ((name, _encoded(figure, pool)) for name, figure in planned.items())
-            for name, picture in _one_behind(drawn):
+            pictures = ((name, _encoded(figure, pool)) for name, figure in planned.items())
+            for name, picture in _one_behind(pictures):
                 path = self.main.with_name(name)
                 try:
                     content = picture.result()

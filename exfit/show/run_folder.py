@@ -5,7 +5,7 @@ What draws them is imported only where they are drawn.
 
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ from exfit.util.file_names import (
     WHOLE_FIT,
     files_named_after,
 )
-from exfit.util.files import write_together
+from exfit.util.files import read_json, write_together
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
@@ -121,74 +121,51 @@ def figures_of_fit(result: "FitResult") -> PlannedFigures:
     """Return the figures of a fit."""
     from exfit.show import figures as plots
 
-    drawings: dict[str, PlannedFigure] = {}
-    single = result.comparison.name == SINGLE
-    title = f"{result.name}: {result.model} fitted to "
-    if single:
-        overlay = partial(plots.overlay, result.comparison, title + result.comparison.record)
+    plan: dict[str, PlannedFigure] = {}
+    title, several = f"{result.name}: {result.model} fitted to ", result.comparisons
+    shows = "measured, start values and fitted"
+    if result.comparison.name == SINGLE:
+        several = ()
+        draw = partial(plots.overlay, result.comparison, title + result.comparison.record)
     else:
-        title += f"{len(result.comparisons)} records"
-        overlay = partial(plots.overlays, result.comparisons, title)
-    drawings["overlay.png"] = PlannedFigure("measured, start values and fitted", overlay)
-    drawings |= _phase_ends(result)
+        draw = partial(plots.overlays, several, f"{title}{len(several)} records")
+    plan["overlay.png"] = PlannedFigure(shows, draw)
+    for end in result.phase_ends:
+        for match in end.comparisons:
+            of = "overlay_" if match.name == SINGLE else f"{match.name}-"
+            place = f"end of {end.phase} (iteration {end.iteration}), {match.record}"
+            title, label = f"{result.name}: {place}", f"end of {end.phase}"
+            draw = partial(plots.overlay, match, title, label)
+            plan[f"{of}{end.phase}.png"] = PlannedFigure(f"measured and the {label}", draw)
     if any(match.iteration_responses is not None for match in result.comparisons):
-        iterations = partial(plots.iterations, result)
-        drawings["iterations.png"] = PlannedFigure("the response after each iteration", iterations)
-    drawings["convergence.png"] = PlannedFigure(
-        "cost, gradient and damping after each iteration", partial(plots.convergence, result)
-    )
-    drawings["trajectories.png"] = PlannedFigure(
-        "the parameters after each iteration", partial(plots.trajectories, result)
-    )
+        shows = "the response after each iteration"
+        plan["iterations.png"] = PlannedFigure(shows, partial(plots.iterations, result))
+    shows = "cost, gradient and damping after each iteration"
+    plan["convergence.png"] = PlannedFigure(shows, partial(plots.convergence, result))
+    shows = "the parameters after each iteration"
+    plan["trajectories.png"] = PlannedFigure(shows, partial(plots.trajectories, result))
     if result.knowledge is not None:
-        drawings |= figures_of_uncertainty(result.knowledge, result.name)
+        plan |= figures_of_uncertainty(result.knowledge, result.name)
     if result.minima is not None:
-        waterfall = partial(plots.waterfall, result.minima, result.name)
-        drawings["starts.png"] = PlannedFigure("the cost that each start led to", waterfall)
-    drawings |= figures_of_comparisons(
-        [*(() if single else result.comparisons), *result.validation]
-    )
-    return drawings
-
-
-def _phase_ends(result: "FitResult") -> PlannedFigures:
-    """Return the overlays of the points where a phase of the search handed over to the next."""
-    from exfit.show import figures as plots
-
-    return {
-        f"overlay_{end.phase}.png" if match.name == SINGLE else f"{match.name}-{end.phase}.png": (
-            PlannedFigure(
-                f"measured and the end of {end.phase}",
-                partial(
-                    plots.overlay,
-                    match,
-                    f"{result.name}: end of {end.phase} (iteration {end.iteration}), "
-                    f"{match.record}",
-                    f"end of {end.phase}",
-                ),
-            )
-        )
-        for end in result.phase_ends
-        for match in end.comparisons
-    }
+        shows = "the cost that each start led to"
+        draw = partial(plots.waterfall, result.minima, result.name)
+        plan["starts.png"] = PlannedFigure(shows, draw)
+    return {**plan, **figures_of_comparisons([*several, *result.validation])}
 
 
 def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> PlannedFigures:
     """Plan the figures of the sensitivities over time and of the correlations."""
     from exfit.show import figures as plots
 
+    moves = partial(plots.sensitivity, uncertainty, name)
+    together = partial(plots.correlation, uncertainty, name)
     return {
-        "sensitivity.png": PlannedFigure(
-            "what 1 % of each parameter does to the response",
-            partial(plots.sensitivity, uncertainty, name),
-        ),
-        "correlation.png": PlannedFigure(
-            "the correlation of the estimates", partial(plots.correlation, uncertainty, name)
-        ),
+        "sensitivity.png": PlannedFigure("what 1 % of each parameter does to the response", moves),
+        "correlation.png": PlannedFigure("the correlation of the estimates", together),
     }
 
 
-def figures_of_comparisons(comparisons: "Sequence[Comparison]") -> PlannedFigures:
+def figures_of_comparisons(comparisons: "Iterable[Comparison]") -> PlannedFigures:
     """Return the overlay of each comparison under its name."""
     from exfit.show import figures as plots
 
@@ -209,45 +186,22 @@ def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
     from exfit.results.side_by_side import results_table
     from exfit.results.tables import parameter_file
 
-    runs = {run.name: (run.case_name, run.result) for run in series.runs}
-    with deferred_interrupts():
-        write_together(
-            folder,
-            {"fits.csv": results_table(runs), SERIES: to_json(series.to_dict())},
-            ["fits.png"],
+    def planned() -> PlannedFigures:
+        from exfit.show import figures as plots
+
+        draw = PlannedFigure(
+            "responses, errors and costs of all fits", partial(plots.fit_series, series)
         )
+        return {"fits.png": draw} if series.runs else {}
+
+    runs = {run.name: (run.case_name, run.result) for run in series.runs}
+    numbers = {"fits.csv": results_table(runs), SERIES: to_json(series.to_dict())}
+    with deferred_interrupts():
+        write_together(folder, numbers, ["fits.png"])
         for fits in series.by_case.values():
             lowest = min((run.result for run in fits), key=lambda result: result.cost)
             _remember(lowest.case, parameter_file(lowest))
-    return FigureFiles.beside(folder / SERIES, partial(_figure_of_series, series))
-
-
-def _figure_of_series(series: "FitSeries") -> PlannedFigures:
-    """Return the figure of the fits of several cases with several strategies."""
-    from exfit.show import figures as plots
-
-    if not series.runs:
-        return {}
-    shows = "responses, errors and costs of all fits"
-    return {"fits.png": PlannedFigure(shows, partial(plots.fit_series, series))}
-
-
-def _of_records(main: Path) -> set[str]:
-    """Return the names of the files that a former run wrote for its records, by its main file."""
-    from exfit.util.files import read_json
-
-    try:
-        content = read_json(main)
-        matches = [*content.get("records", ()), *content.get("validation", ())]
-        names = [Path(match["name"]).name for match in matches]
-    except (ExfitError, LookupError, TypeError, AttributeError):
-        return set()  # there is none, or it is not ours
-    return _named_after(names)
-
-
-def _named_after(records: Iterable[str]) -> set[str]:
-    """Return the names of the files that are named after records."""
-    return {file for name in records if name for file in files_named_after(name)}
+    return FigureFiles.beside(folder / SERIES, planned)
 
 
 def write_validation(result: "ValidationResult", folder: Path) -> FigureFiles:
@@ -266,63 +220,70 @@ def write_validation(result: "ValidationResult", folder: Path) -> FigureFiles:
 
 def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:
     """Write the profiles of parameters as JSON and as a table; return their figure."""
+
+    def planned() -> PlannedFigures:
+        from exfit.show import figures as plots
+
+        draw = partial(plots.profiles, profiles)
+        return {"profile.png": PlannedFigure("the cost along each parameter", draw)}
+
     rows = [
         f"{profile.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
         for profile in profiles.profiles
         for at, costs in ((profile.at, profile.costs), *profile.others)
         for value, cost in zip(at, costs, strict=True)
     ]
-    numbers = {
-        "profile.csv": "".join(["parameter,value,cost\n", *rows]),
-        PROFILES: to_json(profiles.as_json()),
-    }
+    table = "".join(["parameter,value,cost\n", *rows])
+    numbers = {"profile.csv": table, PROFILES: to_json(profiles.as_json())}
     write_together(folder, numbers, ["profile.png"])
-    return FigureFiles.beside(folder / PROFILES, partial(_figure_of_profiles, profiles))
-
-
-def _figure_of_profiles(profiles: "Profiles") -> PlannedFigures:
-    """Return the figure of the profiles of parameters."""
-    from exfit.show import figures as plots
-
-    shows = "the cost along each parameter"
-    return {"profile.png": PlannedFigure(shows, partial(plots.profiles, profiles))}
+    return FigureFiles.beside(folder / PROFILES, planned)
 
 
 def write_inspection(inspection: "Inspection", folder: Path) -> FigureFiles:
     """Write what a recorder's file holds as JSON; return its figure."""
+
+    def planned() -> PlannedFigures:
+        from exfit.show import figures as plots
+
+        draw = partial(plots.inspection, inspection, inspection.path.name)
+        return {"inspect.png": PlannedFigure("the channels, with steps, gaps and spikes", draw)}
+
     write_together(folder, {INSPECTION: to_json(inspection.as_json())}, ["inspect.png"])
-    return FigureFiles.beside(folder / INSPECTION, partial(_figure_of_inspection, inspection))
-
-
-def _figure_of_inspection(inspection: "Inspection") -> PlannedFigures:
-    """Return the figure of what a recorder's file holds."""
-    from exfit.show import figures as plots
-
-    drawing = partial(plots.inspection, inspection, inspection.path.name)
-    return {"inspect.png": PlannedFigure("the channels, with steps, gaps and spikes", drawing)}
+    return FigureFiles.beside(folder / INSPECTION, planned)
 
 
 def write_simulation(simulation: "SimulationResult", name: str, folder: Path) -> FigureFiles:
-    """Write a response; return its figures."""
+    """Write a response; return its figures, beside its record where there is one."""
+
+    def planned() -> PlannedFigures:
+        from exfit.show import figures as plots
+
+        draw, match = partial(plots.response, response, name), simulation.comparison
+        plan = {"response.png": PlannedFigure("every signal and state", draw)}
+        if match is not None:
+            draw = partial(plots.overlay, match, f"{name}: simulated and {match.record}")
+            plan["overlay.png"] = PlannedFigure("measured and simulated", draw)
+        return plan
+
     response = simulation.response
     header = ["t", *response.signals]
     numbers = {RESPONSE: whole_table(header, [response.time, *response.signals.values()])}
     write_together(folder, numbers, ["response.png", "overlay.png"])
-    drawings = partial(_figures_of_simulation, simulation, name)
-    return FigureFiles.beside(folder / RESPONSE, drawings)
+    return FigureFiles.beside(folder / RESPONSE, planned)
 
 
-def _figures_of_simulation(simulation: "SimulationResult", name: str) -> PlannedFigures:
-    """Return the figures of a response, beside its record where there is one."""
-    from exfit.show import figures as plots
+def _named_after(records: Iterable[str]) -> set[str]:
+    return {file for name in records if name for file in files_named_after(name)}
 
-    response = partial(plots.response, simulation.response, name)
-    drawings = {"response.png": PlannedFigure("every signal and state", response)}
-    if simulation.comparison is not None:
-        title = f"{name}: simulated and {simulation.comparison.record}"
-        overlay = partial(plots.overlay, simulation.comparison, title)
-        drawings["overlay.png"] = PlannedFigure("measured and simulated", overlay)
-    return drawings
+
+def _of_records(main: Path) -> set[str]:
+    """Return the names of the files that a former run wrote for its records, by its main file."""
+    try:
+        content = read_json(main)
+        matches = [*content.get("records", ()), *content.get("validation", ())]
+        return _named_after([Path(match["name"]).name for match in matches])
+    except (ExfitError, LookupError, TypeError, AttributeError):
+        return set()  # there is none, or it is not ours
 
 
 def last_fit(case: Path) -> Path | None:

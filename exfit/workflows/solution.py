@@ -21,7 +21,8 @@ from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Uncertainty
-from exfit.results.compare_with_record import compare_with_record, judged
+from exfit.results.acceptance import judged
+from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import Behaviour
 from exfit.results.influences import RecorderAverages, TypicalValue, WindowSpread, by_weight

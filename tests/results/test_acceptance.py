@@ -9,7 +9,7 @@ import pytest
 from exfit.dsp.filtering import Filtering, LowPass
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import noise_of
-from exfit.results.compare_with_record import MUCH_WORSE, judged
+from exfit.results.acceptance import MUCH_WORSE, judged
 from exfit.results.comparisons import Comparison, Match, PlayedRecord, StepFeatures
 
 TIME = np.arange(0.0, 10.0, 0.01)

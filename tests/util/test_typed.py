@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exfit.util.typed import IN_FILE, KEY, FormError, plain, read
+from exfit.util.typed import IN_FILE, KEY, plain
+from exfit.util.typed_reading import FormError, read
 
 
 class Pair(NamedTuple):

@@ -20,7 +20,8 @@ from exfit.runs.store import digest_of
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import read_json, write
 from exfit.util.text import show_value, to_json
-from exfit.util.typed import FormError, plain, read
+from exfit.util.typed import plain
+from exfit.util.typed_reading import FormError, read
 
 KEY = "test"  # the label of the key among the inputs of a fit
 VERSION = 1  # of the file of a test that is no fit

@@ -21,7 +21,8 @@ from exfit.models.sheet import typical
 from exfit.show import figures as plots
 from exfit.show import terminal
 from exfit.util.text import to_json
-from exfit.util.typed import plain, read
+from exfit.util.typed import plain
+from exfit.util.typed_reading import read
 
 P, Q = np.repeat([0.1, 0.8], 3), np.tile([-0.3, 0.0, 0.4], 2)
 MACHINE = MACHINES["GENSAL"]

@@ -10,7 +10,8 @@ from exfit.features.programme.steady.saturation import FieldWinding, directions,
 from exfit.features.programme.steady.saturation_forms import EXCESS
 from exfit.features.programme.steady.saturation_result import SaturationResult
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH
-from exfit.util.typed import plain, read
+from exfit.util.typed import plain
+from exfit.util.typed_reading import read
 
 FORMS = tuple(EXCESS)
 BASE, S10, S12 = 850.0, 0.12, 0.42
