@@ -29,7 +29,7 @@ from thesis_numbers import (
 import exfit
 from exfit.case.case import Case
 from exfit.features.compare.agreement import compare
-from exfit.features.compare.differences import Difference
+from exfit.features.compare.curves import Difference
 from exfit.fitting.search import fitted
 from exfit.results.comparisons import Comparison
 from exfit.show import run_folder

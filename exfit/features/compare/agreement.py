@@ -1,4 +1,4 @@
-"""Responses beside each other, whatever programs they are from, and their differences."""
+"""Responses beside each other, whatever programs they are from: their clocks, their differences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
 from exfit.dsp.recorded_features import RecordedResponse, recorded_features
+from exfit.dsp.step_detection import DetectedStep, first_step
 from exfit.errors import ExfitError, RecordError
-from exfit.features.compare.clock_alignment import compared_clocks, shifted
 from exfit.features.compare.curves import (
     RECORD,
     USUAL_COLUMNS,
     ColumnChoice,
     Curve,
+    Difference,
+    differences,
     read_curve,
     refuse_unknown,
 )
-from exfit.features.compare.differences import Difference, differences
 from exfit.results.comparisons import judged_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
@@ -31,6 +32,9 @@ from exfit.util.file_names import WHOLE_FIT
 from exfit.util.typed import plain
 
 Array = NDArray[np.float64]
+
+STEPS_APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
+MATCHED = 1e-5  # s: how closely the time between two steps is matched
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,17 +135,35 @@ def compare(
     is not detected that is to be aligned.
     """
     paths = dict(zip(_names(len(sources)), sources, strict=True))
-    as_read = _read(paths if record is None else {**paths, RECORD: record}, choice)
+    named = paths if record is None else {**paths, RECORD: record}
+    as_read = [read_curve(name, path, choice) for name, path in named.items()]
+    refuse_unknown(choice, as_read)
     curves = shifted(as_read, shifts or {})
     shared = _shared_signals(curves)
     judged = judged_of(shared)
     clocks = compared_clocks(curves, judged)
     if align:
-        clocks.refuse_undetected(curves)
+        for curve in curves:
+            if clocks.steps.get(curve.name) is None:
+                raise RecordError(
+                    f"--align: {curve.name}, {curve.path}: no step is detected in it; "
+                    "--shift B=SECONDS moves the time of one"
+                )
         curves = shifted(curves, clocks.apart)
     results, unread = _results(paths)
     at = clocks.step_at if step_at is None else step_at
     of_curves = {} if at is None else dict(_features_of(curves, judged, at))
+    notes = [
+        f"{curve.path}: {curve.repeated} instants repeat: the last row of each is used"
+        for curve in curves
+        if curve.repeated
+    ]
+    notes += clocks.notes(curves, judged, align)
+    notes += [
+        f"{name}: its features are read without {of_curve.removed}"
+        for name, of_curve in of_curves.items()
+        if of_curve.removed
+    ]
     return Agreement(
         tuple(curves),
         tuple(differences(curves, shared)),
@@ -149,15 +171,8 @@ def compare(
         judged,
         of_curves,
         results,
-        (*_notes(curves), *clocks.notes(curves, judged, align), *_removed(of_curves), *unread),
+        (*notes, *unread),
     )
-
-
-def _read(paths: Mapping[str, Path], choice: ColumnChoice) -> list[Curve]:
-    """Return curves by their names; raises RecordError for columns that none of them has."""
-    curves = [read_curve(name, path, choice) for name, path in paths.items()]
-    refuse_unknown(choice, curves)
-    return curves
 
 
 def _names(count: int) -> list[str]:
@@ -179,10 +194,13 @@ def _shared_signals(curves: Sequence[Curve]) -> list[str]:
     shared = [name for name in first.signals if any(name in curve.signals for curve in others)]
     for curve in others:
         if not any(name in curve.signals for name in shared or first.signals):
+            ours, theirs = (
+                ", ".join(each.signals) or f"none of {', '.join(COMPARED)}"
+                for each in (first, curve)
+            )
             raise RecordError(
-                f"{first.path} and {curve.path}: no signal in common: {first.name} has "
-                f"{_listed(first)}, {curve.name} has {_listed(curve)}; "
-                "name columns with --columns vt=COLUMN"
+                f"{first.path} and {curve.path}: no signal in common: {first.name} has {ours}, "
+                f"{curve.name} has {theirs}; name columns with --columns vt=COLUMN"
             )
     return shared
 
@@ -197,10 +215,6 @@ def _results(paths: Mapping[str, Path]) -> tuple[dict[str, FitResult], list[str]
             except ExfitError as fault:
                 unread.append(f"{name}: its parameters are not shown: {fault}")
     return results, unread
-
-
-def _listed(curve: Curve) -> str:
-    return ", ".join(curve.signals) or f"none of {', '.join(COMPARED)}"
 
 
 def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tuple[str, Features]]:
@@ -225,13 +239,94 @@ def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tu
                 yield curve.name, of_curve
 
 
-def _removed(of_curves: Mapping[str, Features]) -> Iterator[str]:
-    for name, of_curve in of_curves.items():
-        if of_curve.removed:
-            yield f"{name}: its features are read without {of_curve.removed}"
+@dataclass(frozen=True)
+class ComparedClocks:
+    """The steps that the curves show, by their names, and what would put them together.
+
+    ``reference`` is the curve with which the others are aligned. ``apart`` (s) is what puts those
+    together with it whose steps are farther apart than the shape of a rise may move them: from the
+    detected steps, and as the responses match best within ``within`` (s) of these.
+    """
+
+    steps: Mapping[str, DetectedStep | None]
+    reference: str
+    apart: Mapping[str, float]
+    within: Mapping[str, float]
+
+    @property
+    def step_at(self) -> float | None:
+        """When the step is: in the record, else in the first curve that shows it."""
+        detected = (self.steps.get(RECORD), *self.steps.values())
+        return next((step.at for step in detected if step is not None), None)
+
+    def notes(self, curves: Sequence[Curve], signal: str, aligned: bool) -> Iterator[str]:
+        """Yield whose clock was moved, or differs and what f would be if it were moved."""
+        whose = "the record" if self.reference == RECORD else self.reference
+        at = self.steps.get(self.reference)
+        for curve in curves:
+            name, step = curve.name, self.steps.get(curve.name)
+            if name not in self.apart or step is None or at is None:
+                continue
+            times = f"the step of {name} is at {step.at:.3f} s, that of {whose} at {at.at:.3f} s"
+            if aligned:
+                yield (
+                    f"{times}: {name} is shifted by {self.apart[name]:.4f} s, as it matches best "
+                    f"within {self.within[name]:.1g} s of that"
+                )
+            else:
+                (reference,) = (each for each in curves if each.name == self.reference)
+                f = _from_reference(reference, curve.shifted(self.apart[name]), signal).f
+                yield (
+                    f"{times}: --align puts the steps together (f = {f:.2e}), "
+                    f"--shift {name}={curve.shift + self.apart[name]:.4f} this one"
+                )
 
 
-def _notes(curves: Sequence[Curve]) -> Iterator[str]:
+def compared_clocks(curves: Sequence[Curve], signal: str) -> ComparedClocks:
+    """Return the clocks of curves as the steps of a signal show them."""
+    steps = {
+        curve.name: first_step(curve.time, curve.signals[signal])
+        for curve in curves
+        if signal in curve.signals
+    }
+    name = RECORD if steps.get(RECORD) is not None else curves[0].name
+    reference = next(curve for curve in curves if curve.name == name)
+    at = steps.get(name)
+    apart, within = {}, {}
     for curve in curves:
-        if curve.repeated:
-            yield f"{curve.path}: {curve.repeated} instants repeat: the last row of each is used"
+        step = steps.get(curve.name)
+        if step is None or at is None:
+            continue
+        uncertainty = step.error + at.error
+        if abs(at.at - step.at) > max(STEPS_APART, uncertainty):
+            apart[curve.name] = _matched(reference, curve, signal, at.at - step.at, uncertainty)
+            within[curve.name] = uncertainty
+    return ComparedClocks(steps, name, apart, within)
+
+
+def shifted(curves: Sequence[Curve], shifts: Mapping[str, float]) -> list[Curve]:
+    """Return curves with seconds added to their times; raises RecordError for a wrong name."""
+    names = [curve.name for curve in curves]
+    for name in shifts:
+        if name not in names:
+            raise RecordError(f"--shift {name}: no curve is called so; known: {', '.join(names)}")
+    return [curve.shifted(shifts.get(curve.name, 0.0)) for curve in curves]
+
+
+def _matched(reference: Curve, curve: Curve, signal: str, offset: float, within: float) -> float:
+    """Return the offset (s) near a first one at which a curve differs least from the reference."""
+    from scipy.optimize import minimize_scalar
+
+    best = minimize_scalar(
+        lambda by: _from_reference(reference, curve.shifted(by), signal).rmse,
+        bounds=(offset - within, offset + within),
+        method="bounded",
+        options={"xatol": MATCHED},
+    )
+    return float(best.x)
+
+
+def _from_reference(reference: Curve, curve: Curve, signal: str) -> Difference:
+    pair = [curve, reference] if reference.measured else [reference, curve]
+    (difference,) = differences(pair, [signal])
+    return difference

@@ -1,13 +1,21 @@
-"""The command compare."""
+"""The command compare, and what it shows."""
 
+from collections.abc import Iterator
 from math import isfinite, nan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import Output, output_options, print_json
+from exfit.cli.options import Output, output_options
 from exfit.errors import ExfitError
+from exfit.show.blocks import Block, Table, columns, notes, number, paragraph, row
+from exfit.util.text import percentage, rounded
+
+if TYPE_CHECKING:
+    from exfit.dsp.features import Features
+    from exfit.features.compare.agreement import Agreement
 
 FEWEST_CURVES = 2  # without a record
 
@@ -87,16 +95,7 @@ def compare(
     choice = ColumnChoice(_columns(columns), time)
     agreement = compared(curves, record, choice, _shifts(shifts), align, step_at)
     figures = write_agreement(agreement, folder)
-    if output.as_json:
-        print_json(agreement.as_json())
-    elif output.shown:
-        from exfit.features.compare.agreement_blocks import agreement as blocks_of
-        from exfit.show import terminal
-
-        console = terminal.console()
-        terminal.show(console, blocks_of(agreement))
-        terminal.written(console, folder)
-    output.draw(figures)
+    output.show(agreement.as_json(), blocks_of(agreement), folder, figures)
 
 
 def _shifts(texts: tuple[str, ...]) -> dict[str, float]:
@@ -126,3 +125,61 @@ def _columns(texts: tuple[str, ...]) -> dict[str, list[str]]:
             raise ExfitError(f"--columns {text}: not of the form vt=VOLT")
         columns.setdefault(signal, []).append(column)
     return columns
+
+
+def blocks_of(result: "Agreement") -> Iterator[Block]:
+    """Yield the differences of responses and a record, features of their step, fitted values."""
+    from exfit.dsp.features import LABELS
+    from exfit.features.compare.curves import RECORD
+    from exfit.show.series import rows_table, side_by_side
+
+    files = []
+    for curve in result.curves:
+        moved = f", shifted by {curve.shift:.6g} s" if curve.shift else ""
+        files.append(row(curve.name, f"{curve.path}{moved}"))
+    yield Table(columns("curve", "file"), tuple(files))
+    differences = []
+    for entry in result.differences:
+        value, at = entry.largest
+        finals = ", ".join(number(value) for value in reversed(entry.finals))
+        cells = (f"{entry.rms:.3e}", f"{value:+.3e}", f"{at:.4g} s", finals)
+        differences.append(row(entry.signal, f"{entry.second} - {entry.first}", *cells))
+    heads = ("rms", "largest", "at")
+    columns_of_both = columns("signal", "pu", *heads, "final values", numbers=heads)
+    yield Table(columns_of_both, tuple(differences))
+    matches = []
+    for entry in result.from_reference:
+        texts = (f"{entry.f:.4e}", f"{entry.rmse:.3e}", percentage(entry.fit_percent))
+        matches.append(row(entry.second, entry.signal, *texts, str(entry.count)))
+    whose = "the record" if result.from_reference[0].first == RECORD else "A"
+    counted = ("f, pu²", "rmse, pu", "fit, %", "samples")
+    yield Table(
+        columns("", "signal", *counted, numbers=counted),
+        tuple(matches),
+        f"against {whose}: f, half the sum of squares over the samples",
+    )
+    if result.features and result.step_at is not None:
+        rows = [
+            (label, unit, tuple(_feature(features, key) for features in result.features.values()))
+            for label, key, unit in LABELS
+        ]
+        title = f"{result.judged} after the step at {result.step_at:.4g} s"
+        yield rows_table([*result.features], rows, title)
+    if len(result.results) > 1:
+        yield from side_by_side(result.results, models=True)
+    yield from notes(result.notes)
+    time = result.differences[0].time
+    yield paragraph(f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} instants")
+    worst = max(result.differences, key=lambda difference: difference.interpolation)
+    if worst.interpolation:
+        yield paragraph(
+            f"between samples: a cubic, up to {worst.interpolation:.1e} pu from a straight line "
+            f"({worst.signal})"
+        )
+
+
+def _feature(features: "Features", key: str) -> str:
+    """Write a feature; of a record with half of its 95 % interval."""
+    half = features.errors.get(key)
+    text = rounded(getattr(features, key), half)
+    return text if half is None else f"{text} +- {half:.2g}"

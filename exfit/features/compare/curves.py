@@ -1,24 +1,29 @@
-"""Responses as curves, whatever program they are from."""
+"""Responses as curves, whatever program they are from, and their differences on one clock."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.features import TAIL
 from exfit.errors import RecordError
 from exfit.records.clock import Clock, check_finite, check_increasing
 from exfit.records.formats import RecordTable, open_table
 from exfit.records.formats.table import listed, refuse_uneven
 from exfit.records.units import needs_base
+from exfit.results.comparisons import Overlay
 from exfit.signals import COMPARED
+from exfit.util.file_names import WHOLE_FIT
 
 Array = NDArray[np.float64]
 
 SIMULATED, MEASURED = "_simulated", "_measured"  # behind a signal in the table of a fit
 RECORD = "record"  # the name of the curve that was measured
+FEWEST_IN_COMMON = 2  # instants
+SAME_INSTANT = 1e-9  # s: whatever the digits of a file
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,38 +73,38 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
     """
     path = _table_of(source)
     table = open_table(path)
-    header, clock = table.names, _clock(table, choice.time)
+    column = _chosen(table, choice.time)
+    clock = table.clock if column is None else (column,)
+    if not clock:
+        raise RecordError(
+            f"{path}: no column seems to be the time; --time names one: {listed(table.names)}"
+        )
     ending = MEASURED if name == RECORD else SIMULATED
     chosen = {signal: _chosen(table, names) for signal, names in choice.columns.items()}
     places = {signal: column for signal, column in chosen.items() if column is not None}
     for signal in COMPARED:
-        convention = [column for column in (signal, signal + ending) if column in header]
-        if convention:
-            places.setdefault(signal, convention[0])
-    _refuse_other_units(table, places)
-    columns = table.numbers(places.values(), frozenset(places.values()))
-    time = table.instants(clock)
-    refuse_uneven(path, {clock[0]: time} | columns)
-    _check_clock(table, clock, time)
-    last = np.append(np.diff(time) > 0.0, True)  # of instants that repeat, what holds from then on
-    signals = {signal: columns[column][last] for signal, column in places.items()}
-    return Curve(name, path, table.sha256, time[last], signals, header, int(np.sum(~last)))
-
-
-def _refuse_other_units(table: RecordTable, places: Mapping[str, str]) -> None:
-    """Raise a RecordError for a column that its file says is not per unit."""
+        usual = [column for column in (signal, signal + ending) if column in table.names]
+        if usual:
+            places.setdefault(signal, usual[0])
     for signal, column in places.items():
         unit = table.units.get(column)
         if unit is not None and needs_base(unit):
-            raise RecordError(
-                f"{table.path}: column {column!r} is in {unit}, {signal} is compared in pu"
-            )
+            raise RecordError(f"{path}: column {column!r} is in {unit}, {signal} is compared in pu")
+    columns = table.numbers(places.values(), frozenset(places.values()))
+    time = table.instants(clock)
+    refuse_uneven(path, {clock[0]: time} | columns)
+    label = Clock(clock).label
+    check_finite(time, label, table.place)
+    check_increasing(time, label, table.place, may_repeat=True)
+    last = np.append(np.diff(time) > 0.0, True)  # of instants that repeat, what holds from then on
+    signals = {signal: columns[column][last] for signal, column in places.items()}
+    return Curve(name, path, table.sha256, time[last], signals, table.names, int(np.sum(~last)))
 
 
 def _table_of(source: Path) -> Path:
     """Return the table of a run, or the file itself; raises RecordError where there is none."""
-    folder = source.parent if source.name == "result.json" else source
-    if source.name != "result.json" and not source.is_dir():
+    folder = source.parent if source.name == WHOLE_FIT else source
+    if source.name != WHOLE_FIT and not source.is_dir():
         return source
     if (folder / "response.csv").is_file():
         return folder / "response.csv"
@@ -123,25 +128,6 @@ def _chosen(table: RecordTable, names: Sequence[str]) -> str | None:
     return columns[0] if columns else None
 
 
-def _clock(table: RecordTable, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the columns with the time: the one that is named, else those that seem to hold it."""
-    column = _chosen(table, names)
-    if column is not None:
-        return (column,)
-    if not table.clock:
-        raise RecordError(
-            f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
-        )
-    return table.clock
-
-
-def _check_clock(table: RecordTable, clock: Sequence[str], time: Array) -> None:
-    """Raise a RecordError where time is not finite or goes back; an instant may repeat."""
-    label = Clock(tuple(clock)).label
-    check_finite(time, label, table.place)
-    check_increasing(time, label, table.place, may_repeat=True)
-
-
 def refuse_unknown(choice: ColumnChoice, curves: Sequence[Curve]) -> None:
     """Raise a RecordError for a column that is named and in no file."""
     headers = {name for curve in curves for name in curve.columns}
@@ -150,3 +136,164 @@ def refuse_unknown(choice: ColumnChoice, curves: Sequence[Curve]) -> None:
         if column not in headers:
             held = "; ".join(f"{curve.path} has {listed(curve.columns)}" for curve in curves)
             raise RecordError(f"no file has a column {column!r}; {held}")
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """What a signal of ``second`` is above that of ``first``, (M,) per unit at ``time`` (M,) in s.
+
+    ``values`` are the two signals (2, M); ``interpolation`` is by how much, at most, a cubic and
+    a straight line between the samples of the coarser clock differ: 0 on a common one.
+    """
+
+    signal: str
+    first: str
+    second: str
+    time: Array
+    values: Array
+    interpolation: float
+
+    @property
+    def error(self) -> Array:
+        """The difference itself."""
+        return np.asarray(self.values[1] - self.values[0])
+
+    @property
+    def count(self) -> int:
+        """How many instants have samples of both."""
+        return int(np.count_nonzero(np.isfinite(self.error)))
+
+    @property
+    def f(self) -> float:
+        """Half the sum of its squares over these instants, pu²: it grows with their number."""
+        return 0.5 * float(np.nansum(self.error**2))
+
+    @property
+    def rmse(self) -> float:
+        """Its root mean square over these instants, per unit."""
+        return Overlay(*self.values).rmse
+
+    @property
+    def fit_percent(self) -> float:
+        """100 (1 - |difference| / |first - its mean|): 100 is perfect, 0 as bad as a constant."""
+        return Overlay(*self.values).fit_percent
+
+    @property
+    def rms(self) -> float:
+        """Its root mean square over time, per unit."""
+        kept, steps = np.isfinite(self.error), np.diff(self.time)
+        # each instant stands for half the way to its neighbours
+        weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+        mean = np.average(self.error[kept] ** 2, weights=weights[kept])
+        return float(np.sqrt(mean))
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Its value where it is largest, with its sign, and when, s."""
+        k = int(np.nanargmax(np.abs(self.error)))
+        return float(self.error[k]), float(self.time[k])
+
+    @property
+    def finals(self) -> tuple[float, float]:
+        """The final values of both: means over the last twentieth of the time that both show."""
+        kept = np.isfinite(self.error)
+        time = self.time[kept]
+        tail = time >= time[-1] - TAIL * (time[-1] - time[0])
+        means = np.mean(self.values[:, kept][:, tail], axis=1)
+        return float(means[0]), float(means[1])
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures, without the samples."""
+        value, at = self.largest
+        first, second = self.finals
+        return {
+            "signal": self.signal,
+            "difference": f"{self.second} - {self.first}",
+            "f": self.f,
+            "rmse": self.rmse,
+            "fit_percent": self.fit_percent,
+            "samples": self.count,
+            "rms": self.rms,
+            "largest": value,
+            "largest_at": at,
+            f"final_{self.first}": first,
+            f"final_{self.second}": second,
+            "interpolation": self.interpolation,
+            "from": float(self.time[0]),
+            "until": float(self.time[-1]),
+            "instants": len(self.time),
+        }
+
+
+def differences(curves: Sequence[Curve], signals: Sequence[str]) -> list[Difference]:
+    """Subtract the first from the other responses, then the record where there is one.
+
+    The first are on the finest of their clocks over the time that all responses cover, the others
+    at the instants of the record in that time. Not all curves need to have all of the signals.
+    Raises RecordError where they share no time.
+    """
+    responses = [curve for curve in curves if not curve.measured]
+    finest = max((_covered(curve.time, responses) for curve in responses), key=len)
+    _refuse_apart(finest, responses)
+    pairs = [(responses[0], second, finest) for second in responses[1:]]
+    for record in curves[len(responses) :]:
+        instants = _covered(record.time, curves)
+        _refuse_apart(instants, curves)
+        pairs += [(record, second, instants) for second in responses]
+    return [
+        _difference(signal, first, second, time)
+        for first, second, time in pairs
+        for signal in signals
+        if signal in first.signals and signal in second.signals
+    ]
+
+
+def _covered(time: Array, curves: Sequence[Curve]) -> Array:
+    """Return those of the instants (M,) that all curves cover."""
+    begin = max(float(curve.time[0]) for curve in curves) - SAME_INSTANT
+    end = min(float(curve.time[-1]) for curve in curves) + SAME_INSTANT
+    return np.asarray(time[(time >= begin) & (time <= end)])
+
+
+def _refuse_apart(time: Array, curves: Sequence[Curve]) -> None:
+    """Raise RecordError where curves have no time in common, or hardly any."""
+    if len(time) < FEWEST_IN_COMMON:
+        spans = (f"{curve.path}: {curve.time[0]:g} ... {curve.time[-1]:g} s" for curve in curves)
+        raise RecordError(
+            f"no time in common: {', '.join(spans)}; --align puts the steps together, "
+            "--shift B=SECONDS moves the time of one"
+        )
+
+
+def _difference(signal: str, first: Curve, second: Curve, time: Array) -> Difference:
+    """Return the difference of a signal at some instants."""
+    read = [_at(time, curve.time, curve.signals[signal]) for curve in (first, second)]
+    values = np.stack([samples for samples, _ in read])
+    if not np.isfinite(values).all(axis=0).any():
+        both = f"{first.path} and {second.path}"
+        raise RecordError(f"{both}: {signal}: no instant has samples of both")
+    return Difference(signal, first.name, second.name, time, values, max(bend for _, bend in read))
+
+
+def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
+    """Return samples read at other instants, and by how much cubic and straight lines differ.
+
+    Nothing is read across a sample that is left out.
+    """
+    nearest = np.clip(np.searchsorted(clock, time - SAME_INSTANT), 0, len(clock) - 1)
+    exact = np.abs(clock[nearest] - time) <= SAME_INSTANT
+    read = np.where(exact, samples[nearest], np.nan)
+    if exact.all():
+        return read, 0.0
+    from scipy.interpolate import Akima1DInterpolator
+
+    straight = np.interp(time, clock, samples)
+    kept = np.isfinite(samples)
+    if np.count_nonzero(kept) <= FEWEST_IN_COMMON:
+        return np.where(exact, read, straight), 0.0
+    cubic = Akima1DInterpolator(clock[kept], samples[kept], method="makima")(
+        np.clip(time, clock[kept][0], clock[kept][-1])
+    )
+    between = ~exact & np.isfinite(straight)
+    read = np.where(between, cubic, read)
+    return read, float(np.max(np.abs(cubic - straight)[between], initial=0.0))

@@ -23,7 +23,7 @@ from exfit.signals import label_of
 
 if TYPE_CHECKING:
     from exfit.features.compare.agreement import Agreement
-    from exfit.features.compare.differences import Difference
+    from exfit.features.compare.curves import Difference
 
 
 OF_TWO = ((START, "-"), (SIMULATED, "--"))
