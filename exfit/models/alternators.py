@@ -1,8 +1,8 @@
 """What alternator exciters share since IEEE Std 421.5-2016: the machine, the supply."""
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     Limited,
+    Signal,
     compound_source,
     field_ceiling,
     limited_integrator,
@@ -10,20 +10,18 @@ from exfit.models.blocks import (
     smaller,
     where,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import sheet
+from exfit.models.sheet import UP_TO_100, shared, sheet
 
 # the limits of the alternator that the edition of 2016 gave to all its types, out of reach
-FLOOR = sheet(*shared(VEMIN=0.0))
+FLOOR = shared(VEMIN=0.0)
 FIELD_LIMITS = (
-    *sheet(*shared(VFEMAX=99.0)),
+    *shared(VFEMAX=99.0),
     *FLOOR,
 )
 # the source of the regulator's power stage: terminal voltage alone, and a ceiling 1.5 times that
 SUPPLY = sheet(
-    ("SW1", 1.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
-    *shared(KP=1.0, KI=0.0, XL=0.0, THETAP=0.0),
-    ("KC1", 0.05, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
+    *shared(SW1=1.0, KP=1.0, KI=0.0, XL=0.0, THETAP=0.0),
+    ("KC1", 0.05, *UP_TO_100, "loading factor of the supply's rectifier"),
     *shared(VBMAX=1.5),
 )
 

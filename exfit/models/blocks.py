@@ -6,61 +6,22 @@ A block with a non-windup limit returns its slope as ``Limited``: held at the li
 put back on it after every step, so that a response has no jags where a step ends beyond the limit.
 """
 
-from math import inf, radians
+from math import inf as inf
+from math import radians
 from math import sqrt as root
 from typing import NamedTuple
 
-from exfit.engine.trace import Signal, clip, cos, exp, larger, log, sin, smaller, sqrt, where
+from exfit.engine.trace import Signal as Signal
+from exfit.engine.trace import clip as clip
+from exfit.engine.trace import cos as cos
+from exfit.engine.trace import exp as exp
+from exfit.engine.trace import larger as larger
+from exfit.engine.trace import log as log
+from exfit.engine.trace import sin as sin
+from exfit.engine.trace import smaller as smaller
+from exfit.engine.trace import sqrt as sqrt
+from exfit.engine.trace import where as where
 from exfit.models.phasors import modulus
-
-__all__ = [
-    "SHORTEST",
-    "CommutatorStart",
-    "Limited",
-    "Saturation",
-    "clip",
-    "closed",
-    "commutator_start",
-    "compound_source",
-    "cos",
-    "exciter",
-    "exciter_demand",
-    "exp",
-    "exponential",
-    "exponential_se",
-    "field_ceiling",
-    "field_demand",
-    "high_pass",
-    "inf",
-    "integrator",
-    "is_curved",
-    "lag",
-    "larger",
-    "lead_lag",
-    "limited",
-    "limited_integrator",
-    "limited_lag",
-    "limited_lead_lag",
-    "log",
-    "pi",
-    "pi_rest",
-    "pid",
-    "quadratic",
-    "rate",
-    "rectifier",
-    "rectifier_supply",
-    "regulator_output",
-    "second_order",
-    "second_order_lead",
-    "sin",
-    "smaller",
-    "source_voltage",
-    "sqrt",
-    "washout",
-    "washout_or_lag",
-    "where",
-    "zero",
-]
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
 SQRT3 = root(3.0)

@@ -2,8 +2,15 @@
 
 from math import inf
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import commutator_start, exciter, lag, lead_lag, limited_lag, washout
+from exfit.models.blocks import (
+    Signal,
+    commutator_start,
+    exciter,
+    lag,
+    lead_lag,
+    limited_lag,
+    washout,
+)
 
 COMMUTATOR_STATES = "VC VL VR EFD VF"
 COMMUTATOR_SETPOINTS = "KE0 VRMAX0 VRMIN0"

@@ -1,7 +1,6 @@
 """The supply of exciters that voltage and current of the terminals feed, or nothing does."""
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import compound_source, rectifier, where
+from exfit.models.blocks import Signal, compound_source, rectifier, where
 
 
 def supply(u: Signal, p: Signal) -> Signal:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
@@ -36,6 +37,18 @@ REGULATOR_LAG = SearchRange(high=1.0)
 EXCITER_LAG = SearchRange(low=0.02, high=10.0)
 LAG_OF_KF = SearchRange(needs="KF")
 LEAD_OF_TB, LAG_OF_TC = SearchRange(unlike="TB"), SearchRange(unlike="TC")
+
+# units and ranges of many rows: limits, gains, and times, of which 0 leaves out a lag or a lead
+LIMIT = ("pu", (-9999.0, 9999.0))
+WITHIN_10, WITHIN_1000 = ("pu", (-10.0, 10.0)), ("pu", (-1000.0, 1000.0))
+WITHIN_10000 = ("pu", (-10000.0, 10000.0))
+UP_TO_10, UP_TO_100 = ("pu", (0.0, 10.0)), ("pu", (0.0, 100.0))
+UP_TO_1000, UP_TO_10000 = ("pu", (0.0, 1000.0)), ("pu", (0.0, 10000.0))
+GAIN, PID_GAIN = ("pu", (0.01, 100000.0)), ("pu", (0.0, 100000.0))
+INTEGRAL_GAIN = ("pu/s", (0.0, 100000.0))
+SHORT_TIME, TIME, LONG_TIME = ("s", (0.0, 10.0)), ("s", (0.0, 100.0)), ("s", (0.0, 1000.0))
+POSITIVE_TIME, WASHOUT_TIME = ("s", (0.01, 100.0)), ("s", (0.01, 1000.0))
+DIVIDING_TIME = ("s", (0.001, 100.0))
 
 
 class Parameter(NamedTuple):
@@ -111,15 +124,115 @@ def sheet(*rows: Row | Parameter) -> Sheet:
     """Make the data sheet of rows (symbol, typical value, unit, (low, high), meaning).
 
     FREE, or another range of search, behind the meaning marks what a bump test is fitted for.
-    Rows that exciters share stand among them as ``*shared(TR=0.0, KA=46.0)`` (`exfit.models.rows`).
+    Rows that exciters share stand among them as ``*shared(TR=0.0, KA=46.0)``.
     """
-    return tuple(row if isinstance(row, Parameter) else _parameter(*row) for row in rows)
+    made: list[Parameter] = []
+    for row in rows:
+        if not isinstance(row, Parameter):
+            symbol, typical, unit, limits, *described = row
+            row = Parameter(symbol, typical, unit, *limits, *described)
+        made.append(row)
+    return tuple(made)
 
 
-def _parameter(
-    symbol: str, typical: float, unit: str, limits: Limits, meaning: str, *search: SearchRange
-) -> Parameter:
-    return Parameter(symbol, typical, unit, *limits, meaning, *search)
+def chosen(table: Sheet, **typical: float) -> Sheet:
+    """Take rows of a table by their names, each with the typical value of this model, ``KA=46.0``.
+
+    A name is a symbol, followed by _ and a word where the symbol has several meanings.
+
+    Raises KeyError for a name that is not in the table.
+    """
+    rows = {row.symbol: row for row in table}
+    return tuple(
+        rows[name]._replace(symbol=name.partition("_")[0], typical=value)
+        for name, value in typical.items()
+    )
+
+
+# rows that exciters share by name: the unit, the range and the meaning of each
+SHARED = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 0.0, *GAIN, "regulator gain", FREE),
+    ("TA", 0.0, *SHORT_TIME, "regulator time constant", REGULATOR_LAG),
+    ("TB", 0.0, *TIME, "regulator lag"),
+    ("TC", 0.0, *TIME, "regulator lead"),
+    ("VRMAX", 0.0, *LIMIT, "regulator ceiling"),
+    ("VRMIN", 0.0, *LIMIT, "regulator floor"),
+    ("KE", 0.0, *UP_TO_10, "exciter constant"),
+    ("TE", 0.0, *POSITIVE_TIME, "exciter time constant", EXCITER_LAG),
+    ("KF", 0.0, *UP_TO_10, "stabilising feedback gain", FEEDBACK),
+    ("TF", 0.0, *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
+    ("E1", 0.0, *UP_TO_100, "first voltage of the saturation curve"),
+    ("SE1", 0.0, *UP_TO_100, "saturation at E1"),
+    ("E2", 0.0, *UP_TO_100, "second voltage of the saturation curve"),
+    ("SE2", 0.0, *UP_TO_100, "saturation at E2"),
+    ("KC", 0.0, *UP_TO_100, "rectifier loading factor"),
+    ("KD", 0.0, *UP_TO_100, "demagnetising factor", DEMAGNETISING),
+    ("VEMIN", 0.0, *LIMIT, "floor of the exciter voltage"),
+    ("KP", 0.0, "pu", (0.01, 100.0), "potential source gain"),
+    ("KI", 0.0, *UP_TO_100, "current source gain, on load"),
+    ("XL", 0.0, *UP_TO_10, "reactance of the potential source, on load"),
+    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    ("VBMAX", 0.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    ("VFEMAX", 0.0, *LIMIT, "ceiling of the exciter's field current"),
+    ("VAMAX", 0.0, *LIMIT, "regulator ceiling"),
+    ("VAMIN", 0.0, *LIMIT, "regulator floor"),
+    ("KIR", 0.0, *INTEGRAL_GAIN, "integral gain", FREE),
+    ("TDR", 0.0, *SHORT_TIME, "lag of the derivative", SearchRange(needs="KDR")),
+    ("VIMAX", 0.0, *LIMIT, "ceiling of the voltage error"),
+    ("VIMIN", 0.0, *LIMIT, "floor of the voltage error"),
+    ("TF1", 0.0, *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
+    ("KG", 0.0, *UP_TO_100, "feedback gain of the field voltage loop"),
+    ("EFDMAX", 0.0, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+    ("EFDN", 0.0, *UP_TO_100, "field voltage where the feedback gain changes"),
+    ("K", 0.0, *GAIN, "regulator gain", FREE),
+    ("KA_FIXED", 0.0, "pu", (0.0001, 100000.0), "regulator gain"),
+    ("KB", 0.0, "pu", (0.01, 10000.0), "second stage gain", FREE),
+    ("KC_FREE", 0.0, *UP_TO_100, "rectifier loading factor", LOADING),
+    ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
+    ("KD_OF_PID", 0.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
+    ("KE_ABOVE_0", 0.0, "pu", (0.01, 10.0), "exciter constant"),
+    ("KE_OR_0", 0.0, *WITHIN_10, "exciter constant, or 0"),
+    ("KE_SIGNED", 0.0, *WITHIN_10, "exciter constant"),
+    ("KF_FIXED", 0.0, *UP_TO_10, "stabilising feedback gain"),
+    ("KF_TO_EFDN", 0.0, *UP_TO_10, "stabilising feedback gain up to EFDN", FEEDBACK),
+    ("KH", 0.0, *UP_TO_100, "feedback gain of the exciter's field current", FREE),
+    ("KIR_OF_REGULATOR", 0.0, *INTEGRAL_GAIN, "integral gain of the regulator", FREE),
+    ("KI_OF_PID", 0.0, *INTEGRAL_GAIN, "integral gain", FREE),
+    ("KLR", 0.0, *UP_TO_1000, "field current limiter gain"),
+    ("KN", 0.0, *UP_TO_10, "stabilising feedback gain beyond EFDN"),
+    ("KPR", 0.0, *PID_GAIN, "proportional gain", FREE),
+    ("KPR_OF_REGULATOR", 0.0, *PID_GAIN, "proportional gain of the regulator", FREE),
+    ("KP_OF_PID", 0.0, *PID_GAIN, "proportional gain", FREE),
+    ("KP_OR_0", 0.0, *UP_TO_100, "potential source gain"),
+    ("KR", 0.0, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
+    ("SW1", 0.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
+    ("TATB", 0.0, "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
+    ("TA_FIXED", 0.0, *SHORT_TIME, "regulator time constant"),
+    ("TA_OF_FIRING", 0.0, *SHORT_TIME, "firing circuit time constant", FREE),
+    ("TB_ALONE", 0.0, *TIME, "regulator lag", FREE),
+    ("TB_FREE", 0.0, *TIME, "regulator lag", LAG_OF_TC),
+    ("TC_FREE", 0.0, *TIME, "regulator lead", LEAD_OF_TB),
+    ("TD", 0.0, *SHORT_TIME, "lag of the derivative", SearchRange(needs="KD")),
+    ("TE_OR_0", 0.0, *SHORT_TIME, "exciter time constant", EXCITER_LAG),
+    ("TF2", 0.0, *TIME, "stabilising feedback lag"),
+    ("VEMAX", 0.0, *LIMIT, "ceiling of the exciter voltage"),
+    ("VGMAX", 0.0, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
+    ("VMMAX", 0.0, *LIMIT, "ceiling of the field voltage loop"),
+    ("VMMIN", 0.0, *LIMIT, "floor of the field voltage loop"),
+    ("VPIDMAX", 0.0, *LIMIT, "ceiling of the PID"),
+    ("VPIDMIN", 0.0, *LIMIT, "floor of the PID"),
+    ("VRMAX_AT_VT_OR_0", 0.0, *LIMIT, "regulator ceiling at rated voltage, or 0"),
+    ("VRMAX_OF_EFD", 0.0, *LIMIT, "ceiling of the field voltage"),
+    ("VRMAX_OF_EFD_AT_VT", 0.0, *LIMIT, "ceiling of the field voltage at rated voltage"),
+    ("VRMAX_OF_EXCITER", 0.0, *LIMIT, "ceiling of the exciter's field voltage"),
+    ("VRMAX_OR_0", 0.0, *LIMIT, "regulator ceiling, or 0"),
+    ("VRMIN_AT_VT", 0.0, *LIMIT, "regulator floor at rated voltage"),
+    ("VRMIN_OF_EFD", 0.0, *LIMIT, "floor of the field voltage"),
+    ("VRMIN_OF_EFD_AT_VT", 0.0, *LIMIT, "floor of the field voltage at rated voltage"),
+    ("VRMIN_OF_EXCITER", 0.0, *LIMIT, "floor of the exciter's field voltage"),
+)
+shared = partial(chosen, SHARED)
 
 
 def renamed(rows: Sheet, **symbols: str) -> Sheet:

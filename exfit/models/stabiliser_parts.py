@@ -1,34 +1,65 @@
 """What stabilisers share: a signal of the accelerating power, a canonical form, the switch."""
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, high_pass, lag, lead_lag, limited, where
-from exfit.models.sheet import sheet
+from functools import partial
+
+from exfit.models.blocks import Signal, clip, high_pass, lag, lead_lag, limited, where
+from exfit.models.sheet import (
+    DIVIDING_TIME,
+    LIMIT,
+    LONG_TIME,
+    TIME,
+    WASHOUT_TIME,
+    WITHIN_10,
+    WITHIN_1000,
+    WITHIN_10000,
+    chosen,
+    sheet,
+)
 
 SWITCHING = 0.01  # s, in which the state of the switch goes from one end to the other
 
+# rows that stabilisers share by name
+SHARED = sheet(
+    ("T1", 0.0, *TIME, "first lead"),
+    ("T2", 0.0, *TIME, "first lag"),
+    ("T3", 0.0, *TIME, "second lead"),
+    ("T4", 0.0, *TIME, "second lag"),
+    ("LSMAX", 0.0, *LIMIT, "ceiling of the output"),
+    ("LSMIN", 0.0, *LIMIT, "floor of the output"),
+    ("VSTMAX", 0.0, *LIMIT, "ceiling of the output"),
+    ("VSTMIN", 0.0, *LIMIT, "floor of the output"),
+    ("KS1", 0.0, *WITHIN_10000, "stabiliser gain"),
+    ("T10", 0.0, *TIME, "third lead"),
+    ("T11", 0.0, *TIME, "third lag"),
+    ("T1_OF_INPUT", 0.0, *TIME, "transducer lag of the first input"),
+    ("T2_OF_INPUT", 0.0, *TIME, "transducer lag of the second input"),
+    ("HLIM", 0.0, "pu", (0.0001, 9999.0), "limit of the output, both ways"),
+)
+of_stabiliser = partial(chosen, SHARED)
+
 ACCELERATING = sheet(
-    ("TW1", 10.0, "s", (0.01, 1000.0), "first washout of the first input"),
-    ("TW2", 10.0, "s", (0.0, 1000.0), "second washout of the first input"),
-    ("T6", 0.0, "s", (0.0, 100.0), "transducer lag of the first input"),
-    ("TW3", 10.0, "s", (0.01, 1000.0), "first washout of the second input"),
-    ("TW4", 0.0, "s", (0.0, 1000.0), "second washout of the second input"),
-    ("T7", 10.0, "s", (0.0, 1000.0), "transducer lag of the second input"),
-    ("KS2", 0.99, "pu", (-1000.0, 1000.0), "gain of the second input"),
-    ("KS3", 1.0, "pu", (-1000.0, 1000.0), "share of the second input that is filtered"),
-    ("T8", 0.5, "s", (0.0, 100.0), "lead of the ramp tracking filter"),
-    ("T9", 0.1, "s", (0.001, 100.0), "lag of the ramp tracking filter"),
+    ("TW1", 10.0, *WASHOUT_TIME, "first washout of the first input"),
+    ("TW2", 10.0, *LONG_TIME, "second washout of the first input"),
+    ("T6", 0.0, *TIME, "transducer lag of the first input"),
+    ("TW3", 10.0, *WASHOUT_TIME, "first washout of the second input"),
+    ("TW4", 0.0, *LONG_TIME, "second washout of the second input"),
+    ("T7", 10.0, *LONG_TIME, "transducer lag of the second input"),
+    ("KS2", 0.99, *WITHIN_1000, "gain of the second input"),
+    ("KS3", 1.0, *WITHIN_1000, "share of the second input that is filtered"),
+    ("T8", 0.5, *TIME, "lead of the ramp tracking filter"),
+    ("T9", 0.1, *DIVIDING_TIME, "lag of the ramp tracking filter"),
     ("M", 5.0, "1", (1.0, 5.0), "number of lags of a block of the ramp tracking filter"),
     ("N", 1.0, "1", (1.0, 4.0), "number of blocks of the ramp tracking filter"),
 )
 
 CANONICAL = sheet(
-    ("K0", 1.0, "pu", (-1000.0, 1000.0), "gain of the input of the first integrator"),
-    ("K1", 1.0, "pu", (-1000.0, 1000.0), "gain of the output of the first integrator"),
-    ("K2", 1.0, "pu", (-1000.0, 1000.0), "gain of the output of the second integrator"),
-    ("K3", 1.0, "pu", (-1000.0, 1000.0), "gain of the output of the third integrator"),
-    ("K4", 0.0, "pu", (-1000.0, 1000.0), "gain of the output of the fourth integrator"),
-    ("KI3", 1.0, "pu", (-1000.0, 1000.0), "gain of the third integrator"),
-    ("KI4", 0.0, "pu", (-1000.0, 1000.0), "gain of the fourth integrator"),
+    ("K0", 1.0, *WITHIN_1000, "gain of the input of the first integrator"),
+    ("K1", 1.0, *WITHIN_1000, "gain of the output of the first integrator"),
+    ("K2", 1.0, *WITHIN_1000, "gain of the output of the second integrator"),
+    ("K3", 1.0, *WITHIN_1000, "gain of the output of the third integrator"),
+    ("K4", 0.0, *WITHIN_1000, "gain of the output of the fourth integrator"),
+    ("KI3", 1.0, *WITHIN_1000, "gain of the third integrator"),
+    ("KI4", 0.0, *WITHIN_1000, "gain of the fourth integrator"),
     ("TI1", 0.1, "s", (0.001, 1000.0), "time constant of the first integrator"),
     ("TI2", 0.1, "s", (0.001, 1000.0), "time constant of the second integrator"),
     ("TI3", 1.0, "s", (0.001, 1000.0), "time constant of the third integrator"),
@@ -36,15 +67,15 @@ CANONICAL = sheet(
 )
 
 INPUT_LIMITS = sheet(
-    ("VSI1MAX", 2.0, "pu", (-9999.0, 9999.0), "ceiling of the first input"),
-    ("VSI1MIN", -2.0, "pu", (-9999.0, 9999.0), "floor of the first input"),
-    ("VSI2MAX", 2.0, "pu", (-9999.0, 9999.0), "ceiling of the second input"),
-    ("VSI2MIN", -2.0, "pu", (-9999.0, 9999.0), "floor of the second input"),
+    ("VSI1MAX", 2.0, *LIMIT, "ceiling of the first input"),
+    ("VSI1MIN", -2.0, *LIMIT, "floor of the first input"),
+    ("VSI2MAX", 2.0, *LIMIT, "ceiling of the second input"),
+    ("VSI2MIN", -2.0, *LIMIT, "floor of the second input"),
 )
 
 SWITCH = sheet(
-    ("PPSSON", 0.0, "pu", (-10.0, 10.0), "power at which it is switched on, or 0"),
-    ("PPSSOFF", 0.0, "pu", (-10.0, 10.0), "power at which it is switched off"),
+    ("PPSSON", 0.0, *WITHIN_10, "power at which it is switched on, or 0"),
+    ("PPSSOFF", 0.0, *WITHIN_10, "power at which it is switched off"),
 )
 
 

@@ -1,29 +1,16 @@
 """What static exciters share from IEEE Std 421.5-2016 on: supply and PID."""
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import compound_source, rectifier, smaller, where
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, sheet
+from exfit.models.blocks import Signal, compound_source, rectifier, smaller, where
+from exfit.models.sheet import shared
 
-SUPPLY_SWITCH = sheet(
-    ("SW1", 1.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
-)
+SUPPLY_SWITCH = shared(SW1=1.0)
 # a source of the terminals' voltage alone, and a ceiling 1.5 times that
 SUPPLY = (
     *SUPPLY_SWITCH,
-    *sheet(
-        *shared(KP=1.0, KI=0.0, XL=0.0, THETAP=0.0, KC=0.05, VBMAX=1.5),
-    ),
+    *shared(KP=1.0, KI=0.0, XL=0.0, THETAP=0.0, KC=0.05, VBMAX=1.5),
 )
 # a PI with a small derivative, in front of the gain of the edition of 2005, which then stays fixed
-PID = sheet(
-    ("KPR", 1.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    *shared(KIR=0.5),
-    ("KDR", 0.02, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    *shared(TDR=0.1),
-    ("VPIDMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
-    ("VPIDMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
-)
+PID = shared(KPR=1.0, KIR=0.5, KDR=0.02, TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0)
 
 
 def supply(u: Signal, p: Signal) -> Signal:

@@ -9,7 +9,7 @@ from oracle import lively_values, system_of
 from exfit.errors import SimulationError
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.models.rows import ROWS as SHARED_ROWS
+from exfit.models.sheet import SHARED, shared
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
@@ -88,11 +88,12 @@ def test_an_integral_gain_of_the_other_sign_starts_from_rest(name, gain):
     assert np.max(np.abs(vt - vt[0])) < 1e-9
 
 
-@pytest.mark.parametrize("symbol", SHARED_ROWS)
-def test_a_shared_row_is_of_several_exciters(symbol):
+@pytest.mark.parametrize("name", [row.symbol for row in SHARED])
+def test_a_shared_row_is_of_several_exciters(name):
+    (shared_row,) = shared(**{name: 0.0})
     same = [
         name
         for name, model in MODELS.items()
-        if SHARED_ROWS[symbol] in [row._replace(typical=0.0) for row in model.sheet]
+        if shared_row in [row._replace(typical=0.0) for row in model.sheet]
     ]
     assert len(same) > 1

@@ -12,8 +12,8 @@ behind it is not: VA may exceed VRMAX. The gates of UEL and OEL, not drawn, are
 between the two.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_demand,
     lag,
@@ -24,17 +24,13 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import AS_IN_PSSE, LOADING, record, sheet
+from exfit.models.sheet import AS_IN_PSSE, record, shared, sheet
 
 ALIASES = ("ESAC1A",)
 
 SHEET = sheet(
     *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02, VAMAX=14.5, VAMIN=-14.5),
-    ("VRMAX", 6.03, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
-    ("VRMIN", -5.43, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    *shared(TE=0.8, KF=0.03, TF=1.0),
-    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    *shared(VRMAX_OF_EXCITER=6.03, VRMIN_OF_EXCITER=-5.43, TE=0.8, KF=0.03, TF=1.0, KC_FREE=0.2),
     *shared(KD=0.38, KE=1.0, E1=4.18, SE1=0.10, E2=3.14, SE2=0.03),
 )
 

@@ -17,9 +17,8 @@ The limiters act at the summing point (vsum) or at the gates. Dynawo and
 InterPSS draw the same.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
-from exfit.models.blocks import clip, field_demand, lag, lead_lag, limited_lag, washout
+from exfit.models.blocks import Signal, clip, field_demand, lag, lead_lag, limited_lag, washout
 from exfit.models.exciters import ac1a
 from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 

@@ -21,8 +21,8 @@ closes a loop that shortens the exciter's time constant, so at rest
 VA = VFE / KB + KH VFE.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_ceiling,
     field_demand,
@@ -34,21 +34,14 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import AS_IN_PSSE, FREE, LOADING, record, sheet
+from exfit.models.sheet import AS_IN_PSSE, record, shared, sheet
 
 ALIASES = ("ESAC2A",)
 
 SHEET = sheet(
-    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02, VAMAX=8.0, VAMIN=-8.0),
-    ("KB", 25.0, "pu", (0.01, 10000.0), "second stage gain", FREE),
-    ("VRMAX", 105.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
-    ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    *shared(TE=0.6, VFEMAX=4.4),
-    ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current", FREE),
-    *shared(KF=0.03, TF=1.0),
-    ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=0.35, KE=1.0, E1=4.4, SE1=0.037, E2=3.3, SE2=0.012),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02, VAMAX=8.0, VAMIN=-8.0, KB=25.0),
+    *shared(VRMAX_OF_EXCITER=105.0, VRMIN_OF_EXCITER=-95.0, TE=0.6, VFEMAX=4.4, KH=1.0, KF=0.03),
+    *shared(TF=1.0, KC_FREE=0.28, KD=0.35, KE=1.0, E1=4.4, SE1=0.037, E2=3.3, SE2=0.012),
 )
 
 RECORDS = (

@@ -25,9 +25,8 @@ the drawing of 2005, which differs in nothing else, the program InterPSS and the
 parameters that PowerWorld lists.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import FLOOR, alternator
-from exfit.models.blocks import clip, field_demand, lag, lead_lag, limited_lag, washout
+from exfit.models.blocks import Signal, clip, field_demand, lag, lead_lag, limited_lag, washout
 from exfit.models.exciters import ac2a
 from exfit.models.sheet import OF_TWO_PROGRAMS, record, renamed
 

@@ -21,8 +21,8 @@ VEMIN is 0.1 here; with 0, as in some copies of the sample data, VE stays at 0
 once it is there, since the regulator then has no supply.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_ceiling,
     field_demand,
@@ -36,20 +36,14 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FEEDBACK, LOADING, OF_A_LIST, record, sheet
+from exfit.models.sheet import OF_A_LIST, record, shared, sheet
 
 ALIASES = ("ESAC3A",)
 
 SHEET = sheet(
     *shared(TR=0.0, TB=0.0, TC=0.0, KA=45.62, TA=0.013, VAMAX=1.0, VAMIN=-0.95, TE=1.17, VEMIN=0.1),
-    ("KR", 3.77, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
-    ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN", FEEDBACK),
-    *shared(TF=1.0),
-    ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN"),
-    ("EFDN", 2.36, "pu", (0.0, 100.0), "field voltage where the feedback gain changes"),
-    ("KC", 0.104, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=0.499, KE=1.0, VFEMAX=16.0, E1=6.24, SE1=1.143, E2=4.68, SE2=0.1),
+    *shared(KR=3.77, KF_TO_EFDN=0.143, TF=1.0, KN=0.05, EFDN=2.36, KC_FREE=0.104, KD=0.499, KE=1.0),
+    *shared(VFEMAX=16.0, E1=6.24, SE1=1.143, E2=4.68, SE2=0.1),
 )
 
 RECORDS = (

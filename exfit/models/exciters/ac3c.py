@@ -29,8 +29,8 @@ here; with 0 VE stays at 0 once it is there, since the regulator then has no
 supply.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_ceiling,
     field_demand,
@@ -45,20 +45,17 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac3a
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, PID_GAIN, record, shared, sheet
 
 ALIASES = ("ESAC3C",)
 
 SHEET = (
     *ac3a.SHEET,
     *sheet(
-        ("KPR", 1.0, "pu", (0.0, 100000.0), "proportional gain"),
+        ("KPR", 1.0, *PID_GAIN, "proportional gain"),
         *shared(KIR=0.5),
         ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain"),
-        *shared(TDR=0.1),
-        ("VPIDMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
-        ("VPIDMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
+        *shared(TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0),
     ),
 )
 

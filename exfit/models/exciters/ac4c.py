@@ -17,8 +17,7 @@ the drawing of 2005 and the program InterPSS, which adds the gate of the OEL and
 where the limit of the lag winds up.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, limited_lag
+from exfit.models.blocks import Signal, clip, lag, lead_lag, limited_lag
 from exfit.models.exciters import ac4a
 from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record
 

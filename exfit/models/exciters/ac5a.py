@@ -20,10 +20,8 @@ where a record says 0. Copies of the sample data differ in TF2, TF3: 0.8
 and 0 here, 1 and 1 (which cancel) elsewhere.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import exciter, exciter_demand, lag, lead_lag, limited_lag, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import LAG_OF_KF, OF_A_LIST, REGULATOR_LAG, record, sheet
+from exfit.models.blocks import Signal, exciter, exciter_demand, lag, lead_lag, limited_lag, washout
+from exfit.models.sheet import LAG_OF_KF, OF_A_LIST, REGULATOR_LAG, TIME, record, shared, sheet
 
 ALIASES = ("ESAC5A",)
 
@@ -33,8 +31,8 @@ SHEET = sheet(
     *shared(VRMAX=7.3, VRMIN=-7.3),
     ("KE", 1.0, "pu", (0.001, 10.0), "exciter constant"),
     *shared(TE=0.8, KF=0.03, TF1=1.0),
-    ("TF2", 0.8, "s", (0.0, 100.0), "stabilising feedback lag", LAG_OF_KF),
-    ("TF3", 0.0, "s", (0.0, 100.0), "stabilising feedback lead"),
+    ("TF2", 0.8, *TIME, "stabilising feedback lag", LAG_OF_KF),
+    ("TF3", 0.0, *TIME, "stabilising feedback lead"),
     *shared(E1=5.6, SE1=0.86, E2=4.2, SE2=0.5),
 )
 

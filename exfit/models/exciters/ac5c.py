@@ -23,9 +23,9 @@ the parameters that PowerWorld lists. The rectifier is that of PowerWorld 24 (vt
 1e-6 pu over a fault); the gates rest on InterPSS alone.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_demand,
     lag,

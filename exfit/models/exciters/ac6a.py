@@ -21,8 +21,8 @@ are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. UEL and OEL are added
 to vs.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_demand,
     lag,
@@ -32,28 +32,34 @@ from exfit.models.blocks import (
     rectifier,
     rectifier_supply,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, LOADING, OF_A_LIST, record, sheet
+from exfit.models.sheet import (
+    FREE,
+    LAG_OF_TC,
+    LEAD_OF_TB,
+    LIMIT,
+    OF_A_LIST,
+    TIME,
+    UP_TO_10000,
+    record,
+    shared,
+    sheet,
+)
 
 ALIASES = ("ESAC6A",)
 
 SHEET = sheet(
     *shared(TR=0.02, KA=536.0),
-    ("TA", 0.086, "s", (0.0, 100.0), "regulator lag", FREE),
-    ("TK", 0.18, "s", (0.0, 100.0), "regulator lead", FREE),
-    ("TB", 9.0, "s", (0.0, 100.0), "second regulator lag", LAG_OF_TC),
-    ("TC", 3.0, "s", (0.0, 100.0), "second regulator lead", LEAD_OF_TB),
-    *shared(VAMAX=75.0, VAMIN=-75.0),
-    ("VRMAX", 44.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
-    ("VRMIN", -36.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    *shared(TE=1.0),
-    ("VFELIM", 19.0, "pu", (-9999.0, 9999.0), "field current where the limiter begins"),
-    ("KH", 92.0, "pu", (0.0, 10000.0), "gain of the field current limiter"),
+    ("TA", 0.086, *TIME, "regulator lag", FREE),
+    ("TK", 0.18, *TIME, "regulator lead", FREE),
+    ("TB", 9.0, *TIME, "second regulator lag", LAG_OF_TC),
+    ("TC", 3.0, *TIME, "second regulator lead", LEAD_OF_TB),
+    *shared(VAMAX=75.0, VAMIN=-75.0, VRMAX_OF_EXCITER=44.0, VRMIN_OF_EXCITER=-36.0, TE=1.0),
+    ("VFELIM", 19.0, *LIMIT, "field current where the limiter begins"),
+    ("KH", 92.0, *UP_TO_10000, "gain of the field current limiter"),
     ("VHMAX", 75.0, "pu", (0.0, 9999.0), "ceiling of the field current limiter"),
-    ("TH", 0.08, "s", (0.0, 100.0), "field current limiter lag"),
-    ("TJ", 0.02, "s", (0.0, 100.0), "field current limiter lead"),
-    ("KC", 0.173, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=1.91, KE=1.6, E1=7.4, SE1=0.214, E2=5.55, SE2=0.044),
+    ("TH", 0.08, *TIME, "field current limiter lag"),
+    ("TJ", 0.02, *TIME, "field current limiter lead"),
+    *shared(KC_FREE=0.173, KD=1.91, KE=1.6, E1=7.4, SE1=0.214, E2=5.55, SE2=0.044),
 )
 
 RECORDS = (

@@ -27,9 +27,8 @@ InterPSS draw the same; InterPSS clamps the output of the second lead-lag, whose
 state runs on.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
-from exfit.models.blocks import clip, field_demand, lag, lead_lag, limited_lead_lag
+from exfit.models.blocks import Signal, clip, field_demand, lag, lead_lag, limited_lead_lag
 from exfit.models.exciters import ac6a
 from exfit.models.sheet import OF_TWO_PROGRAMS, ONE_GATE, record, renamed
 

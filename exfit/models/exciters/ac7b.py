@@ -22,8 +22,8 @@ integrates, 1/sTE: the 1/(1+sTE) in the figure of 2005 is a misprint. An UEL is
 added at the first summing point.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     field_ceiling,
     field_demand,
     lag,
@@ -36,27 +36,36 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LOADING, OF_A_LIST, SearchRange, record, sheet
+from exfit.models.sheet import (
+    FREE,
+    INTEGRAL_GAIN,
+    LIMIT,
+    OF_A_LIST,
+    PID_GAIN,
+    POSITIVE_TIME,
+    UP_TO_100,
+    SearchRange,
+    record,
+    shared,
+    sheet,
+)
 
 SHEET = sheet(
-    *shared(TR=0.0),
-    ("KPR", 4.24, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
-    ("KIR", 4.24, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
+    *shared(TR=0.0, KPR_OF_REGULATOR=4.24, KIR_OF_REGULATOR=4.24),
     ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain of the regulator"),
     *shared(TDR=0.03, VRMAX=5.79, VRMIN=-5.79),
-    ("KPA", 65.36, "pu", (0.0, 100000.0), "proportional gain of the amplifier", FREE),
-    ("KIA", 59.69, "pu/s", (0.0, 100000.0), "integral gain of the amplifier", FREE),
-    ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "amplifier ceiling"),
-    ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "amplifier floor"),
+    ("KPA", 65.36, *PID_GAIN, "proportional gain of the amplifier", FREE),
+    ("KIA", 59.69, *INTEGRAL_GAIN, "integral gain of the amplifier", FREE),
+    ("VAMAX", 1.0, *LIMIT, "amplifier ceiling"),
+    ("VAMIN", -0.95, *LIMIT, "amplifier floor"),
     *shared(KP=4.96),
     ("KL", 10.0, "pu", (0.0, 9999.0), "lower limit of the field voltage per field current"),
-    ("KF1", 0.212, "pu", (0.0, 100.0), "feedback gain of the generator field voltage", FREE),
-    ("KF2", 0.0, "pu", (0.0, 100.0), "feedback gain of the exciter field current"),
-    ("KF3", 0.0, "pu", (0.0, 100.0), "stabilising feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", SearchRange(needs="KF3")),
-    ("KC", 0.18, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=0.02, KE=1.0, TE=1.1, VFEMAX=6.9, VEMIN=0.0, E1=6.3, SE1=0.44, E2=4.725, SE2=0.075),
+    ("KF1", 0.212, *UP_TO_100, "feedback gain of the generator field voltage", FREE),
+    ("KF2", 0.0, *UP_TO_100, "feedback gain of the exciter field current"),
+    ("KF3", 0.0, *UP_TO_100, "stabilising feedback gain"),
+    ("TF", 1.0, *POSITIVE_TIME, "stabilising feedback time constant", SearchRange(needs="KF3")),
+    *shared(KC_FREE=0.18, KD=0.02, KE=1.0, TE=1.1, VFEMAX=6.9, VEMIN=0.0, E1=6.3, SE1=0.44),
+    *shared(E2=4.725, SE2=0.075),
 )
 
 RECORDS = (

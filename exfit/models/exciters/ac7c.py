@@ -30,9 +30,9 @@ in a PSS/E record). The data of the supply, but for KP, are not those of a
 sample.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import SUPPLY, alternator, supply
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_demand,
     lag,
@@ -46,8 +46,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import ac7b
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_TWO_PROGRAMS, TWO_GATES, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, TWO_GATES, UP_TO_100, record, shared, sheet
 
 ALIASES = ("ESAC7C",)
 
@@ -55,10 +54,10 @@ SHEET = (
     *ac7b.SHEET,
     *(row for row in SUPPLY if row.symbol not in ("KP", "KC1", "VBMAX")),
     *sheet(
-        ("KC1", 0.2, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
+        ("KC1", 0.2, *UP_TO_100, "loading factor of the supply's rectifier"),
         *shared(VBMAX=7.0),
         ("SW2", 1.0, "1", (1.0, 2.0), "supply of the amplifier: 1 VB, 2 field voltage"),
-        ("KR", 4.0, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
+        *shared(KR=4.0),
     ),
 )
 

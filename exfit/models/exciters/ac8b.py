@@ -14,8 +14,8 @@ is at its limit. UEL and OEL are added at the summing point. PSS/E's ESAC8B is
 another model.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     field_ceiling,
     field_demand,
     lag,
@@ -26,22 +26,12 @@ from exfit.models.blocks import (
     rectifier,
     rectifier_supply,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LOADING, OF_A_LIST, SearchRange, record, sheet
+from exfit.models.sheet import OF_A_LIST, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0),
-    ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    *shared(KIR=5.0),
-    ("KDR", 10.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    *shared(TDR=0.1),
-    ("VPIDMAX", 999.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
-    ("VPIDMIN", -999.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
-    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    *shared(VRMAX=35.0, VRMIN=0.0, TE=1.2, VFEMAX=6.0, VEMIN=0.0),
-    ("KC", 0.55, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=1.1, KE=1.0, E1=9.0, SE1=3.0, E2=6.5, SE2=0.3),
+    *shared(TR=0.0, KPR=80.0, KIR=5.0, KDR=10.0, TDR=0.1, VPIDMAX=999.0, VPIDMIN=-999.0),
+    *shared(KA_FIXED=1.0, TA_FIXED=0.0, VRMAX=35.0, VRMIN=0.0, TE=1.2, VFEMAX=6.0, VEMIN=0.0),
+    *shared(KC_FREE=0.55, KD=1.1, KE=1.0, E1=9.0, SE1=3.0, E2=6.5, SE2=0.3),
 )
 
 RECORDS = (

@@ -25,9 +25,17 @@ also be added behind the first gate (VOS = 2 in a PSS/E record): not modelled,
 and the same where no limiter acts. The supply's data are not those of a sample.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import SUPPLY, alternator, supply
-from exfit.models.blocks import clip, field_demand, lag, limited_lag, pi_rest, pid, rectifier_supply
+from exfit.models.blocks import (
+    Signal,
+    clip,
+    field_demand,
+    lag,
+    limited_lag,
+    pi_rest,
+    pid,
+    rectifier_supply,
+)
 from exfit.models.exciters import ac8b
 from exfit.models.sheet import TWO_GATES, record
 

@@ -20,21 +20,18 @@ Not modelled: SWITCH = 1, a stabiliser added behind VRMAX; UEL and OEL other
 than at the summing point.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, limited_lead_lag
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag, limited_lead_lag
+from exfit.models.sheet import LIMIT, TIME, SearchRange, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.01),
-    ("K", 300.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("T1", 6.0, "s", (0.0, 100.0), "regulator lag", SearchRange(unlike="T2")),
-    ("T2", 1.0, "s", (0.0, 100.0), "regulator lead", SearchRange(unlike="T1")),
-    ("T3", 0.05, "s", (0.0, 100.0), "second regulator lead"),
-    ("T4", 0.01, "s", (0.0, 100.0), "second regulator lag"),
+    *shared(TR=0.01, K=300.0),
+    ("T1", 6.0, *TIME, "regulator lag", SearchRange(unlike="T2")),
+    ("T2", 1.0, *TIME, "regulator lead", SearchRange(unlike="T1")),
+    ("T3", 0.05, *TIME, "second regulator lead"),
+    ("T4", 0.01, *TIME, "second regulator lag"),
     *shared(VRMAX=5.0, VRMIN=-5.0),
-    ("EFDMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
-    ("EFDMIN", -5.0, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
+    ("EFDMAX", 5.0, *LIMIT, "ceiling of the field voltage at rated voltage"),
+    ("EFDMIN", -5.0, *LIMIT, "floor of the field voltage at rated voltage"),
 )
 
 RECORDS = (

@@ -18,8 +18,7 @@ setpoints KE0, VRMAX0, VRMIN0.
 Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import larger
+from exfit.models.blocks import Signal, larger
 from exfit.models.commutators import (
     COMMUTATOR_SETPOINTS,
     COMMUTATOR_STATES,
@@ -27,16 +26,12 @@ from exfit.models.commutators import (
     excited,
     regulator_input,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_A_LIST, record, sheet
+from exfit.models.sheet import OF_A_LIST, record, shared, sheet
 
 ALIASES = ("ESDC1A",)
 
 SHEET = sheet(
-    *shared(TR=0.0, KA=46.0, TA=0.06, TB=0.0, TC=0.0),
-    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    *shared(VRMIN=-0.9),
-    ("KE", 0.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    *shared(TR=0.0, KA=46.0, TA=0.06, TB=0.0, TC=0.0, VRMAX_OR_0=1.0, VRMIN=-0.9, KE_OR_0=0.0),
     *shared(TE=0.46, KF=0.1, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
 )
 

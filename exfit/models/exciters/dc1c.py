@@ -20,8 +20,7 @@ setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
 them.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip
+from exfit.models.blocks import Signal, clip
 from exfit.models.commutators import (
     COMMUTATOR_SETPOINTS,
     COMMUTATOR_STATES,
@@ -30,17 +29,13 @@ from exfit.models.commutators import (
     regulator_input,
 )
 from exfit.models.exciters import dc1a
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_TWO_PROGRAMS, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, record, shared
 
 ALIASES = ("ESDC1C",)
 
 SHEET = (
     *dc1a.SHEET,
-    *sheet(
-        ("VEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter voltage"),
-        *shared(VEMIN=0.0),
-    ),
+    *shared(VEMAX=99.0, VEMIN=0.0),
 )
 
 RECORDS = (

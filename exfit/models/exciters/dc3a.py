@@ -22,20 +22,16 @@ and a dead band. The typical data are not the standard's sample (KV .05, TRH 20,
 KE .05, VR 1/0): with those the rheostat hunts on open circuit.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import exciter, exciter_demand, lag, limited_integrator, where
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.blocks import Signal, exciter, exciter_demand, lag, limited_integrator, where
+from exfit.models.sheet import FREE, LIMIT, WASHOUT_TIME, record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.0),
     ("KV", 0.1, "pu", (0.001, 10.0), "setting of the fast raise and lower contacts"),
-    ("VRMAX", 4.0, "pu", (-9999.0, 9999.0), "voltage of the raise contact"),
-    ("VRMIN", -0.9, "pu", (-9999.0, 9999.0), "voltage of the lower contact"),
-    ("TRH", 60.0, "s", (0.01, 1000.0), "travel time of the rheostat", FREE),
-    *shared(TE=0.5),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
-    *shared(VEMIN=0.0, E1=3.375, SE1=0.267, E2=3.15, SE2=0.068),
+    ("VRMAX", 4.0, *LIMIT, "voltage of the raise contact"),
+    ("VRMIN", -0.9, *LIMIT, "voltage of the lower contact"),
+    ("TRH", 60.0, *WASHOUT_TIME, "travel time of the rheostat", FREE),
+    *shared(TE=0.5, KE_SIGNED=1.0, VEMIN=0.0, E1=3.375, SE1=0.267, E2=3.15, SE2=0.068),
 )
 
 RECORDS = (

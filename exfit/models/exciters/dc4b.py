@@ -30,8 +30,8 @@ setpoints KE0, VRMAX0, VRMIN0.
 computes neither.) Not modelled: UEL or OEL at the summing point.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     commutator_start,
     exciter,
@@ -41,23 +41,12 @@ from exfit.models.blocks import (
     pid,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, record, sheet
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0),
-    ("KP", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KI", 20.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
-    ("KD", 20.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
-    ("TD", 0.01, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KD")),
-    ("VRMAX", 2.7, "pu", (-9999.0, 9999.0), "regulator ceiling at rated voltage, or 0"),
-    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor at rated voltage"),
-    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-    *shared(TA=0.2),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    *shared(TE=0.8),
-    ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
-    *shared(TF=1.0, VEMIN=0.0, E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
+    *shared(TR=0.0, KP_OF_PID=80.0, KI_OF_PID=20.0, KD_OF_PID=20.0, TD=0.01, VRMAX_AT_VT_OR_0=2.7),
+    *shared(VRMIN_AT_VT=0.0, KA_FIXED=1.0, TA=0.2, KE_OR_0=1.0, TE=0.8, KF_FIXED=0.0, TF=1.0),
+    *shared(VEMIN=0.0, E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
 )
 
 RECORDS = (

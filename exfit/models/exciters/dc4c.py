@@ -30,9 +30,9 @@ rectifier is InterPSS's. Typical data are the standard's, as GridKit has them,
 but for saturation (DC4B's; the SE of 1.54 at 4.8 lets no EFD pass 1.5) and KC1.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.alternators import SUPPLY, supply
 from exfit.models.blocks import (
+    Signal,
     clip,
     exciter,
     exciter_demand,
@@ -42,23 +42,14 @@ from exfit.models.blocks import (
     pid,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, record, sheet
+from exfit.models.sheet import record, shared, sheet
 
 DOUBT = "rests on one public diagram for the load of its supply (KC1), that of InterPSS"
 SHEET = (
     *sheet(
-        *shared(TR=0.0),
-        ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-        *shared(KIR=20.0),
-        ("KDR", 20.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-        *shared(TDR=0.01, VRMAX=2.7, VRMIN=-2.7),
-        ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-        *shared(TA=0.02),
-        ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
-        *shared(TE=0.8),
-        ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
-        *shared(TF=1.0, VEMIN=0.0, E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
+        *shared(TR=0.0, KPR=80.0, KIR=20.0, KDR=20.0, TDR=0.01, VRMAX=2.7, VRMIN=-2.7),
+        *shared(KA_FIXED=1.0, TA=0.02, KE_SIGNED=1.0, TE=0.8, KF_FIXED=0.0, TF=1.0, VEMIN=0.0),
+        *shared(E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
     ),
     *SUPPLY,
 )

@@ -12,20 +12,12 @@ demagnetisation: efd is the exciter voltage itself, without limits of its own.
 AC8B (2005) is another model, with KC, KD and limits of the PID and of VE.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import exciter, exciter_demand, lag, limited_lag, pi_rest, pid
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, record, sheet
+from exfit.models.blocks import Signal, exciter, exciter_demand, lag, limited_lag, pi_rest, pid
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0),
-    ("KP", 40.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KI", 10.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
-    ("KD", 15.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
-    ("TD", 0.02, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KD")),
-    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    *shared(VRMAX=35.0, VRMIN=0.0, TE=1.2, KE=1.0, E1=9.0, SE1=3.0, E2=6.5, SE2=0.3),
+    *shared(TR=0.0, KP_OF_PID=40.0, KI_OF_PID=10.0, KD_OF_PID=15.0, TD=0.02, KA_FIXED=1.0),
+    *shared(TA_FIXED=0.0, VRMAX=35.0, VRMIN=0.0, TE=1.2, KE=1.0, E1=9.0, SE1=3.0, E2=6.5, SE2=0.3),
 )
 
 RECORDS = (record("ESAC8B", "TR KP KI KD TD KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),)

@@ -19,8 +19,8 @@ another name. Typical data are those of a record but for KC. Not modelled: UEL
 other than at the summing point (PSS/E adds it to IREF).
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_demand,
     lag,
@@ -30,24 +30,33 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LOADING, SearchRange, record, sheet
+from exfit.models.sheet import (
+    FREE,
+    GAIN,
+    TIME,
+    UP_TO_100,
+    UP_TO_1000,
+    SearchRange,
+    record,
+    shared,
+    sheet,
+)
 
 ALIASES = ("EXAC1M",)
 
 SHEET = sheet(
     *shared(TR=0.016668),
-    ("TA", 0.8, "s", (0.0, 100.0), "first regulator lead", SearchRange(unlike="TB")),
-    ("TB", 0.1, "s", (0.0, 100.0), "first regulator lag", SearchRange(unlike="TA")),
-    ("TC", 0.6, "s", (0.0, 100.0), "second regulator lead", SearchRange(unlike="TD")),
-    ("TD", 19.0, "s", (0.0, 100.0), "second regulator lag", SearchRange(unlike="TC")),
-    ("K10", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("T1", 1.0, "s", (0.0, 100.0), "lag of the exciter's field current"),
-    ("K16", 1.0, "pu", (0.0, 1000.0), "feedback gain of the lagged field current"),
-    ("KF", 20.0, "pu", (0.0, 1000.0), "stabilising feedback gain", FREE),
+    ("TA", 0.8, *TIME, "first regulator lead", SearchRange(unlike="TB")),
+    ("TB", 0.1, *TIME, "first regulator lag", SearchRange(unlike="TA")),
+    ("TC", 0.6, *TIME, "second regulator lead", SearchRange(unlike="TD")),
+    ("TD", 19.0, *TIME, "second regulator lag", SearchRange(unlike="TC")),
+    ("K10", 400.0, *GAIN, "regulator gain", FREE),
+    ("T1", 1.0, *TIME, "lag of the exciter's field current"),
+    ("K16", 1.0, *UP_TO_1000, "feedback gain of the lagged field current"),
+    ("KF", 20.0, *UP_TO_1000, "stabilising feedback gain", FREE),
     *shared(TF=1.6, VRMAX=14.0, VRMIN=-12.6, TE=2.0, E1=3.01, SE1=0.01, E2=5.01, SE2=0.2),
-    ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    ("KD", 0.0, "pu", (0.0, 100.0), "demagnetising factor"),
+    *shared(KC_FREE=0.1),
+    ("KD", 0.0, *UP_TO_100, "demagnetising factor"),
     *shared(KE=0.8),
 )
 

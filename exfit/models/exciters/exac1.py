@@ -13,8 +13,8 @@ AC1A is this with limits VAMAX and VAMIN of its own at the lag and a clamp to
 VRMAX and VRMIN behind it.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     field_demand,
     lag,
     lead_lag,
@@ -24,14 +24,11 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import LOADING, OF_A_LIST, record, sheet
+from exfit.models.sheet import OF_A_LIST, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02),
-    *shared(VRMAX=6.03, VRMIN=-5.43, TE=0.8, KF=0.03, TF=1.0),
-    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=0.38, KE=1.0, E1=4.18, SE1=0.10, E2=3.14, SE2=0.03),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.02, VRMAX=6.03, VRMIN=-5.43, TE=0.8, KF=0.03),
+    *shared(TF=1.0, KC_FREE=0.2, KD=0.38, KE=1.0, E1=4.18, SE1=0.10, E2=3.14, SE2=0.03),
 )
 
 RECORDS = (record("EXAC1", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),)

@@ -15,8 +15,7 @@ PSS/E's EXAC1A agree, but one of them takes the saturation SE at efd instead of
 VE. Typical data are those of EXAC1.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import larger, rectifier, washout
+from exfit.models.blocks import Signal, larger, rectifier, washout
 from exfit.models.exciters import exac1
 from exfit.models.exciters.exac1 import SHEET, STATES, regulated
 from exfit.models.sheet import record

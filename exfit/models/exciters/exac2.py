@@ -21,8 +21,8 @@ refused; some programs raise VLR without a message instead. The AC2A of 1992 and
 UEL and OEL inputs, which some programs add at the first summing point.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     field_demand,
     lag,
@@ -34,21 +34,14 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LOADING, OF_A_LIST, record, sheet
+from exfit.models.sheet import LIMIT, OF_A_LIST, PID_GAIN, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.01, VAMAX=8.0, VAMIN=-8.0),
-    ("KB", 25.0, "pu", (0.01, 10000.0), "second stage gain", FREE),
-    ("VRMAX", 105.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
-    ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    *shared(TE=0.6),
-    ("KL", 10.0, "pu", (0.0, 100000.0), "gain of the field current limiter"),
-    ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current", FREE),
-    *shared(KF=0.03, TF=1.0),
-    ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=0.35, KE=1.0),
-    ("VLR", 4.4, "pu", (-9999.0, 9999.0), "limit of the exciter's field current"),
+    *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.01, VAMAX=8.0, VAMIN=-8.0, KB=25.0),
+    *shared(VRMAX_OF_EXCITER=105.0, VRMIN_OF_EXCITER=-95.0, TE=0.6),
+    ("KL", 10.0, *PID_GAIN, "gain of the field current limiter"),
+    *shared(KH=1.0, KF=0.03, TF=1.0, KC_FREE=0.28, KD=0.35, KE=1.0),
+    ("VLR", 4.4, *LIMIT, "limit of the exciter's field current"),
     *shared(E1=4.4, SE1=0.037, E2=3.3, SE2=0.012),
 )
 

@@ -22,8 +22,8 @@ Typical data are those of a PSS/E record. Not modelled: UEL and OEL other than
 at the summing point.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     field_demand,
     lag,
     larger,
@@ -35,20 +35,13 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters.ac3a import feedback
-from exfit.models.rows import shared
-from exfit.models.sheet import FEEDBACK, LOADING, record, sheet
+from exfit.models.sheet import LIMIT, UP_TO_1000, record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.0, TB=0.0, TC=0.0, KA=78.04, TA=0.013, VAMAX=1.0, VAMIN=-0.95, TE=3.71),
-    ("KLV", 0.167, "pu", (0.0, 1000.0), "gain of the low voltage limiter"),
-    ("KR", 6.99, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
-    ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN", FEEDBACK),
-    *shared(TF=1.0),
-    ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN"),
-    ("EFDN", 1.603, "pu", (0.0, 100.0), "field voltage where the feedback gain changes"),
-    ("KC", 0.14, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=1.02, KE=1.0),
-    ("VLV", 0.46, "pu", (-9999.0, 9999.0), "field voltage of the low voltage limiter"),
+    ("KLV", 0.167, *UP_TO_1000, "gain of the low voltage limiter"),
+    *shared(KR=6.99, KF_TO_EFDN=0.143, TF=1.0, KN=0.05, EFDN=1.603, KC_FREE=0.14, KD=1.02, KE=1.0),
+    ("VLV", 0.46, *LIMIT, "field voltage of the low voltage limiter"),
     *shared(E1=4.64, SE1=0.186, E2=6.19, SE2=1.391),
 )
 

@@ -13,19 +13,12 @@ after PSS/E's EXAC4 agree; a third has the same limits, but non-windup. Not
 modelled: UEL and OEL, which are added to vs.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag
-from exfit.models.rows import shared
-from exfit.models.sheet import LAG_OF_TC, LEAD_OF_TB, record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, VIMAX=10.0, VIMIN=-10.0),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
-    *shared(KA=200.0, TA=0.015),
-    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
-    ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
-    *shared(KC=0.0),
+    *shared(TR=0.0, VIMAX=10.0, VIMIN=-10.0, TC_FREE=1.0, TB_FREE=10.0, KA=200.0, TA=0.015),
+    *shared(VRMAX_OF_EFD=5.64, VRMIN_OF_EFD=-4.53, KC=0.0),
 )
 
 RECORDS = (record("EXAC4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),)

@@ -20,17 +20,20 @@ KE0, VRMAX0, VRMIN0.
 Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import commutator_start, exciter, lag, lead_lag, limited_lag, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_A_LIST, record, sheet
+from exfit.models.blocks import (
+    Signal,
+    commutator_start,
+    exciter,
+    lag,
+    lead_lag,
+    limited_lag,
+    washout,
+)
+from exfit.models.sheet import OF_A_LIST, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0),
-    ("VRMAX", 4.95, "pu", (-9999.0, 9999.0), "regulator ceiling at rated voltage, or 0"),
-    ("VRMIN", -4.9, "pu", (-9999.0, 9999.0), "regulator floor at rated voltage"),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    *shared(TE=1.33, KF=0.02, TF1=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
+    *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0, VRMAX_AT_VT_OR_0=4.95, VRMIN_AT_VT=-4.9),
+    *shared(KE_OR_0=1.0, TE=1.33, KF=0.02, TF1=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
 )
 
 RECORDS = (

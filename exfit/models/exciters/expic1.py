@@ -25,9 +25,9 @@ but for TF1, KE and the saturation, which do nothing there. Not modelled: UEL
 and OEL other than at the summing point.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     SHORTEST,
+    Signal,
     clip,
     closed,
     exciter_demand,
@@ -40,29 +40,25 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.compound import supply
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
+from exfit.models.sheet import FREE, LIMIT, OF_A_LIST, TIME, record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.0),
     ("KA", 3.15, "pu/s", (0.001, 100000.0), "integral gain of the PI", FREE),
-    ("TA1", 1.0, "s", (0.0, 100.0), "lead of the PI", FREE),
-    ("VR1", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PI"),
-    ("VR2", -0.87, "pu", (-9999.0, 9999.0), "floor of the PI"),
-    ("TA2", 0.01, "s", (0.0, 100.0), "regulator lag"),
-    ("TA3", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("TA4", 0.0, "s", (0.0, 100.0), "second regulator lag"),
-    *shared(VRMAX=1.0, VRMIN=-0.87),
-    ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
-    ("TF1", 1.0, "s", (0.0, 100.0), "stabilising feedback time constant"),
-    ("TF2", 0.0, "s", (0.0, 100.0), "stabilising feedback lag"),
-    ("EFDMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
-    ("EFDMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
+    ("TA1", 1.0, *TIME, "lead of the PI", FREE),
+    ("VR1", 1.0, *LIMIT, "ceiling of the PI"),
+    ("VR2", -0.87, *LIMIT, "floor of the PI"),
+    ("TA2", 0.01, *TIME, "regulator lag"),
+    ("TA3", 0.0, *TIME, "regulator lead"),
+    ("TA4", 0.0, *TIME, "second regulator lag"),
+    *shared(VRMAX=1.0, VRMIN=-0.87, KF_FIXED=0.0),
+    ("TF1", 1.0, *TIME, "stabilising feedback time constant"),
+    *shared(TF2=0.0),
+    ("EFDMAX", 8.0, *LIMIT, "ceiling of the field voltage"),
+    ("EFDMIN", -0.87, *LIMIT, "floor of the field voltage"),
     *shared(KE=1.0),
-    ("TE", 0.0, "s", (0.0, 100.0), "exciter time constant"),
-    *shared(E1=2.8, SE1=0.08, E2=3.7, SE2=0.33),
-    ("KP", 6.5, "pu", (0.0, 100.0), "potential source gain"),
-    *shared(KI=0.0, KC=0.08),
+    ("TE", 0.0, *TIME, "exciter time constant"),
+    *shared(E1=2.8, SE1=0.08, E2=3.7, SE2=0.33, KP_OR_0=6.5, KI=0.0, KC=0.08),
 )
 
 RECORDS = (

@@ -14,16 +14,12 @@ leaves VT out); the floor of ST1A, VT VRMIN, is another. Not modelled: UEL and
 OEL, which here are added to the error.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, regulator_output, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag, regulator_output, washout
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.02, VIMAX=0.2, VIMIN=-0.2, TC=1.0, TB=1.0, KA=80.0, TA=0.05),
-    ("VRMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
-    ("VRMIN", -3.0, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    *shared(KC=0.2, KF=0.1, TF=1.0),
+    *shared(VRMAX_OF_EFD_AT_VT=8.0, VRMIN_OF_EFD_AT_VT=-3.0, KC=0.2, KF=0.1, TF=1.0),
 )
 
 RECORDS = (record("EXST1", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF"),)

@@ -19,19 +19,13 @@ IEEET3, whose source is added as well, but for KP and KC. Not modelled: UEL and
 OEL other than at the summing point.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, limited_integrator, limited_lag, washout
+from exfit.models.blocks import Signal, lag, limited_integrator, limited_lag, washout
 from exfit.models.compound import supply
-from exfit.models.rows import shared
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=2.0, VRMIN=-2.0),
-    ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
-    *shared(TE=0.5, KF=0.02, TF=0.53),
-    ("KP", 0.9, "pu", (0.0, 100.0), "potential source gain"),
-    *shared(KI=1.86, KC=0.1),
-    ("EFDMAX", 2.8, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+    *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=2.0, VRMIN=-2.0, KE_ABOVE_0=1.0, TE=0.5, KF=0.02),
+    *shared(TF=0.53, KP_OR_0=0.9, KI=1.86, KC=0.1, EFDMAX=2.8),
 )
 
 RECORDS = (record("EXST2", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),)

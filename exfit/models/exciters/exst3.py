@@ -18,8 +18,8 @@ of its regulator (KJ there is KA, and KA is KM), a ceiling of VB in place of
 that of efd, and a gate of the UEL, which is added to the error here.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     compound_source,
     inf,
@@ -29,23 +29,17 @@ from exfit.models.blocks import (
     rectifier,
     smaller,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
+from exfit.models.sheet import FREE, GAIN, LIMIT, record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.0, VIMAX=0.2, VIMIN=-0.2),
-    ("KJ", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
-    ("KA", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop", FREE),
+    ("KJ", 200.0, *GAIN, "regulator gain", FREE),
+    *shared(TC_FREE=1.0, TB_FREE=10.0),
+    ("KA", 7.93, *GAIN, "gain of the field voltage loop", FREE),
     ("TA", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop", FREE),
-    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
-    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
-    *shared(KG=1.0, KP=6.15, KI=0.0),
-    ("EFDMAX", 6.9, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
-    *shared(KC=0.2, XL=0.081),
-    ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
-    *shared(THETAP=0.0),
+    ("VRMAX", 1.0, *LIMIT, "ceiling of the field voltage loop"),
+    ("VRMIN", 0.0, *LIMIT, "floor of the field voltage loop"),
+    *shared(KG=1.0, KP=6.15, KI=0.0, EFDMAX=6.9, KC=0.2, XL=0.081, VGMAX=5.8, THETAP=0.0),
 )
 
 RECORDS = (

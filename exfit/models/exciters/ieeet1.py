@@ -17,17 +17,12 @@ setpoints KE0, VRMAX0, VRMIN0.
 Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import commutator_start, exciter, lag, limited_lag, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, commutator_start, exciter, lag, limited_lag, washout
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.02, KA=50.0, TA=0.06),
-    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    *shared(VRMIN=-7.3),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    *shared(TE=0.5, KF=0.08, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
+    *shared(TR=0.02, KA=50.0, TA=0.06, VRMAX_OR_0=7.3, VRMIN=-7.3, KE_OR_0=1.0, TE=0.5, KF=0.08),
+    *shared(TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
 )
 
 RECORDS = (

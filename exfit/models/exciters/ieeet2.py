@@ -18,18 +18,13 @@ are the setpoints KE0, VRMAX0, VRMIN0.
 Not modelled: UEL or OEL at the summing point.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import commutator_start, exciter, lag, limited_lag, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import LAG_OF_KF, record, sheet
+from exfit.models.blocks import Signal, commutator_start, exciter, lag, limited_lag, washout
+from exfit.models.sheet import LAG_OF_KF, POSITIVE_TIME, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, KA=400.0, TA=0.02),
-    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    *shared(VRMIN=-7.3),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    *shared(TE=0.8, KF=0.03, TF1=1.0),
-    ("TF2", 0.8, "s", (0.01, 100.0), "second stabilising feedback time constant", LAG_OF_KF),
+    *shared(TR=0.0, KA=400.0, TA=0.02, VRMAX_OR_0=7.3, VRMIN=-7.3, KE_OR_0=1.0, TE=0.8, KF=0.03),
+    *shared(TF1=1.0),
+    ("TF2", 0.8, *POSITIVE_TIME, "second stabilising feedback time constant", LAG_OF_KF),
     *shared(E1=4.18, SE1=0.1, E2=3.14, SE2=0.03),
 )
 

@@ -15,8 +15,8 @@ clamp). The current IT, and so KI, acts on load only.
 Not modelled: UEL or OEL at the summing point.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     compound_source,
     lag,
@@ -26,15 +26,13 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=2.0, VRMIN=-2.0, TE=0.5, KF=0.02, TF=0.53),
-    ("KP", 1.19, "pu", (0.0, 100.0), "potential source gain"),
-    *shared(KI=1.86),
+    *shared(KP_OR_0=1.19, KI=1.86),
     ("VBMAX", 2.82, "pu", (0.01, 9999.0), "ceiling of the exciter's supply"),
-    ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
+    *shared(KE_ABOVE_0=1.0),
 )
 
 RECORDS = (record("IEEET3", "TR KA TA VRMAX VRMIN TE KF TF KP KI VBMAX KE"),)

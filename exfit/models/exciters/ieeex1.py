@@ -19,16 +19,19 @@ KE0, VRMAX0, VRMIN0.
 Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import commutator_start, exciter, lag, lead_lag, limited_lag, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_A_LIST, record, sheet
+from exfit.models.blocks import (
+    Signal,
+    commutator_start,
+    exciter,
+    lag,
+    lead_lag,
+    limited_lag,
+    washout,
+)
+from exfit.models.sheet import OF_A_LIST, record, shared, sheet
 
 SHEET = sheet(
-    *shared(TR=0.0, KA=40.0, TA=0.04, TB=0.0, TC=0.0),
-    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
-    *shared(VRMIN=-7.3),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    *shared(TR=0.0, KA=40.0, TA=0.04, TB=0.0, TC=0.0, VRMAX_OR_0=7.3, VRMIN=-7.3, KE_OR_0=1.0),
     *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
 )
 

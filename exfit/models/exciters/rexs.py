@@ -31,9 +31,9 @@ there are only gains (KVP 2800, KVI 0, KIP 1, KII 0, KH 0, VR 47/-20, KF .05,
 TF 3, TE 1.2, KC .05, KD 2).
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     SHORTEST,
+    Signal,
     clip,
     closed,
     field_demand,
@@ -49,34 +49,43 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, LOADING, record, sheet
+from exfit.models.sheet import (
+    FREE,
+    INTEGRAL_GAIN,
+    LIMIT,
+    PID_GAIN,
+    SHORT_TIME,
+    TIME,
+    UP_TO_100,
+    UP_TO_1000,
+    record,
+    shared,
+    sheet,
+)
 
 ALIASES = ("REXSYS",)
 
 SHEET = sheet(
     *shared(TR=0.01),
-    ("KVP", 30.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KVI", 25.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+    ("KVP", 30.0, *PID_GAIN, "proportional gain", FREE),
+    ("KVI", 25.0, *INTEGRAL_GAIN, "integral gain", FREE),
     ("VIMAX", 0.5, "pu", (0.0, 9999.0), "limit of the voltage error, of both signs"),
     *shared(TA=0.01),
-    ("TB1", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC1", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("TB2", 0.0, "s", (0.0, 100.0), "second regulator lag"),
-    ("TC2", 0.0, "s", (0.0, 100.0), "second regulator lead"),
+    ("TB1", 0.0, *TIME, "regulator lag"),
+    ("TC1", 0.0, *TIME, "regulator lead"),
+    ("TB2", 0.0, *TIME, "second regulator lag"),
+    ("TC2", 0.0, *TIME, "second regulator lead"),
     *shared(VRMAX=15.4, VRMIN=-12.3, KF=0.02, TF=0.7),
-    ("TF1", 0.0, "s", (0.0, 100.0), "stabilising feedback lead"),
-    ("TF2", 0.0, "s", (0.0, 100.0), "stabilising feedback lag"),
+    ("TF1", 0.0, *TIME, "stabilising feedback lead"),
+    *shared(TF2=0.0),
     ("FBF", 1.0, "1", (0.0, 2.0), "fed back: 0 VR, 1 VFE, 2 efd"),
-    ("KIP", 5.0, "pu", (0.0, 1000.0), "proportional gain of the field current regulator"),
+    ("KIP", 5.0, *UP_TO_1000, "proportional gain of the field current regulator"),
     ("KII", 5.0, "pu/s", (0.0, 1000.0), "integral gain of the field current regulator"),
-    ("TP", 0.02, "s", (0.0, 10.0), "time constant of the field current regulator"),
-    ("VFMAX", 15.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
-    ("VFMIN", -12.3, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current"),
-    *shared(KE=0.5, TE=0.7),
-    ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
-    *shared(KD=0.5, E1=2.525, SE1=0.1, E2=3.367, SE2=0.23),
+    ("TP", 0.02, *SHORT_TIME, "time constant of the field current regulator"),
+    ("VFMAX", 15.4, *LIMIT, "ceiling of the exciter's field voltage"),
+    ("VFMIN", -12.3, *LIMIT, "floor of the exciter's field voltage"),
+    ("KH", 1.0, *UP_TO_100, "feedback gain of the exciter's field current"),
+    *shared(KE=0.5, TE=0.7, KC_FREE=0.1, KD=0.5, E1=2.525, SE1=0.1, E2=3.367, SE2=0.23),
     ("FLIMF", 0.0, "1", (0.0, 1.0), "share of the limits that follows VT"),
 )
 

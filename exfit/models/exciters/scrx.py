@@ -12,17 +12,13 @@ carries no negative field current (rc/rfd > 0), where OpenIPSL and Dynawo
 disagree; a voltage step on open circuit hardly ever reaches this state.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lead_lag, limited_lag, where
-from exfit.models.sheet import EXCITER_LAG, FREE, record, sheet
+from exfit.models.blocks import Signal, lead_lag, limited_lag, where
+from exfit.models.sheet import LIMIT, record, shared, sheet
 
 SHEET = sheet(
-    ("TATB", 0.1, "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", FREE),
-    ("K", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TE", 0.02, "s", (0.0, 10.0), "exciter time constant", EXCITER_LAG),
-    ("EMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the bridge voltage"),
-    ("EMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the bridge voltage"),
+    *shared(TATB=0.1, TB_ALONE=10.0, K=200.0, TE_OR_0=0.02),
+    ("EMIN", 0.0, *LIMIT, "floor of the bridge voltage"),
+    ("EMAX", 5.0, *LIMIT, "ceiling of the bridge voltage"),
     ("CSWITCH", 0.0, "1", (0.0, 1.0), "feed of the bridge: 0 bus, 1 solid"),
 )
 

@@ -9,17 +9,13 @@ TA = TATB TB: the record gives the ratio TA/TB. The limits of the lag are
 non-windup. Not modelled: UEL and OEL at the summing point.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lead_lag, limited_lag
-from exfit.models.sheet import EXCITER_LAG, FREE, record, sheet
+from exfit.models.blocks import Signal, lead_lag, limited_lag
+from exfit.models.sheet import LIMIT, record, shared, sheet
 
 SHEET = sheet(
-    ("TATB", 0.1, "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", FREE),
-    ("K", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TE", 0.05, "s", (0.0, 10.0), "exciter time constant", EXCITER_LAG),
-    ("EMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
-    ("EMAX", 4.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+    *shared(TATB=0.1, TB_ALONE=10.0, K=200.0, TE_OR_0=0.05),
+    ("EMIN", 0.0, *LIMIT, "floor of the field voltage"),
+    ("EMAX", 4.0, *LIMIT, "ceiling of the field voltage"),
 )
 
 RECORDS = (record("SEXS", "TATB TB K TE EMIN EMAX"),)

@@ -25,8 +25,8 @@ standard's (its KF = 0 and its limiter's KLR and ILR come from other sets of
 it).
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     inf,
     lag,
@@ -36,8 +36,16 @@ from exfit.models.blocks import (
     regulator_output,
     washout,
 )
-from exfit.models.rows import shared
-from exfit.models.sheet import LAG_OF_TC, LEAD_OF_TB, SearchRange, record, sheet
+from exfit.models.sheet import (
+    LIMIT,
+    POSITIVE_TIME,
+    TIME,
+    UP_TO_10,
+    SearchRange,
+    record,
+    shared,
+    sheet,
+)
 
 ALIASES = ("ESST1A",)
 
@@ -46,21 +54,15 @@ KF_ALONE = SearchRange(high=1.0, instead_of=("TB", "TC"))
 TF_ALONE = SearchRange(needs="KF", instead_of=("TB", "TC"))
 
 SHEET = sheet(
-    *shared(TR=0.04, VIMAX=99.0, VIMIN=-99.0),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
-    ("TC1", 0.0, "s", (0.0, 100.0), "second regulator lead"),
-    ("TB1", 0.0, "s", (0.0, 100.0), "second regulator lag"),
-    *shared(KA=190.0),
-    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    *shared(VAMAX=14.5, VAMIN=-14.5),
-    ("VRMAX", 7.8, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
-    ("VRMIN", -6.7, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    *shared(KC=0.08),
-    ("KF", 0.001, "pu", (0.0, 10.0), "stabilising feedback gain", KF_ALONE),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", TF_ALONE),
-    ("KLR", 4.54, "pu", (0.0, 1000.0), "field current limiter gain"),
-    ("ILR", 4.4, "pu", (-9999.0, 9999.0), "field current limit"),
+    *shared(TR=0.04, VIMAX=99.0, VIMIN=-99.0, TC_FREE=1.0, TB_FREE=10.0),
+    ("TC1", 0.0, *TIME, "second regulator lead"),
+    ("TB1", 0.0, *TIME, "second regulator lag"),
+    *shared(KA=190.0, TA_FIXED=0.0, VAMAX=14.5, VAMIN=-14.5, VRMAX_OF_EFD_AT_VT=7.8),
+    *shared(VRMIN_OF_EFD_AT_VT=-6.7, KC=0.08),
+    ("KF", 0.001, *UP_TO_10, "stabilising feedback gain", KF_ALONE),
+    ("TF", 1.0, *POSITIVE_TIME, "stabilising feedback time constant", TF_ALONE),
+    *shared(KLR=4.54),
+    ("ILR", 4.4, *LIMIT, "field current limit"),
 )
 
 RECORDS = (

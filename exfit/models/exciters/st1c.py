@@ -23,8 +23,7 @@ clamp, as ST1A here does. PowerWorld lists the places in another order than
 InterPSS's record of PSS/E: OEL, UEL, VOS. Typical data are those of ST1A.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, where
+from exfit.models.blocks import Signal, lag, where
 from exfit.models.exciters import st1a
 from exfit.models.sheet import TWO_GATES, record, sheet
 

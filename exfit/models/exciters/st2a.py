@@ -15,21 +15,15 @@ and so KI, acts on load only. Not modelled: UEL and OEL at the summing point,
 where PSS/E's EXST2A has them and no gate.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, larger, limited_integrator, limited_lag, washout
+from exfit.models.blocks import Signal, lag, larger, limited_integrator, limited_lag, washout
 from exfit.models.compound import supply
-from exfit.models.rows import shared
-from exfit.models.sheet import AS_IN_PSSE, record, sheet
+from exfit.models.sheet import AS_IN_PSSE, record, shared, sheet
 
 ALIASES = ("ESST2A", "EXST2A")
 
 SHEET = sheet(
-    *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=1.0, VRMIN=0.0),
-    ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
-    *shared(TE=0.5, KF=0.05, TF=1.0),
-    ("KP", 4.88, "pu", (0.0, 100.0), "potential source gain"),
-    *shared(KI=8.0, KC=1.82),
-    ("EFDMAX", 4.5, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+    *shared(TR=0.0, KA=120.0, TA=0.15, VRMAX=1.0, VRMIN=0.0, KE_ABOVE_0=1.0, TE=0.5, KF=0.05),
+    *shared(TF=1.0, KP_OR_0=4.88, KI=8.0, KC=1.82, EFDMAX=4.5),
 )
 
 RECORDS = (

@@ -27,8 +27,8 @@ KI = XL = 0, KC = 0.1, VBMAX = 5.2 and EFDMAX = 4.4. PID, VBMAX and XL are not
 those of a sample.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     lag,
     limited_integrator,
@@ -41,8 +41,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import st2a
-from exfit.models.rows import shared
-from exfit.models.sheet import OF_TWO_PROGRAMS, not_searched, record, sheet
+from exfit.models.sheet import OF_TWO_PROGRAMS, not_searched, record, shared
 from exfit.models.static import PID
 
 ALIASES = ("ESST2C",)
@@ -50,9 +49,7 @@ ALIASES = ("ESST2C",)
 SHEET = (
     *not_searched(st2a.SHEET, "KA"),
     *PID,
-    *sheet(
-        *shared(XL=0.081, THETAP=0.0, VBMAX=9.0),
-    ),
+    *shared(XL=0.081, THETAP=0.0, VBMAX=9.0),
 )
 
 RECORDS = (

@@ -15,26 +15,27 @@ both lags are non-windup. The current IT, and so KI, XL and THETAP, act on load
 only. The standard has no OEL gate here.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller, source_voltage
-from exfit.models.rows import shared
-from exfit.models.sheet import AS_IN_PSSE, FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
+from exfit.models.blocks import (
+    Signal,
+    clip,
+    lag,
+    larger,
+    lead_lag,
+    limited_lag,
+    smaller,
+    source_voltage,
+)
+from exfit.models.sheet import AS_IN_PSSE, FREE, GAIN, record, shared, sheet
 
 ALIASES = ("ESST3A",)
 
 SHEET = sheet(
     *shared(TR=0.0, VIMAX=0.2, VIMIN=-0.2),
-    ("KM", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop", FREE),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
-    *shared(KA=200.0),
-    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
-    *shared(VRMAX=10.0, VRMIN=-10.0, KG=1.0, KP=6.15, KI=0.0, VBMAX=6.9, KC=0.2, XL=0.081),
-    ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
-    *shared(THETAP=0.0),
+    ("KM", 7.93, *GAIN, "gain of the field voltage loop", FREE),
+    *shared(TC_FREE=1.0, TB_FREE=10.0, KA=200.0, TA_FIXED=0.0, VRMAX=10.0, VRMIN=-10.0, KG=1.0),
+    *shared(KP=6.15, KI=0.0, VBMAX=6.9, KC=0.2, XL=0.081, VGMAX=5.8, THETAP=0.0),
     ("TM", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop", FREE),
-    ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
-    ("VMMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
+    *shared(VMMAX=1.0, VMMIN=0.0),
 )
 
 RECORDS = (

@@ -30,8 +30,7 @@ are the first set of the standard's sample data in GridKit; the PID is not that
 of a sample: GridKit lists none.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, limited_lag, pi_rest, pid, smaller
+from exfit.models.blocks import Signal, clip, lag, lead_lag, limited_lag, pi_rest, pid, smaller
 from exfit.models.exciters import st3a
 from exfit.models.sheet import OF_TWO_PROGRAMS, not_searched, record
 from exfit.models.static import PID, SUPPLY_SWITCH, supply

@@ -14,25 +14,19 @@ the equations solve it. The current IT, and so KI, XL and THETAP, act on load
 only. Not modelled: UEL at the summing point, and VGMAX of later editions.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, pi, pi_rest, smaller, source_voltage
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.blocks import Signal, clip, lag, pi, pi_rest, smaller, source_voltage
+from exfit.models.sheet import FREE, INTEGRAL_GAIN, PID_GAIN, record, shared, sheet
 
 ALIASES = ("ESST4B",)
 
 # the gains are those that OpenIPSL compared with PSS/E: the samples of the standard cut a loop
 
 SHEET = sheet(
-    *shared(TR=0.0),
-    ("KPR", 2.97, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
-    ("KIR", 2.97, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
-    *shared(VRMAX=1.0, VRMIN=-0.87, TA=0.02),
-    ("KPM", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field voltage loop", FREE),
-    ("KIM", 0.2, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop", FREE),
-    ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
-    ("VMMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
-    *shared(KG=0.1, KP=6.73, KI=0.1, VBMAX=8.41, KC=0.1, XL=0.0, THETAP=0.0),
+    *shared(TR=0.0, KPR_OF_REGULATOR=2.97, KIR_OF_REGULATOR=2.97, VRMAX=1.0, VRMIN=-0.87, TA=0.02),
+    ("KPM", 1.0, *PID_GAIN, "proportional gain of the field voltage loop", FREE),
+    ("KIM", 0.2, *INTEGRAL_GAIN, "integral gain of the field voltage loop", FREE),
+    *shared(VMMAX=1.0, VMMIN=-0.87, KG=0.1, KP=6.73, KI=0.1, VBMAX=8.41, KC=0.1, XL=0.0),
+    *shared(THETAP=0.0),
 )
 
 RECORDS = (

@@ -27,9 +27,9 @@ acts. Typical data are those of ST4B with a wider limit of the regulator, and
 VGMAX of ST3A; VAMAX and VAMIN lie within the limits of the loop, and so act.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     SHORTEST,
+    Signal,
     clip,
     lag,
     larger,
@@ -40,7 +40,16 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import st4b
-from exfit.models.sheet import FREE, TWO_GATES, record, sheet, with_typical
+from exfit.models.sheet import (
+    FREE,
+    LIMIT,
+    SHORT_TIME,
+    TWO_GATES,
+    record,
+    shared,
+    sheet,
+    with_typical,
+)
 from exfit.models.static import SUPPLY_SWITCH, supply
 
 ALIASES = ("ESST4C",)
@@ -51,10 +60,10 @@ SHEET = (
         for row in with_typical(st4b.SHEET, VRMAX=2.0, VRMIN=-1.74)
     ),
     *sheet(
-        ("VAMAX", 0.95, "pu", (-9999.0, 9999.0), "ceiling of the lag before the rectifier"),
-        ("VAMIN", -0.82, "pu", (-9999.0, 9999.0), "floor of the lag before the rectifier"),
-        ("TG", 0.02, "s", (0.0, 10.0), "feedback lag of the field voltage loop", FREE),
-        ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
+        ("VAMAX", 0.95, *LIMIT, "ceiling of the lag before the rectifier"),
+        ("VAMIN", -0.82, *LIMIT, "floor of the lag before the rectifier"),
+        ("TG", 0.02, *SHORT_TIME, "feedback lag of the field voltage loop", FREE),
+        *shared(VGMAX=5.8),
     ),
     *SUPPLY_SWITCH,
 )

@@ -21,21 +21,29 @@ Not modelled: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter
 has the gate; while none acts they have no effect.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import Limited, clip, lag, limited_lag, limited_lead_lag
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, record, sheet
+from exfit.models.blocks import Limited, Signal, clip, lag, limited_lag, limited_lead_lag
+from exfit.models.sheet import (
+    FREE,
+    GAIN,
+    LIMIT,
+    SHORT_TIME,
+    TIME,
+    SearchRange,
+    record,
+    shared,
+    sheet,
+)
 
 SHEET = sheet(
     *shared(TR=0.02),
-    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead", SearchRange(unlike="TB1")),
-    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag", SearchRange(unlike="TC1")),
-    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead", SearchRange(unlike="TB2")),
-    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag", SearchRange(unlike="TC2")),
-    ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling, and at rated voltage"),
-    ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor, and at rated voltage"),
-    ("T1", 0.004, "s", (0.0, 10.0), "firing circuit time constant", FREE),
+    ("TC1", 0.8, *TIME, "first regulator lead", SearchRange(unlike="TB1")),
+    ("TB1", 6.0, *TIME, "first regulator lag", SearchRange(unlike="TC1")),
+    ("TC2", 0.08, *TIME, "second regulator lead", SearchRange(unlike="TB2")),
+    ("TB2", 0.01, *TIME, "second regulator lag", SearchRange(unlike="TC2")),
+    ("KR", 200.0, *GAIN, "regulator gain", FREE),
+    ("VRMAX", 5.0, *LIMIT, "regulator ceiling, and at rated voltage"),
+    ("VRMIN", -4.0, *LIMIT, "regulator floor, and at rated voltage"),
+    ("T1", 0.004, *SHORT_TIME, "firing circuit time constant", FREE),
     *shared(KC=0.004),
 )
 

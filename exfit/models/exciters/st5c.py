@@ -24,24 +24,23 @@ the times of the limiters' pairs are the standard's sample data, as GridKit has
 them.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, larger, smaller, where
+from exfit.models.blocks import Signal, lag, larger, smaller, where
 from exfit.models.exciters import st5b
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import TIME, record, sheet
 
 ALIASES = ("ESST5C",)
 
 SHEET = (
     *st5b.SHEET,
     *sheet(
-        ("TUC1", 2.0, "s", (0.0, 100.0), "first regulator lead while UEL has the gate"),
-        ("TUB1", 10.0, "s", (0.0, 100.0), "first regulator lag while UEL has the gate"),
-        ("TUC2", 0.1, "s", (0.0, 100.0), "second regulator lead while UEL has the gate"),
-        ("TUB2", 0.05, "s", (0.0, 100.0), "second regulator lag while UEL has the gate"),
-        ("TOC1", 0.1, "s", (0.0, 100.0), "first regulator lead while OEL has the gate"),
-        ("TOB1", 2.0, "s", (0.0, 100.0), "first regulator lag while OEL has the gate"),
-        ("TOC2", 0.08, "s", (0.0, 100.0), "second regulator lead while OEL has the gate"),
-        ("TOB2", 0.08, "s", (0.0, 100.0), "second regulator lag while OEL has the gate"),
+        ("TUC1", 2.0, *TIME, "first regulator lead while UEL has the gate"),
+        ("TUB1", 10.0, *TIME, "first regulator lag while UEL has the gate"),
+        ("TUC2", 0.1, *TIME, "second regulator lead while UEL has the gate"),
+        ("TUB2", 0.05, *TIME, "second regulator lag while UEL has the gate"),
+        ("TOC1", 0.1, *TIME, "first regulator lead while OEL has the gate"),
+        ("TOB1", 2.0, *TIME, "first regulator lag while OEL has the gate"),
+        ("TOC2", 0.08, *TIME, "second regulator lead while OEL has the gate"),
+        ("TOB2", 0.08, *TIME, "second regulator lag while OEL has the gate"),
     ),
 )
 

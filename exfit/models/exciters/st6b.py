@@ -19,27 +19,34 @@ Not modelled: the overexcitation limiter, which is added to the error before the
 gate (OEL = 1 in a PSS/E record) or behind it (OEL = 2).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, pi_rest, pid, smaller
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, SearchRange, record, sheet
+from exfit.models.blocks import Signal, clip, lag, larger, pi_rest, pid, smaller
+from exfit.models.sheet import (
+    FREE,
+    INTEGRAL_GAIN,
+    LIMIT,
+    PID_GAIN,
+    SHORT_TIME,
+    UP_TO_1000,
+    SearchRange,
+    record,
+    shared,
+    sheet,
+)
 
 SHEET = sheet(
     *shared(TR=0.012),
-    ("KPA", 18.038, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KIA", 45.094, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+    ("KPA", 18.038, *PID_GAIN, "proportional gain", FREE),
+    ("KIA", 45.094, *INTEGRAL_GAIN, "integral gain", FREE),
     ("KDA", 0.1, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDA")),
-    ("TDA", 0.1, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDA")),
-    ("VAMAX", 4.81, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
-    ("VAMIN", -3.85, "pu", (-9999.0, 9999.0), "floor of the PID"),
-    ("KFF", 1.0, "pu", (0.0, 1000.0), "feedforward gain"),
-    ("KM", 1.0, "pu", (0.0, 1000.0), "gain of the field voltage loop", FREE),
-    ("KCI", 1.0577, "pu", (0.0, 1000.0), "factor on the field current limit"),
-    ("KLR", 17.33, "pu", (0.0, 1000.0), "field current limiter gain"),
+    ("TDA", 0.1, *SHORT_TIME, "lag of the derivative", SearchRange(needs="KDA")),
+    ("VAMAX", 4.81, *LIMIT, "ceiling of the PID"),
+    ("VAMIN", -3.85, *LIMIT, "floor of the PID"),
+    ("KFF", 1.0, *UP_TO_1000, "feedforward gain"),
+    ("KM", 1.0, *UP_TO_1000, "gain of the field voltage loop", FREE),
+    ("KCI", 1.0577, *UP_TO_1000, "factor on the field current limit"),
+    *shared(KLR=17.33),
     ("ILR", 4.164, "pu", (0.0, 9999.0), "field current limit"),
-    ("VRMAX", 4.81, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
-    ("VRMIN", -3.85, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    *shared(KG=1.0),
+    *shared(VRMAX_OF_EFD_AT_VT=4.81, VRMIN_OF_EFD_AT_VT=-3.85, KG=1.0),
     ("TG", 0.02, "s", (0.001, 10.0), "feedback lag of the field voltage loop", FREE),
 )
 

@@ -27,10 +27,9 @@ this; Dynawo has no derivative, and a lag of ILIM that the others do not have.
 Typical data are those of ST6B, with a supply from the terminals and a lag.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, limited_lag, pi_rest, pid, smaller, where
+from exfit.models.blocks import Signal, clip, lag, larger, limited_lag, pi_rest, pid, smaller, where
 from exfit.models.exciters import st6b
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import LIMIT, record, shared, sheet
 from exfit.models.static import SUPPLY, supply
 
 ALIASES = ("ESST6C",)
@@ -38,9 +37,9 @@ ALIASES = ("ESST6C",)
 SHEET = (
     *st6b.SHEET,
     *sheet(
-        ("TA", 0.02, "s", (0.0, 10.0), "firing circuit time constant", FREE),
-        ("VMMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the lag before the rectifier"),
-        ("VMMIN", -3.6, "pu", (-9999.0, 9999.0), "floor of the lag before the rectifier"),
+        *shared(TA_OF_FIRING=0.02),
+        ("VMMAX", 4.5, *LIMIT, "ceiling of the lag before the rectifier"),
+        ("VMMIN", -3.6, *LIMIT, "floor of the lag before the rectifier"),
     ),
     *SUPPLY,
 )

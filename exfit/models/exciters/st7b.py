@@ -27,25 +27,34 @@ VMAX and VMIN are 1.1 and 0.9; the typical data here leave the reference of a
 test unlimited.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag
+from exfit.models.sheet import (
+    FREE,
+    GAIN,
+    LIMIT,
+    OF_A_LIST,
+    POSITIVE_TIME,
+    TIME,
+    UP_TO_10,
+    UP_TO_100,
+    record,
+    shared,
+    sheet,
+)
 
 SHEET = sheet(
     *shared(TR=0.02),
-    ("TG", 1.0, "s", (0.0, 100.0), "lead of the measured voltage"),
-    ("TF", 1.0, "s", (0.0, 100.0), "lag of the measured voltage"),
-    ("VMAX", 1.6, "pu", (-9999.0, 9999.0), "ceiling of the reference"),
-    ("VMIN", 0.4, "pu", (-9999.0, 9999.0), "floor of the reference"),
-    ("KPA", 40.0, "pu", (0.01, 100000.0), "proportional gain", FREE),
-    ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
-    ("VRMIN", -4.5, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    ("KH", 1.0, "pu", (0.0, 100.0), "feedback to the high-value gate"),
-    ("KL", 1.0, "pu", (0.0, 100.0), "feedback to the low-value gate"),
+    ("TG", 1.0, *TIME, "lead of the measured voltage"),
+    ("TF", 1.0, *TIME, "lag of the measured voltage"),
+    ("VMAX", 1.6, *LIMIT, "ceiling of the reference"),
+    ("VMIN", 0.4, *LIMIT, "floor of the reference"),
+    ("KPA", 40.0, *GAIN, "proportional gain", FREE),
+    *shared(VRMAX_OF_EFD_AT_VT=5.0, VRMIN_OF_EFD_AT_VT=-4.5),
+    ("KH", 1.0, *UP_TO_100, "feedback to the high-value gate"),
+    ("KL", 1.0, *UP_TO_100, "feedback to the low-value gate"),
     *shared(TC=1.0, TB=1.0),
-    ("KIA", 1.0, "pu", (0.0, 10.0), "feedback gain, 1 for an integral"),
-    ("TIA", 3.0, "s", (0.01, 100.0), "feedback time constant, that of the integral", FREE),
+    ("KIA", 1.0, *UP_TO_10, "feedback gain, 1 for an integral"),
+    ("TIA", 3.0, *POSITIVE_TIME, "feedback time constant, that of the integral", FREE),
 )
 
 RECORDS = (

@@ -26,16 +26,15 @@ lag TA, InterPSS limits its state, which is followed. InterPSS applies OEL
 before UEL. Typical data are those of ST7B.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, limited_lag
+from exfit.models.blocks import Signal, clip, lag, limited_lag
 from exfit.models.exciters import st7b
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import record, shared
 
 ALIASES = ("ESST7C",)
 
 SHEET = (
     *st7b.SHEET,
-    *sheet(("TA", 0.01, "s", (0.0, 10.0), "firing circuit time constant", FREE)),
+    *shared(TA_OF_FIRING=0.01),
 )
 
 RECORDS = (

@@ -27,8 +27,8 @@ has it, has no KIA and no second source (KPR 6.6, KIR 30, KPA 2.38, KA 4.295, TA
 0.0017, KC1 0.062, KP 1, KC2 and KI2 0, TR and TF 0.0226).
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
+    Signal,
     clip,
     compound_source,
     lag,
@@ -40,35 +40,44 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.phasors import modulus
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, ONE_GATE, record, sheet
+from exfit.models.sheet import (
+    FREE,
+    GAIN,
+    INTEGRAL_GAIN,
+    LIMIT,
+    ONE_GATE,
+    PID_GAIN,
+    SHORT_TIME,
+    UP_TO_100,
+    record,
+    shared,
+    sheet,
+)
 from exfit.models.static import SUPPLY_SWITCH
 
 ALIASES = ("ESST8C",)
 
 SHEET = (
     *sheet(
-        *shared(TR=0.012),
-        ("KPR", 20.0, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
-        ("KIR", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
-        ("VPIMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the field current reference"),
-        ("VPIMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the field current reference"),
-        ("KPA", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field current loop", FREE),
-        ("KIA", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the field current loop", FREE),
-        ("VAMAX", 1.2, "pu", (-9999.0, 9999.0), "ceiling of the field current loop"),
-        ("VAMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the field current loop"),
-        ("KA", 1.0, "pu", (0.01, 100000.0), "regulator gain"),
-        ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", FREE),
+        *shared(TR=0.012, KPR_OF_REGULATOR=20.0, KIR_OF_REGULATOR=10.0),
+        ("VPIMAX", 4.5, *LIMIT, "ceiling of the field current reference"),
+        ("VPIMIN", -1.0, *LIMIT, "floor of the field current reference"),
+        ("KPA", 1.0, *PID_GAIN, "proportional gain of the field current loop", FREE),
+        ("KIA", 10.0, *INTEGRAL_GAIN, "integral gain of the field current loop", FREE),
+        ("VAMAX", 1.2, *LIMIT, "ceiling of the field current loop"),
+        ("VAMIN", -1.0, *LIMIT, "floor of the field current loop"),
+        ("KA", 1.0, *GAIN, "regulator gain"),
+        ("TA", 0.01, *SHORT_TIME, "regulator time constant", FREE),
         *shared(VRMAX=1.0, VRMIN=-0.87),
-        ("KF", 1.0, "pu", (0.0, 100.0), "feedback gain of the field current"),
-        ("TF", 0.02, "s", (0.0, 10.0), "feedback lag of the field current", FREE),
-        ("KC1", 0.05, "pu", (0.0, 100.0), "rectifier loading factor"),
+        ("KF", 1.0, *UP_TO_100, "feedback gain of the field current"),
+        ("TF", 0.02, *SHORT_TIME, "feedback lag of the field current", FREE),
+        ("KC1", 0.05, *UP_TO_100, "rectifier loading factor"),
         *shared(KP=6.0),
-        ("KI1", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+        ("KI1", 0.0, *UP_TO_100, "current source gain, on load"),
         *shared(XL=0.0, THETAP=0.0),
         ("VB1MAX", 8.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
-        ("KC2", 0.05, "pu", (0.0, 100.0), "loading factor of the second rectifier, on load"),
-        ("KI2", 0.5, "pu", (0.0, 100.0), "gain of the second source, on load"),
+        ("KC2", 0.05, *UP_TO_100, "loading factor of the second rectifier, on load"),
+        ("KI2", 0.5, *UP_TO_100, "gain of the second source, on load"),
         ("VB2MAX", 0.5, "pu", (0.01, 9999.0), "ceiling of the second source, on load"),
     ),
     *SUPPLY_SWITCH,

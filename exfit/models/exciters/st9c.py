@@ -27,10 +27,8 @@ sample data, as GridKit has them, but for TR, KU, TAUEL, TAS, KC and VBMAX,
 which are 0, 10000, 2, 0.0018, 0 and 1.2 there: most leave out what they act on.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, smaller, washout
-from exfit.models.rows import shared
-from exfit.models.sheet import FREE, ONE_GATE, record, sheet
+from exfit.models.blocks import Signal, clip, lag, larger, smaller, washout
+from exfit.models.sheet import FREE, ONE_GATE, POSITIVE_TIME, SHORT_TIME, record, shared, sheet
 from exfit.models.static import SUPPLY, supply
 
 ALIASES = ("ESST9C",)
@@ -38,16 +36,16 @@ ALIASES = ("ESST9C",)
 SHEET = (
     *sheet(
         *shared(TR=0.02),
-        ("TCD", 0.06, "s", (0.0, 10.0), "time constant of the derivative"),
-        ("TBD", 0.03, "s", (0.0, 10.0), "lag of the derivative"),
+        ("TCD", 0.06, *SHORT_TIME, "time constant of the derivative"),
+        ("TBD", 0.03, *SHORT_TIME, "lag of the derivative"),
         ("ZA", 0.036, "pu", (0.0, 9999.0), "dead band of the derivative"),
         *shared(KA=12.0),
         ("KU", 100.0, "1", (0.0, 1e6), "gain of the change to TAUEL while UEL has the gate"),
-        ("TA", 2.0, "s", (0.01, 100.0), "time constant of the integral", FREE),
-        ("TAUEL", 3.0, "s", (0.01, 100.0), "that of the integral while UEL has the gate"),
+        ("TA", 2.0, *POSITIVE_TIME, "time constant of the integral", FREE),
+        ("TAUEL", 3.0, *POSITIVE_TIME, "that of the integral while UEL has the gate"),
         *shared(VRMAX=1.0, VRMIN=-0.866),
         ("KAS", 6.1, "pu", (0.01, 1000.0), "gain of the power converter"),
-        ("TAS", 0.01, "s", (0.0, 10.0), "firing circuit time constant", FREE),
+        ("TAS", 0.01, *SHORT_TIME, "firing circuit time constant", FREE),
     ),
     *SUPPLY,
 )

@@ -16,8 +16,7 @@ limits, and there are no lead-lags of limiters. Otherwise it is ST5B; OpenIPSL's
 and OPAL-RT's models, written after PSS/E's, agree. Typical data are ST5B's.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, limited_lag
+from exfit.models.blocks import Signal, clip, lag, limited_lag
 from exfit.models.exciters import st5b
 from exfit.models.exciters.st5b import SHEET, STATES
 from exfit.models.sheet import record

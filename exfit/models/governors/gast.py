@@ -15,20 +15,19 @@ load that the ambient temperature allows, is not at rest. Typical data are those
 of IEC 61970-302 (GovGAST).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, limited_lag, smaller
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, lag, limited_lag, smaller
+from exfit.models.sheet import DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, record, sheet
 
 SHEET = sheet(
     ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
-    ("T1", 0.5, "s", (0.0, 100.0), "fuel valve lag"),
-    ("T2", 0.5, "s", (0.0, 100.0), "turbine lag"),
-    ("T3", 3.0, "s", (0.001, 100.0), "exhaust temperature lag"),
+    ("T1", 0.5, *TIME, "fuel valve lag"),
+    ("T2", 0.5, *TIME, "turbine lag"),
+    ("T3", 3.0, *DIVIDING_TIME, "exhaust temperature lag"),
     ("AT", 1.0, "pu", (0.001, 10.0), "load limit by the ambient temperature"),
     ("KT", 3.0, "1", (0.0, 1000.0), "temperature limiter gain"),
-    ("VMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the valve"),
-    ("VMIN", 0.0, "pu", (-10.0, 10.0), "floor of the valve"),
-    ("Dturb", 0.18, "pu", (0.0, 100.0), "turbine damping"),
+    ("VMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
+    ("VMIN", 0.0, *WITHIN_10, "floor of the valve"),
+    ("Dturb", 0.18, *UP_TO_100, "turbine damping"),
 )
 
 RECORDS = (record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),)

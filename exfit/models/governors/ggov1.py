@@ -59,9 +59,9 @@ Rdown). Typical data are those of the public libraries (OpenIPSL, InterPSS).
 
 from typing import NamedTuple
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     Limited,
+    Signal,
     clip,
     exp,
     lag,
@@ -75,40 +75,40 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import DIVIDING_TIME, LONG_TIME, TIME, UP_TO_10, WITHIN_10, record, sheet
 
 SHEET = sheet(
     ("Rselect", 1.0, "1", (-2.0, 1.0), "signal of the droop: 1, 0, -1 or -2"),
     ("Flag", 0.0, "1", (0.0, 1.0), "1: fuel in proportion to the speed"),
-    ("R", 0.04, "pu", (0.0, 10.0), "permanent droop"),
-    ("Tpelec", 1.0, "s", (0.0, 100.0), "power transducer lag"),
-    ("maxerr", 0.05, "pu", (0.0, 10.0), "ceiling of the speed error"),
+    ("R", 0.04, *UP_TO_10, "permanent droop"),
+    ("Tpelec", 1.0, *TIME, "power transducer lag"),
+    ("maxerr", 0.05, *UP_TO_10, "ceiling of the speed error"),
     ("minerr", -0.05, "pu", (-10.0, 0.0), "floor of the speed error"),
     ("Kpgov", 10.0, "1", (0.001, 1000.0), "proportional gain of the governor"),
     ("Kigov", 2.0, "1/s", (0.0, 1000.0), "integral gain of the governor"),
-    ("Kdgov", 0.0, "s", (0.0, 1000.0), "derivative gain of the governor"),
-    ("Tdgov", 1.0, "s", (0.001, 100.0), "derivative lag of the governor"),
-    ("VMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the valve"),
-    ("VMIN", 0.15, "pu", (-10.0, 10.0), "floor of the valve"),
-    ("Tact", 0.5, "s", (0.001, 100.0), "actuator time constant"),
+    ("Kdgov", 0.0, *LONG_TIME, "derivative gain of the governor"),
+    ("Tdgov", 1.0, *DIVIDING_TIME, "derivative lag of the governor"),
+    ("VMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
+    ("VMIN", 0.15, *WITHIN_10, "floor of the valve"),
+    ("Tact", 0.5, *DIVIDING_TIME, "actuator time constant"),
     ("Kturb", 1.5, "1", (0.001, 100.0), "turbine gain"),
     ("Wfnl", 0.2, "pu", (0.0, 1.0), "fuel flow at no load"),
-    ("Tb", 0.1, "s", (0.0, 100.0), "turbine lag"),
-    ("Tc", 0.0, "s", (0.0, 100.0), "turbine lead"),
-    ("Tfload", 3.0, "s", (0.0, 100.0), "lag of the load limiter"),
+    ("Tb", 0.1, *TIME, "turbine lag"),
+    ("Tc", 0.0, *TIME, "turbine lead"),
+    ("Tfload", 3.0, *TIME, "lag of the load limiter"),
     ("Kpload", 2.0, "1", (0.0, 1000.0), "proportional gain of the load limiter"),
     ("Kiload", 0.67, "1/s", (0.0, 1000.0), "integral gain of the load limiter"),
-    ("Ldref", 1.0, "pu", (0.0, 10.0), "reference of the load limiter"),
+    ("Ldref", 1.0, *UP_TO_10, "reference of the load limiter"),
     ("Dm", 0.0, "pu", (-100.0, 100.0), "speed sensitivity of the turbine"),
     ("Ropen", 0.1, "pu/s", (0.0001, 1000.0), "fastest opening of the valve"),
     ("Rclose", -0.1, "pu/s", (-1000.0, -0.0001), "fastest closing of the valve"),
     ("Kimw", 0.0, "1/s", (0.0, 1000.0), "gain of the power controller"),
     ("Aset", 0.01, "pu/s", (0.0, 1000.0), "setpoint of the acceleration limiter"),
     ("Ka", 10.0, "1", (0.0, 1000.0), "gain of the acceleration limiter"),
-    ("Ta", 0.1, "s", (0.001, 100.0), "lag of the acceleration limiter"),
+    ("Ta", 0.1, *DIVIDING_TIME, "lag of the acceleration limiter"),
     ("db", 0.0, "pu", (0.0, 1.0), "dead band of the speed error"),
-    ("Tsa", 4.0, "s", (0.0, 100.0), "lead of the exhaust temperature"),
-    ("Tsb", 5.0, "s", (0.0, 100.0), "lag of the exhaust temperature"),
+    ("Tsa", 4.0, *TIME, "lead of the exhaust temperature"),
+    ("Tsb", 5.0, *TIME, "lag of the exhaust temperature"),
     ("Trate_Mbase", 1.0, "1", (0.01, 100.0), "turbine rating over the machine's base"),
 )
 

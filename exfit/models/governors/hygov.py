@@ -17,22 +17,21 @@ agrees where r Tr = 1. Not modelled: dead band and the curve of gate and power
 of later versions. Typical data are those of IEC 61970-302 (GovHydro1).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, limited
-from exfit.models.sheet import AS_IN_PSSE, record, sheet
+from exfit.models.blocks import Signal, clip, lag, larger, limited
+from exfit.models.sheet import AS_IN_PSSE, DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, record, sheet
 
 SHEET = sheet(
     ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
     ("r", 0.3, "pu", (0.001, 100.0), "temporary droop"),
     ("Tr", 5.0, "s", (0.001, 1000.0), "dashpot time constant"),
-    ("Tf", 0.05, "s", (0.001, 100.0), "filter lag"),
-    ("Tg", 0.5, "s", (0.0, 100.0), "gate servo lag"),
+    ("Tf", 0.05, *DIVIDING_TIME, "filter lag"),
+    ("Tg", 0.5, *TIME, "gate servo lag"),
     ("VELM", 0.2, "pu/s", (0.0001, 1000.0), "fastest motion of the gate"),
-    ("GMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the gate"),
-    ("GMIN", 0.0, "pu", (-10.0, 10.0), "floor of the gate"),
-    ("TW", 1.0, "s", (0.001, 100.0), "water starting time"),
+    ("GMAX", 1.0, *WITHIN_10, "ceiling of the gate"),
+    ("GMIN", 0.0, *WITHIN_10, "floor of the gate"),
+    ("TW", 1.0, *DIVIDING_TIME, "water starting time"),
     ("At", 1.2, "1", (0.001, 100.0), "turbine gain"),
-    ("Dturb", 0.5, "pu", (0.0, 100.0), "turbine damping"),
+    ("Dturb", 0.5, *UP_TO_100, "turbine damping"),
     ("qNL", 0.08, "pu", (0.0, 1.0), "flow at no load"),
 )
 

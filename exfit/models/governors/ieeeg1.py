@@ -21,26 +21,25 @@ Pm over their sum (ANDES scales them to 1). T1 = 0 bypasses its block with T2.
 Typical data are those of IEC 61970-302 (GovSteamIEEE1).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, limited
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag, limited
+from exfit.models.sheet import DIVIDING_TIME, TIME, WITHIN_10, record, sheet
 
 SHEET = sheet(
     ("K", 25.0, "pu", (0.01, 1000.0), "governor gain, 1 over the droop"),
-    ("T1", 0.0, "s", (0.0, 100.0), "governor lag"),
-    ("T2", 0.0, "s", (0.0, 100.0), "governor lead"),
-    ("T3", 0.1, "s", (0.001, 100.0), "valve positioner time constant"),
+    ("T1", 0.0, *TIME, "governor lag"),
+    ("T2", 0.0, *TIME, "governor lead"),
+    ("T3", 0.1, *DIVIDING_TIME, "valve positioner time constant"),
     ("UO", 1.0, "pu/s", (0.0001, 1000.0), "fastest opening of the valve"),
     ("UC", -10.0, "pu/s", (-1000.0, -0.0001), "fastest closing of the valve"),
-    ("PMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the valve"),
-    ("PMIN", 0.0, "pu", (-10.0, 10.0), "floor of the valve"),
-    ("T4", 0.3, "s", (0.0, 100.0), "steam inlet lag"),
+    ("PMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
+    ("PMIN", 0.0, *WITHIN_10, "floor of the valve"),
+    ("T4", 0.3, *TIME, "steam inlet lag"),
     ("K1", 0.2, "1", (0.0, 10.0), "share behind the steam inlet"),
-    ("T5", 5.0, "s", (0.0, 100.0), "second boiler pass lag"),
+    ("T5", 5.0, *TIME, "second boiler pass lag"),
     ("K3", 0.3, "1", (0.0, 10.0), "share behind the second boiler pass"),
-    ("T6", 0.5, "s", (0.0, 100.0), "third boiler pass lag"),
+    ("T6", 0.5, *TIME, "third boiler pass lag"),
     ("K5", 0.5, "1", (0.0, 10.0), "share behind the third boiler pass"),
-    ("T7", 0.0, "s", (0.0, 100.0), "fourth boiler pass lag"),
+    ("T7", 0.0, *TIME, "fourth boiler pass lag"),
     ("K7", 0.0, "1", (0.0, 10.0), "share behind the fourth boiler pass"),
 )
 

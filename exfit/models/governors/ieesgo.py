@@ -18,22 +18,21 @@ there. T1, T4, T5 or T6 = 0 bypasses its block. Typical data are those of a unit
 in a public library (iTesla, REN), with limits of 0 and 1.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag
+from exfit.models.sheet import DIVIDING_TIME, TIME, WITHIN_10, record, sheet
 
 SHEET = sheet(
-    ("T1", 0.0, "s", (0.0, 100.0), "controller lag"),
-    ("T2", 0.0, "s", (0.0, 100.0), "governor lead"),
-    ("T3", 0.02, "s", (0.001, 100.0), "governor lag"),
-    ("T4", 0.673, "s", (0.0, 100.0), "steam inlet lag"),
-    ("T5", 3.0, "s", (0.0, 100.0), "reheater lag"),
-    ("T6", 0.45, "s", (0.0, 100.0), "crossover lag"),
+    ("T1", 0.0, *TIME, "controller lag"),
+    ("T2", 0.0, *TIME, "governor lead"),
+    ("T3", 0.02, *DIVIDING_TIME, "governor lag"),
+    ("T4", 0.673, *TIME, "steam inlet lag"),
+    ("T5", 3.0, *TIME, "reheater lag"),
+    ("T6", 0.45, *TIME, "crossover lag"),
     ("K1", 14.3, "pu", (0.01, 1000.0), "governor gain, 1 over the droop"),
     ("K2", 0.7, "1", (0.0, 10.0), "share behind the reheater"),
     ("K3", 1.0, "1", (-10.0, 10.0), "share of that behind the crossover"),
-    ("PMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the power demand"),
-    ("PMIN", 0.0, "pu", (-10.0, 10.0), "floor of the power demand"),
+    ("PMAX", 1.0, *WITHIN_10, "ceiling of the power demand"),
+    ("PMIN", 0.0, *WITHIN_10, "floor of the power demand"),
 )
 
 RECORDS = (record("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN"),)

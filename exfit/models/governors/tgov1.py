@@ -10,18 +10,17 @@ pref is a speed, R times the power at rest. The limits are non-windup. Typical
 data are those of IEC 61970-302 (GovSteam0).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lead_lag, limited_lag
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, lead_lag, limited_lag
+from exfit.models.sheet import TIME, UP_TO_100, WITHIN_10, record, sheet
 
 SHEET = sheet(
     ("R", 0.05, "pu", (0.001, 10.0), "permanent droop"),
-    ("T1", 0.5, "s", (0.0, 100.0), "valve lag"),
-    ("VMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the valve"),
-    ("VMIN", 0.0, "pu", (-10.0, 10.0), "floor of the valve"),
-    ("T2", 3.0, "s", (0.0, 100.0), "reheater lead"),
-    ("T3", 10.0, "s", (0.0, 100.0), "reheater lag"),
-    ("Dt", 0.0, "pu", (0.0, 100.0), "turbine damping"),
+    ("T1", 0.5, *TIME, "valve lag"),
+    ("VMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
+    ("VMIN", 0.0, *WITHIN_10, "floor of the valve"),
+    ("T2", 3.0, *TIME, "reheater lead"),
+    ("T3", 10.0, *TIME, "reheater lag"),
+    ("Dt", 0.0, *UP_TO_100, "turbine damping"),
 )
 
 RECORDS = (record("TGOV1", "R T1 VMAX VMIN T2 T3 Dt"),)

@@ -41,8 +41,7 @@ exciter's field current as input. Typical data are the first set of the
 standard's sample data (GridKit, PSCAD).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import Limited, lag, where
+from exfit.models.blocks import Limited, Signal, lag, where
 from exfit.models.limiter_blocks import (
     BEYOND,
     counting,
@@ -53,37 +52,46 @@ from exfit.models.limiter_blocks import (
     timed_reference,
     timers,
 )
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import (
+    INTEGRAL_GAIN,
+    LONG_TIME,
+    PID_GAIN,
+    TIME,
+    UP_TO_10000,
+    WITHIN_1000,
+    record,
+    sheet,
+)
 
 PLACES = ("takeover", "takeover-output", "summing")
 INPUTS = ("ifd",)
 
 SHEET = sheet(
-    ("TC1OEL", 0.1, "s", (0.0, 100.0), "lead of the last block"),
-    ("TB1OEL", 0.1, "s", (0.0, 100.0), "lag of the last block"),
-    ("TC2OEL", 0.1, "s", (0.0, 100.0), "lead of the last but one"),
-    ("TB2OEL", 0.1, "s", (0.0, 100.0), "lag of the last but one"),
-    ("KPOEL", 0.5, "pu", (0.0, 100000.0), "proportional gain"),
-    ("KIOEL", 0.0, "pu", (0.0, 100000.0), "integral gain"),
-    ("KDOEL", 0.0, "pu", (0.0, 10000.0), "derivative gain"),
-    ("TDOEL", 0.1, "s", (0.0, 100.0), "derivative lag"),
-    ("VOELMAX3", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the PID"),
-    ("VOELMIN3", -100.0, "pu", (-1000.0, 1000.0), "floor of the PID"),
-    ("VOELMAX2", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the last block but one"),
-    ("VOELMIN2", -100.0, "pu", (-1000.0, 1000.0), "floor of the last block but one"),
-    ("VOELMAX1", 10.0, "pu", (-1000.0, 1000.0), "ceiling of the output"),
-    ("VOELMIN1", -10.0, "pu", (-1000.0, 1000.0), "floor of the output"),
-    ("IRESET", 100.0, "pu", (0.0, 10000.0), "bias while it is inactive"),
-    ("TEN", 0.2, "s", (0.0, 1000.0), "activation delay"),
-    ("TOFF", 5.0, "s", (0.0, 1000.0), "reset delay"),
+    ("TC1OEL", 0.1, *TIME, "lead of the last block"),
+    ("TB1OEL", 0.1, *TIME, "lag of the last block"),
+    ("TC2OEL", 0.1, *TIME, "lead of the last but one"),
+    ("TB2OEL", 0.1, *TIME, "lag of the last but one"),
+    ("KPOEL", 0.5, *PID_GAIN, "proportional gain"),
+    ("KIOEL", 0.0, *PID_GAIN, "integral gain"),
+    ("KDOEL", 0.0, *UP_TO_10000, "derivative gain"),
+    ("TDOEL", 0.1, *TIME, "derivative lag"),
+    ("VOELMAX3", 100.0, *WITHIN_1000, "ceiling of the PID"),
+    ("VOELMIN3", -100.0, *WITHIN_1000, "floor of the PID"),
+    ("VOELMAX2", 100.0, *WITHIN_1000, "ceiling of the last block but one"),
+    ("VOELMIN2", -100.0, *WITHIN_1000, "floor of the last block but one"),
+    ("VOELMAX1", 10.0, *WITHIN_1000, "ceiling of the output"),
+    ("VOELMIN1", -10.0, *WITHIN_1000, "floor of the output"),
+    ("IRESET", 100.0, *UP_TO_10000, "bias while it is inactive"),
+    ("TEN", 0.2, *LONG_TIME, "activation delay"),
+    ("TOFF", 5.0, *LONG_TIME, "reset delay"),
     ("ITHOFF", 0.05, "pu", (-10.0, 100.0), "distance below the reference that resets"),
     ("KSCALE", 1.0, "1", (0.0001, 1000.0), "scale of the field current"),
-    ("TROEL", 0.01, "s", (0.0, 100.0), "field current transducer lag"),
+    ("TROEL", 0.01, *TIME, "field current transducer lag"),
     ("KACT", 1.0, "1", (0.0001, 1000.0), "scale of the current that is limited"),
     ("ITFPU", 3.0, "pu", (0.0001, 1000.0), "field current above which the timer counts"),
     ("IINST", 6.0, "pu", (0.0001, 10000.0), "instantaneous limit"),
     ("ILIM", 3.0, "pu", (0.0001, 10000.0), "thermal limit"),
-    ("TAOEL", 0.04, "s", (0.0, 100.0), "lag of the reference"),
+    ("TAOEL", 0.04, *TIME, "lag of the reference"),
     ("C1", 0.0, "1", (0.0, 100.0), "exponent of the rate with SW1 = 1"),
     ("K1", 0.0, "pu/s", (-10000.0, 10000.0), "gain of the rate with SW1 = 1"),
     ("C2", 2.0, "1", (0.0, 100.0), "exponent of the inverse time"),
@@ -97,7 +105,7 @@ SHEET = sheet(
     ("TMIN", 0.0, "s", (-10000.0, 1000.0), "floor of the timer"),
     ("KFB", 0.0, "1/s", (0.0, 1000.0), "feedback of the timer"),
     ("KRD", -1000.0, "pu/s", (-100000.0, 0.0), "rate of the reference down"),
-    ("KRU", 1000.0, "pu/s", (0.0, 100000.0), "rate of the reference up"),
+    ("KRU", 1000.0, *INTEGRAL_GAIN, "rate of the reference up"),
     ("KZRU", 0.99, "1", (0.0, 1.0), "share of the timer at which the reference rises"),
     ("SW1", 0.0, "1", (0.0, 1.0), "rates of the reference: 0 fixed, 1 by the current"),
 )

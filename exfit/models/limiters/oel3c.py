@@ -17,10 +17,9 @@ public source says where it begins. Not modelled: the field voltage or the
 exciter's field current as input. Typical data are those of CoLib.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, limited_integrator, where
+from exfit.models.blocks import Signal, clip, lag, limited_integrator, where
 from exfit.models.limiter_blocks import power
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import TIME, UP_TO_1000, UP_TO_10000, WITHIN_1000, record, sheet
 
 DOUBT = "rests on one public diagram, that of Dynawo, which CoLib describes"
 PLACES = ("summing",)
@@ -29,15 +28,15 @@ INPUTS = ("ifd",)
 SHEET = sheet(
     ("ITFPU", 3.7, "pu", (0.001, 100.0), "field current above which it acts, scaled"),
     ("KSCALE", 1.0, "1", (0.0001, 1000.0), "scale of the field current"),
-    ("TF", 0.02, "s", (0.0, 100.0), "field current transducer lag"),
+    ("TF", 0.02, *TIME, "field current transducer lag"),
     ("K1", 1.0, "1", (0.1, 10.0), "exponent of the error"),
     ("KOEL", 1.0, "pu", (0.0001, 10000.0), "gain"),
     ("TOEL", 24.0, "s", (0.001, 10000.0), "integral time constant"),
-    ("KPOEL", 1.0, "pu", (0.0, 10000.0), "proportional gain"),
-    ("VOELMAX1", 0.66, "pu", (0.0, 1000.0), "ceiling of the integral"),
+    ("KPOEL", 1.0, *UP_TO_10000, "proportional gain"),
+    ("VOELMAX1", 0.66, *UP_TO_1000, "ceiling of the integral"),
     ("VOELMIN1", -1.0, "pu", (-1000.0, 0.0), "floor of the integral"),
-    ("VOELMAX2", 0.0, "pu", (-1000.0, 1000.0), "ceiling of the output"),
-    ("VOELMIN2", -1.0, "pu", (-1000.0, 1000.0), "floor of the output"),
+    ("VOELMAX2", 0.0, *WITHIN_1000, "ceiling of the output"),
+    ("VOELMIN2", -1.0, *WITHIN_1000, "floor of the output"),
 )
 
 RECORDS = (

@@ -21,10 +21,9 @@ equations are those of Dynawo, the parameters those of PSCAD's and GridKit's
 lists, whose first set of typical data this is. PSS/E's record is not known.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, limited, pi, where
+from exfit.models.blocks import Signal, clip, lag, lead_lag, limited, pi, where
 from exfit.models.limiter_blocks import latch, leaky_rest, power, timer, waiting_integral
-from exfit.models.sheet import sheet
+from exfit.models.sheet import LONG_TIME, PID_GAIN, TIME, UP_TO_1000, WITHIN_1000, sheet
 
 DOUBT = "rests on one public diagram, that of Dynawo, which CoLib describes"
 PLACES = ("takeover", "takeover-output")
@@ -36,20 +35,20 @@ SHEET = sheet(
     ("VOELMAX1", 9.49, "pu s", (0.0001, 10000.0), "ceiling of the count"),
     ("TOEL", 1.0, "s", (0.001, 10000.0), "time constant of the count"),
     ("KIFDT", 0.0043, "1", (0.0, 1000.0), "leak of the count"),
-    ("K", 1.0, "pu", (0.0, 1000.0), "gain of the lead-lag"),
-    ("TCOEL", 0.0, "s", (0.0, 100.0), "lead"),
-    ("TBOEL", 0.0, "s", (0.0, 100.0), "lag"),
+    ("K", 1.0, *UP_TO_1000, "gain of the lead-lag"),
+    ("TCOEL", 0.0, *TIME, "lead"),
+    ("TBOEL", 0.0, *TIME, "lag"),
     ("IFDPULEV", 1.4, "pu", (0.0001, 100.0), "field current above which it acts soon"),
-    ("TIFDLEV", 1.0, "s", (0.0, 1000.0), "time above that"),
+    ("TIFDLEV", 1.0, *LONG_TIME, "time above that"),
     ("IFDREF1", 1.25, "pu", (0.0001, 100.0), "reference until the count is over"),
     ("IFDREF2", 1.0, "pu", (0.0001, 100.0), "reference once it is over"),
-    ("KPOEL", 0.46, "pu", (0.0, 100000.0), "proportional gain"),
-    ("KIOEL", 17.36, "pu", (0.0, 100000.0), "integral gain"),
-    ("VOELMAX", 1.0, "pu", (-1000.0, 1000.0), "ceiling of the PI"),
-    ("VOELMIN", -0.99, "pu", (-1000.0, 1000.0), "floor of the PI"),
+    ("KPOEL", 0.46, *PID_GAIN, "proportional gain"),
+    ("KIOEL", 17.36, *PID_GAIN, "integral gain"),
+    ("VOELMAX", 1.0, *WITHIN_1000, "ceiling of the PI"),
+    ("VOELMIN", -0.99, *WITHIN_1000, "floor of the PI"),
     ("KSCALE1", 0.295, "1", (0.0001, 1000.0), "scale of the field current"),
-    ("TF1", 0.0, "s", (0.0, 100.0), "field current transducer lag"),
-    ("IBIAS", 1.0, "pu", (-1000.0, 1000.0), "output while it does not act"),
+    ("TF1", 0.0, *TIME, "field current transducer lag"),
+    ("IBIAS", 1.0, *WITHIN_1000, "output while it does not act"),
     ("K1", 1.0, "1", (0.1, 10.0), "exponent of the count"),
 )
 

@@ -29,10 +29,9 @@ a takeover, but they are 0 while it waits: at the gates of most exciters that
 would act at once. PSS/E's record is not known.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, larger, pi, smaller, where
+from exfit.models.blocks import Signal, lag, larger, pi, smaller, where
 from exfit.models.limiter_blocks import POWERS, power, stator_current, timer, waiting_integral
-from exfit.models.sheet import sheet
+from exfit.models.sheet import TIME, UP_TO_100, UP_TO_1000, UP_TO_10000, sheet
 
 DOUBT = "rests on one public diagram, that of Dynawo"
 PLACES = ("summing",)
@@ -40,20 +39,20 @@ INPUTS = ("vt", *POWERS)
 
 SHEET = sheet(
     ("ISCLLIM", 1.05, "pu", (0.0001, 100.0), "stator current above which it acts"),
-    ("TIT", 0.005, "s", (0.0, 100.0), "stator current transducer lag"),
+    ("TIT", 0.005, *TIME, "stator current transducer lag"),
     ("K", 1.0, "1", (0.1, 10.0), "exponent of the currents"),
-    ("TQSCL", 0.0, "s", (0.0, 100.0), "reactive current transducer lag"),
-    ("IQMIN", 0.0, "pu", (0.0, 100.0), "reactive current that it leaves"),
-    ("VSCLDB", 0.1, "pu", (0.0, 100.0), "dead band of the reactive power"),
+    ("TQSCL", 0.0, *TIME, "reactive current transducer lag"),
+    ("IQMIN", 0.0, *UP_TO_100, "reactive current that it leaves"),
+    ("VSCLDB", 0.1, *UP_TO_100, "dead band of the reactive power"),
     ("TINV", 30.0, "s", (0.0, 10000.0), "lag of the current that starts it at inverse time"),
     ("TDSCL", 0.0, "s", (0.0, 10000.0), "fixed delay"),
     ("SW1", 1.0, "1", (1.0, 2.0), "1 reactive current, 2 reactive power"),
     ("SW2", 1.0, "1", (0.0, 1.0), "0 fixed time, 1 inverse time"),
-    ("KPOEX", 0.0, "pu", (0.0, 10000.0), "proportional gain, overexcited"),
-    ("KIOEX", 0.2, "pu", (0.0, 10000.0), "integral gain, overexcited"),
-    ("KPUEX", 0.0, "pu", (0.0, 10000.0), "proportional gain, underexcited"),
-    ("KIUEX", 0.2, "pu", (0.0, 10000.0), "integral gain, underexcited"),
-    ("VSCLMAX", 1.0, "pu", (0.0, 1000.0), "ceiling of each PI"),
+    ("KPOEX", 0.0, *UP_TO_10000, "proportional gain, overexcited"),
+    ("KIOEX", 0.2, *UP_TO_10000, "integral gain, overexcited"),
+    ("KPUEX", 0.0, *UP_TO_10000, "proportional gain, underexcited"),
+    ("KIUEX", 0.2, *UP_TO_10000, "integral gain, underexcited"),
+    ("VSCLMAX", 1.0, *UP_TO_1000, "ceiling of each PI"),
     ("VSCLMIN", 0.0, "pu", (-1000.0, 0.0), "floor of each PI"),
 )
 

@@ -19,30 +19,29 @@ the output the limits of the PI. Typical data are the standard's sample data
 (PSCAD, IEC 61970-302) but for KUF.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lead_lag, pi, smaller
+from exfit.models.blocks import Signal, clip, lead_lag, pi, smaller
 from exfit.models.limiter_blocks import POWERS, waiting_integral
 from exfit.models.phasors import modulus
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import TIME, UP_TO_100, UP_TO_1000, UP_TO_10000, WITHIN_1000, record, sheet
 
 PLACES = ("takeover", "takeover-output", "summing")
 INPUTS = ("vt", *POWERS)
 
 SHEET = sheet(
     ("KUR", 1.95, "pu", (0.0001, 100.0), "radius"),
-    ("KUC", 1.38, "pu", (0.0, 100.0), "centre"),
-    ("VURMAX", 5.8, "pu", (0.0, 1000.0), "ceiling of the radius"),
-    ("VUCMAX", 5.8, "pu", (0.0, 1000.0), "ceiling of the distance from the centre"),
-    ("KUI", 0.0, "pu", (0.0, 10000.0), "integral gain"),
-    ("KUL", 100.0, "pu", (0.0, 10000.0), "proportional gain"),
-    ("VUIMAX", 18.0, "pu", (-1000.0, 1000.0), "ceiling of the PI"),
-    ("VUIMIN", -18.0, "pu", (-1000.0, 1000.0), "floor of the PI"),
-    ("TU1", 0.0, "s", (0.0, 100.0), "first lead"),
-    ("TU2", 0.05, "s", (0.0, 100.0), "first lag"),
-    ("TU3", 0.0, "s", (0.0, 100.0), "second lead"),
-    ("TU4", 0.0, "s", (0.0, 100.0), "second lag"),
-    ("VULMAX", 18.0, "pu", (-1000.0, 1000.0), "ceiling of the output"),
-    ("VULMIN", -18.0, "pu", (-1000.0, 1000.0), "floor of the output"),
+    ("KUC", 1.38, *UP_TO_100, "centre"),
+    ("VURMAX", 5.8, *UP_TO_1000, "ceiling of the radius"),
+    ("VUCMAX", 5.8, *UP_TO_1000, "ceiling of the distance from the centre"),
+    ("KUI", 0.0, *UP_TO_10000, "integral gain"),
+    ("KUL", 100.0, *UP_TO_10000, "proportional gain"),
+    ("VUIMAX", 18.0, *WITHIN_1000, "ceiling of the PI"),
+    ("VUIMIN", -18.0, *WITHIN_1000, "floor of the PI"),
+    ("TU1", 0.0, *TIME, "first lead"),
+    ("TU2", 0.05, *TIME, "first lag"),
+    ("TU3", 0.0, *TIME, "second lead"),
+    ("TU4", 0.0, *TIME, "second lag"),
+    ("VULMAX", 18.0, *WITHIN_1000, "ceiling of the output"),
+    ("VULMIN", -18.0, *WITHIN_1000, "floor of the output"),
 )
 
 RECORDS = (

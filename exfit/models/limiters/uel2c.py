@@ -25,11 +25,10 @@ Typical data are the standard's sample data (PSCAD, GridKit).
 
 from itertools import pairwise
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, inf, lag, limited_lag, limited_lead_lag, pi, where
+from exfit.models.blocks import Signal, clip, inf, lag, limited_lag, limited_lead_lag, pi, where
 from exfit.models.limiter_blocks import POWERS, power, waiting_integral
 from exfit.models.phasors import modulus
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import LONG_TIME, TIME, UP_TO_10000, WITHIN_1000, record, sheet
 
 PLACES = ("summing", "takeover", "takeover-output")
 INPUTS = ("vt", *POWERS)
@@ -38,29 +37,29 @@ POINTS = ((0.0, -0.31), (0.3, -0.31), (0.6, -0.28), (0.9, -0.21), (1.02, 0.0), *
 LEAST_GAIN = 0.1  # of kadj
 
 SHEET = sheet(
-    ("TUP", 5.0, "s", (0.0, 1000.0), "active power filter lag"),
-    ("TUQ", 0.0, "s", (0.0, 1000.0), "reactive power filter lag"),
-    ("TUV", 5.0, "s", (0.0, 1000.0), "voltage filter lag"),
+    ("TUP", 5.0, *LONG_TIME, "active power filter lag"),
+    ("TUQ", 0.0, *LONG_TIME, "reactive power filter lag"),
+    ("TUV", 5.0, *LONG_TIME, "voltage filter lag"),
     ("VBIAS", 1.0, "pu", (0.01, 10.0), "voltage bias"),
     ("K1", 2.0, "1", (0.0, 10.0), "exponent of the voltage at P of the points"),
     ("K2", 2.0, "1", (0.0, 10.0), "exponent of the voltage at Q of the points"),
-    ("TQREF", 0.0, "s", (0.0, 1000.0), "lag of the reference of Q"),
+    ("TQREF", 0.0, *LONG_TIME, "lag of the reference of Q"),
     ("KFIX", 1.0, "pu", (0.0001, 1000.0), "fixed gain reduction"),
-    ("TADJ", 3.0, "s", (0.0, 1000.0), "lag of the adjustable gain reduction"),
+    ("TADJ", 3.0, *LONG_TIME, "lag of the adjustable gain reduction"),
     ("SW1", 1.0, "1", (1.0, 2.0), "gain reduction: 1 fixed, 2 adjustable"),
     ("XQ", 0.6, "pu", (0.01, 10.0), "q-axis reactance of the machine, for SW1 = 2"),
-    ("KUI", 0.5, "pu", (0.0, 10000.0), "integral gain"),
-    ("KUL", 0.8, "pu", (0.0, 10000.0), "proportional gain"),
-    ("VUIMAX", 0.25, "pu", (-1000.0, 1000.0), "ceiling of the PI"),
-    ("VUIMIN", 0.0, "pu", (-1000.0, 1000.0), "floor of the PI"),
-    ("TU1", 0.0, "s", (0.0, 100.0), "first lead"),
-    ("TU2", 0.0, "s", (0.0, 100.0), "first lag"),
-    ("TU3", 0.0, "s", (0.0, 100.0), "second lead"),
-    ("TU4", 0.0, "s", (0.0, 100.0), "second lag"),
-    ("VUELMAX1", 0.25, "pu", (-1000.0, 1000.0), "ceiling of the output"),
-    ("VUELMIN1", 0.0, "pu", (-1000.0, 1000.0), "floor of the output"),
-    ("VUELMAX2", 99.0, "pu", (-1000.0, 1000.0), "ceiling of the first lead-lag"),
-    ("VUELMIN2", -99.0, "pu", (-1000.0, 1000.0), "floor of the first lead-lag"),
+    ("KUI", 0.5, *UP_TO_10000, "integral gain"),
+    ("KUL", 0.8, *UP_TO_10000, "proportional gain"),
+    ("VUIMAX", 0.25, *WITHIN_1000, "ceiling of the PI"),
+    ("VUIMIN", 0.0, *WITHIN_1000, "floor of the PI"),
+    ("TU1", 0.0, *TIME, "first lead"),
+    ("TU2", 0.0, *TIME, "first lag"),
+    ("TU3", 0.0, *TIME, "second lead"),
+    ("TU4", 0.0, *TIME, "second lag"),
+    ("VUELMAX1", 0.25, *WITHIN_1000, "ceiling of the output"),
+    ("VUELMIN1", 0.0, *WITHIN_1000, "floor of the output"),
+    ("VUELMAX2", 99.0, *WITHIN_1000, "ceiling of the first lead-lag"),
+    ("VUELMIN2", -99.0, *WITHIN_1000, "floor of the first lead-lag"),
     *(
         row
         for k, (P, Q) in enumerate(POINTS)

@@ -14,10 +14,10 @@ from exfit.models.machines.machine import (
     descending,
     saturation_order,
 )
-from exfit.models.sheet import sheet
+from exfit.models.sheet import POSITIVE_TIME, sheet
 
 SHEET = sheet(
-    ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
+    ("Tpd0", 6.35, *POSITIVE_TIME, "d-axis transient time constant"),
     *SWING,
     ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance, on load"),
     ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),

@@ -4,8 +4,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Literal
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, where
+from exfit.models.blocks import Signal, lag, where
 from exfit.models.machines.d_axis import (
     D_AXIS,
     D_AXIS_DRAWING,
@@ -33,12 +32,12 @@ from exfit.models.machines.machine import (
     pslf_record,
     saturation_order,
 )
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import LONG_TIME, POSITIVE_TIME, TIME, UP_TO_10, record, sheet
 
 SHEET = sheet(
-    ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
-    ("Tppd0", 0.06, "s", (0.0, 1000.0), "d-axis subtransient time constant"),
-    ("Tpq0", 0.5, "s", (0.0, 100.0), "q-axis transient time constant, on load"),
+    ("Tpd0", 6.35, *POSITIVE_TIME, "d-axis transient time constant"),
+    ("Tppd0", 0.06, *LONG_TIME, "d-axis subtransient time constant"),
+    ("Tpq0", 0.5, *TIME, "q-axis transient time constant, on load"),
     ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
     *SWING,
     ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
@@ -46,7 +45,7 @@ SHEET = sheet(
     ("Xpd", 0.3, "pu", (0.001, 10.0), "d-axis transient reactance"),
     ("Xpq", 0.55, "pu", (0.001, 10.0), "q-axis transient reactance, on load"),
     ("Xppd", 0.25, "pu", (0.001, 10.0), "subtransient reactance"),
-    ("Xl", 0.2, "pu", (0.0, 10.0), "leakage reactance"),
+    ("Xl", 0.2, *UP_TO_10, "leakage reactance"),
     *SATURATION,
 )
 

@@ -6,8 +6,7 @@ GENSAL saturates by E'q, on the d axis alone; GENSAE by the air-gap flux on both
 from collections.abc import Mapping
 from functools import partial
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import lag
+from exfit.models.blocks import Signal, lag
 from exfit.models.machines.d_axis import (
     D_AXIS,
     D_AXIS_DRAWING,
@@ -35,18 +34,18 @@ from exfit.models.machines.machine import (
     pslf_record,
     saturation_order,
 )
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import LONG_TIME, POSITIVE_TIME, UP_TO_10, record, sheet
 
 SHEET = sheet(
-    ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
-    ("Tppd0", 0.06, "s", (0.0, 1000.0), "d-axis subtransient time constant"),
+    ("Tpd0", 6.35, *POSITIVE_TIME, "d-axis transient time constant"),
+    ("Tppd0", 0.06, *LONG_TIME, "d-axis subtransient time constant"),
     ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
     *SWING,
     ("Xd", 1.071, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
     ("Xq", 0.704, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
     ("Xpd", 0.351, "pu", (0.001, 10.0), "d-axis transient reactance"),
     ("Xppd", 0.296, "pu", (0.001, 10.0), "subtransient reactance"),
-    ("Xl", 0.154, "pu", (0.0, 10.0), "leakage reactance"),
+    ("Xl", 0.154, *UP_TO_10, "leakage reactance"),
     *SATURATION,
 )
 

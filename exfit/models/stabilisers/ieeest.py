@@ -12,9 +12,9 @@ as the power, is refused then. Not modelled: a switch-off at terminal voltages
 beyond VCU and VCL.
 """
 
-from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     SHORTEST,
+    Signal,
     clip,
     is_curved,
     lead_lag,
@@ -23,26 +23,23 @@ from exfit.models.blocks import (
     washout_or_lag,
     where,
 )
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import LONG_TIME, SHORT_TIME, WITHIN_10000, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("speed",)
 
 SHEET = sheet(
-    ("A1", 0.061, "s", (0.0, 10.0), "first coefficient of the first filter"),
+    ("A1", 0.061, *SHORT_TIME, "first coefficient of the first filter"),
     ("A2", 0.0017, "s2", (0.0, 10.0), "second coefficient of the first filter"),
-    ("A3", 0.0, "s", (0.0, 10.0), "first coefficient of the second filter"),
+    ("A3", 0.0, *SHORT_TIME, "first coefficient of the second filter"),
     ("A4", 0.0, "s2", (0.0, 10.0), "second coefficient of the second filter"),
     ("A5", 0.0, "s", (-10.0, 10.0), "first coefficient of the filters' numerator"),
     ("A6", 0.0, "s2", (-10.0, 10.0), "second coefficient of the filters' numerator"),
-    ("T1", 0.15, "s", (0.0, 100.0), "first lead"),
-    ("T2", 0.03, "s", (0.0, 100.0), "first lag"),
-    ("T3", 0.15, "s", (0.0, 100.0), "second lead"),
-    ("T4", 0.03, "s", (0.0, 100.0), "second lag"),
-    ("T5", 1.65, "s", (0.0, 1000.0), "washout lead"),
+    *of_stabiliser(T1=0.15, T2=0.03, T3=0.15, T4=0.03),
+    ("T5", 1.65, *LONG_TIME, "washout lead"),
     ("T6", 1.65, "s", (0.001, 1000.0), "washout lag"),
-    ("KS", 6.2, "pu", (-10000.0, 10000.0), "gain"),
-    ("LSMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-    ("LSMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+    ("KS", 6.2, *WITHIN_10000, "gain"),
+    *of_stabiliser(LSMAX=0.1, LSMIN=-0.1),
 )
 
 RECORDS = (

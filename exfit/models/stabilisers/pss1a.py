@@ -10,24 +10,20 @@ bypasses its block. Not modelled: a switch-off at terminal voltages beyond
 VCU and VCL, which some programs add.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, second_order, washout
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag, second_order, washout
+from exfit.models.sheet import SHORT_TIME, WASHOUT_TIME, WITHIN_10000, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("speed",)
 
 SHEET = sheet(
-    ("A1", 0.061, "s", (0.0, 10.0), "first coefficient of the filter"),
+    ("A1", 0.061, *SHORT_TIME, "first coefficient of the filter"),
     ("A2", 0.0017, "s2", (0.0, 10.0), "second coefficient of the filter"),
-    ("T1", 0.3, "s", (0.0, 100.0), "first lead"),
-    ("T2", 0.03, "s", (0.0, 100.0), "first lag"),
-    ("T3", 0.3, "s", (0.0, 100.0), "second lead"),
-    ("T4", 0.03, "s", (0.0, 100.0), "second lag"),
-    ("T5", 10.0, "s", (0.01, 1000.0), "washout time constant"),
-    ("T6", 0.0, "s", (0.0, 10.0), "transducer lag"),
-    ("KS", 5.0, "pu", (-10000.0, 10000.0), "gain"),
-    ("VSTMAX", 0.05, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-    ("VSTMIN", -0.05, "pu", (-9999.0, 9999.0), "floor of the output"),
+    *of_stabiliser(T1=0.3, T2=0.03, T3=0.3, T4=0.03),
+    ("T5", 10.0, *WASHOUT_TIME, "washout time constant"),
+    ("T6", 0.0, *SHORT_TIME, "transducer lag"),
+    ("KS", 5.0, *WITHIN_10000, "gain"),
+    *of_stabiliser(VSTMAX=0.05, VSTMIN=-0.05),
 )
 
 RECORDS = (

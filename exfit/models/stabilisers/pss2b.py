@@ -19,40 +19,41 @@ to 5. With T10 = T11 = 0 and input limits out of reach this is PSS2A, whose
 record has no such rows: it is read as PSS2B with these values.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lead_lag
-from exfit.models.sheet import record, sheet
-from exfit.models.stabiliser_parts import accelerating, accelerating_rest
+from exfit.models.blocks import Signal, clip, lead_lag
+from exfit.models.sheet import (
+    DIVIDING_TIME,
+    LIMIT,
+    LONG_TIME,
+    TIME,
+    WASHOUT_TIME,
+    WITHIN_1000,
+    record,
+    sheet,
+)
+from exfit.models.stabiliser_parts import accelerating, accelerating_rest, of_stabiliser
 
 INPUTS = ("speed", "p")
 ALIASES = ("PSS2A",)
 NO_LIMIT = 9999.0  # pu
 
 SHEET = sheet(
-    ("TW1", 10.0, "s", (0.01, 1000.0), "first washout of the first input"),
-    ("TW2", 10.0, "s", (0.0, 1000.0), "second washout of the first input"),
-    ("T6", 0.0, "s", (0.0, 100.0), "transducer lag of the first input"),
-    ("TW3", 10.0, "s", (0.01, 1000.0), "first washout of the second input"),
-    ("TW4", 0.0, "s", (0.0, 1000.0), "second washout of the second input"),
-    ("T7", 10.0, "s", (0.0, 1000.0), "transducer lag of the second input"),
-    ("KS2", 0.99, "pu", (-1000.0, 1000.0), "gain of the second input"),
-    ("KS3", 1.0, "pu", (-1000.0, 1000.0), "share of the second input that is filtered"),
-    ("T8", 0.5, "s", (0.0, 100.0), "lead of the ramp tracking filter"),
-    ("T9", 0.1, "s", (0.001, 100.0), "lag of the ramp tracking filter"),
+    ("TW1", 10.0, *WASHOUT_TIME, "first washout of the first input"),
+    ("TW2", 10.0, *LONG_TIME, "second washout of the first input"),
+    ("T6", 0.0, *TIME, "transducer lag of the first input"),
+    ("TW3", 10.0, *WASHOUT_TIME, "first washout of the second input"),
+    ("TW4", 0.0, *LONG_TIME, "second washout of the second input"),
+    ("T7", 10.0, *LONG_TIME, "transducer lag of the second input"),
+    ("KS2", 0.99, *WITHIN_1000, "gain of the second input"),
+    ("KS3", 1.0, *WITHIN_1000, "share of the second input that is filtered"),
+    ("T8", 0.5, *TIME, "lead of the ramp tracking filter"),
+    ("T9", 0.1, *DIVIDING_TIME, "lag of the ramp tracking filter"),
     ("M", 5.0, "1", (1.0, 5.0), "number of lags of the ramp tracking filter"),
-    ("KS1", 20.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
-    ("T1", 0.15, "s", (0.0, 100.0), "first lead"),
-    ("T2", 0.025, "s", (0.0, 100.0), "first lag"),
-    ("T3", 0.15, "s", (0.0, 100.0), "second lead"),
-    ("T4", 0.025, "s", (0.0, 100.0), "second lag"),
-    ("T10", 0.0, "s", (0.0, 100.0), "third lead"),
-    ("T11", 0.033, "s", (0.0, 100.0), "third lag"),
-    ("VSI1MAX", 0.08, "pu", (-9999.0, 9999.0), "ceiling of the first input"),
-    ("VSI1MIN", -0.08, "pu", (-9999.0, 9999.0), "floor of the first input"),
-    ("VSI2MAX", 1.25, "pu", (-9999.0, 9999.0), "ceiling of the second input"),
-    ("VSI2MIN", -1.25, "pu", (-9999.0, 9999.0), "floor of the second input"),
-    ("VSTMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-    ("VSTMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+    *of_stabiliser(KS1=20.0, T1=0.15, T2=0.025, T3=0.15, T4=0.025, T10=0.0, T11=0.033),
+    ("VSI1MAX", 0.08, *LIMIT, "ceiling of the first input"),
+    ("VSI1MIN", -0.08, *LIMIT, "floor of the first input"),
+    ("VSI2MAX", 1.25, *LIMIT, "ceiling of the second input"),
+    ("VSI2MIN", -1.25, *LIMIT, "floor of the second input"),
+    *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
 )
 
 PSS2A_HELD = {

@@ -28,15 +28,15 @@ make a compensated frequency of an input of PSS/E. Typical data are a sample of
 the standard, as GridKit has them, with KS2 for H = 5.05 s.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lead_lag
-from exfit.models.sheet import MOST_LAGS, record, sheet
+from exfit.models.blocks import Signal, clip, lead_lag
+from exfit.models.sheet import MOST_LAGS, TIME, record, sheet
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
     INPUT_LIMITS,
     SWITCH,
     accelerating,
     accelerating_rest,
+    of_stabiliser,
     switch_rest,
     switched,
 )
@@ -46,17 +46,10 @@ INPUTS = ("speed", "p")
 SHEET = (
     *ACCELERATING,
     *sheet(
-        ("KS1", 5.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
-        ("T1", 0.16, "s", (0.0, 100.0), "first lead"),
-        ("T2", 0.04, "s", (0.0, 100.0), "first lag"),
-        ("T3", 0.16, "s", (0.0, 100.0), "second lead"),
-        ("T4", 0.04, "s", (0.0, 100.0), "second lag"),
-        ("T10", 0.18, "s", (0.0, 100.0), "third lead"),
-        ("T11", 0.03, "s", (0.0, 100.0), "third lag"),
-        ("T12", 0.0, "s", (0.0, 100.0), "fourth lead"),
-        ("T13", 0.0, "s", (0.0, 100.0), "fourth lag"),
-        ("VSTMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-        ("VSTMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+        *of_stabiliser(KS1=5.0, T1=0.16, T2=0.04, T3=0.16, T4=0.04, T10=0.18, T11=0.03),
+        ("T12", 0.0, *TIME, "fourth lead"),
+        ("T13", 0.0, *TIME, "fourth lag"),
+        *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
     ),
     *INPUT_LIMITS,
     *SWITCH,

@@ -15,30 +15,29 @@ T1 or T2 = 0 bypasses its block, TW3 = 0 leaves out its washout. A4 = 0 leaves a
 lag, without A2, and A3 = A4 = 0 no filter; so do A7 and A8.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, high_pass, lag, second_order_lead
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, high_pass, lag, second_order_lead
+from exfit.models.sheet import LONG_TIME, TIME, WASHOUT_TIME, WITHIN_10000, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("p", "speed")
 
 SHEET = sheet(
-    ("KS1", -0.602, "pu", (-10000.0, 10000.0), "gain of the first input"),
-    ("T1", 0.012, "s", (0.0, 100.0), "transducer lag of the first input"),
-    ("TW1", 0.3, "s", (0.01, 1000.0), "washout of the first input"),
-    ("KS2", 30.12, "pu", (-10000.0, 10000.0), "gain of the second input"),
-    ("T2", 0.012, "s", (0.0, 100.0), "transducer lag of the second input"),
-    ("TW2", 0.3, "s", (0.01, 1000.0), "washout of the second input"),
-    ("TW3", 0.6, "s", (0.0, 1000.0), "washout of the sum"),
+    ("KS1", -0.602, *WITHIN_10000, "gain of the first input"),
+    *of_stabiliser(T1_OF_INPUT=0.012),
+    ("TW1", 0.3, *WASHOUT_TIME, "washout of the first input"),
+    ("KS2", 30.12, *WITHIN_10000, "gain of the second input"),
+    *of_stabiliser(T2_OF_INPUT=0.012),
+    ("TW2", 0.3, *WASHOUT_TIME, "washout of the second input"),
+    ("TW3", 0.6, *LONG_TIME, "washout of the sum"),
     ("A1", 0.359, "s", (-100.0, 100.0), "first coefficient of the first numerator"),
     ("A2", 0.586, "s2", (-100.0, 100.0), "second coefficient of the first numerator"),
-    ("A3", 0.429, "s", (0.0, 100.0), "first coefficient of the first filter"),
+    ("A3", 0.429, *TIME, "first coefficient of the first filter"),
     ("A4", 0.564, "s2", (0.0, 100.0), "second coefficient of the first filter"),
     ("A5", 0.001, "s", (-100.0, 100.0), "first coefficient of the second numerator"),
     ("A6", 0.0, "s2", (-100.0, 100.0), "second coefficient of the second numerator"),
-    ("A7", 0.031, "s", (0.0, 100.0), "first coefficient of the second filter"),
+    ("A7", 0.031, *TIME, "first coefficient of the second filter"),
     ("A8", 0.0, "s2", (0.0, 100.0), "second coefficient of the second filter"),
-    ("VSTMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-    ("VSTMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+    *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
 )
 
 RECORDS = (

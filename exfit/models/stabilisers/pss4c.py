@@ -35,8 +35,7 @@ the 2 H of the machine need its value here. Typical data of the bands are the
 standard's, as GridKit has them, of the transducers PSS4B's.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip
+from exfit.models.blocks import Signal, clip
 from exfit.models.sheet import Parameter, record, with_typical
 from exfit.models.stabilisers import pss4b
 

@@ -30,34 +30,33 @@ notches and but for the sign of D (-0.001759 in CIM's PSS4B). Typical data are
 the standard's, as GridKit has them.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, second_order, second_order_lead
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag, second_order, second_order_lead
+from exfit.models.sheet import LIMIT, WITHIN_10000, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("speed",)
 
 SHEET = sheet(
-    ("KVL", 0.5, "pu", (-10000.0, 10000.0), "gain of the very low band"),
+    ("KVL", 0.5, *WITHIN_10000, "gain of the very low band"),
     ("FVL", 0.01, "Hz", (0.0001, 100.0), "central frequency of the very low band"),
-    ("VVLMAX", 0.01, "pu", (-9999.0, 9999.0), "ceiling of the very low band"),
-    ("VVLMIN", -0.01, "pu", (-9999.0, 9999.0), "floor of the very low band"),
-    ("KL", 3.0, "pu", (-10000.0, 10000.0), "gain of the low band"),
+    ("VVLMAX", 0.01, *LIMIT, "ceiling of the very low band"),
+    ("VVLMIN", -0.01, *LIMIT, "floor of the very low band"),
+    ("KL", 3.0, *WITHIN_10000, "gain of the low band"),
     ("FL", 0.07, "Hz", (0.0001, 100.0), "central frequency of the low band"),
-    ("VLMAX", 0.075, "pu", (-9999.0, 9999.0), "ceiling of the low band"),
-    ("VLMIN", -0.075, "pu", (-9999.0, 9999.0), "floor of the low band"),
-    ("KI", 20.0, "pu", (-10000.0, 10000.0), "gain of the intermediate band"),
+    ("VLMAX", 0.075, *LIMIT, "ceiling of the low band"),
+    ("VLMIN", -0.075, *LIMIT, "floor of the low band"),
+    ("KI", 20.0, *WITHIN_10000, "gain of the intermediate band"),
     ("FI", 0.6, "Hz", (0.0001, 100.0), "central frequency of the intermediate band"),
-    ("VIMAX", 0.6, "pu", (-9999.0, 9999.0), "ceiling of the intermediate band"),
-    ("VIMIN", -0.6, "pu", (-9999.0, 9999.0), "floor of the intermediate band"),
-    ("KH", 80.0, "pu", (-10000.0, 10000.0), "gain of the high band"),
+    ("VIMAX", 0.6, *LIMIT, "ceiling of the intermediate band"),
+    ("VIMIN", -0.6, *LIMIT, "floor of the intermediate band"),
+    ("KH", 80.0, *WITHIN_10000, "gain of the high band"),
     ("FH", 9.0, "Hz", (0.0001, 100.0), "central frequency of the high band"),
-    ("VHMAX", 0.6, "pu", (-9999.0, 9999.0), "ceiling of the high band"),
-    ("VHMIN", -0.6, "pu", (-9999.0, 9999.0), "floor of the high band"),
+    ("VHMAX", 0.6, *LIMIT, "ceiling of the high band"),
+    ("VHMIN", -0.6, *LIMIT, "floor of the high band"),
     ("K1", 5.736, "1", (0.001, 1000.0), "rate of the slowest lag over the central frequency"),
     ("K2", 6.883, "1", (0.001, 1000.0), "rate of a lead and a lag over the central frequency"),
     ("K3", 8.259, "1", (0.001, 1000.0), "rate of the fastest lead over the central frequency"),
-    ("VSTMAX", 0.15, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-    ("VSTMIN", -0.15, "pu", (-9999.0, 9999.0), "floor of the output"),
+    *of_stabiliser(VSTMAX=0.15, VSTMIN=-0.15),
 )
 
 RECORDS = (

@@ -30,15 +30,24 @@ a response do not include the shift of the jumps. T1, T2 or T3 = 0 bypasses its
 block. Typical data are the standard's, as GridKit has them.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, high_pass, lag, washout
-from exfit.models.sheet import record, sheet, with_typical
+from exfit.models.blocks import Signal, clip, high_pass, lag, washout
+from exfit.models.sheet import (
+    DIVIDING_TIME,
+    TIME,
+    WASHOUT_TIME,
+    WITHIN_1000,
+    WITHIN_10000,
+    record,
+    sheet,
+    with_typical,
+)
 from exfit.models.stabiliser_parts import (
     CANONICAL,
     INPUT_LIMITS,
     SWITCH,
     canonical,
     limited_inputs,
+    of_stabiliser,
     switch_rest,
     switched,
 )
@@ -47,17 +56,16 @@ INPUTS = ("p", "speed")
 
 SHEET = (
     *sheet(
-        ("KS1", 1.0, "pu", (-1000.0, 1000.0), "gain of the first input"),
-        ("T1", 0.01, "s", (0.0, 100.0), "transducer lag of the first input"),
-        ("T3", 0.4405, "s", (0.0, 100.0), "lag of the first input"),
-        ("KS2", 1.0, "pu", (-1000.0, 1000.0), "gain of the second input"),
+        ("KS1", 1.0, *WITHIN_1000, "gain of the first input"),
+        *of_stabiliser(T1_OF_INPUT=0.01),
+        ("T3", 0.4405, *TIME, "lag of the first input"),
+        ("KS2", 1.0, *WITHIN_1000, "gain of the second input"),
         ("MACC", 20.6838, "s", (-1000.0, 1000.0), "lead of the second input"),
-        ("T2", 0.01, "s", (0.0, 100.0), "transducer lag of the second input"),
-        ("T4", 0.4405, "s", (0.001, 100.0), "lag of the second input"),
-        ("TD", 1.7809, "s", (0.01, 1000.0), "washout of the sum"),
-        ("KS", 1.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
-        ("VSTMAX", 0.05, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-        ("VSTMIN", -0.05, "pu", (-9999.0, 9999.0), "floor of the output"),
+        *of_stabiliser(T2_OF_INPUT=0.01),
+        ("T4", 0.4405, *DIVIDING_TIME, "lag of the second input"),
+        ("TD", 1.7809, *WASHOUT_TIME, "washout of the sum"),
+        ("KS", 1.0, *WITHIN_10000, "stabiliser gain"),
+        *of_stabiliser(VSTMAX=0.05, VSTMIN=-0.05),
     ),
     *with_typical(
         CANONICAL,

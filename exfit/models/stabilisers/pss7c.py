@@ -33,8 +33,7 @@ of an input of PSS/E. Typical data are the standard's, as GridKit has them, but
 for KS2, which is that of H = 5.05 s as in PSS2C (there 0.7052).
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip
+from exfit.models.blocks import Signal, clip
 from exfit.models.sheet import MOST_LAGS, record, sheet, with_typical
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
@@ -44,6 +43,7 @@ from exfit.models.stabiliser_parts import (
     accelerating,
     accelerating_rest,
     canonical,
+    of_stabiliser,
     switch_rest,
     switched,
 )
@@ -53,9 +53,7 @@ INPUTS = ("speed", "p")
 SHEET = (
     *ACCELERATING,
     *sheet(
-        ("KS1", 50.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
-        ("VSTMAX", 0.05, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-        ("VSTMIN", -0.05, "pu", (-9999.0, 9999.0), "floor of the output"),
+        *of_stabiliser(KS1=50.0, VSTMAX=0.05, VSTMIN=-0.05),
     ),
     *with_typical(
         CANONICAL,

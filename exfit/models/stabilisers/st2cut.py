@@ -15,27 +15,25 @@ then. Not modelled: the cut-off where the terminal voltage leaves its initial
 value by more than VCU and VCL.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, lead_lag, washout_or_lag
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, lead_lag, washout_or_lag
+from exfit.models.sheet import LONG_TIME, TIME, WITHIN_10000, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("speed", "p")
 
 SHEET = sheet(
-    ("K1", 5.0, "pu", (-10000.0, 10000.0), "gain of the first input"),
-    ("K2", 0.0, "pu", (-10000.0, 10000.0), "gain of the second input"),
-    ("T1", 0.02, "s", (0.0, 100.0), "transducer lag of the first input"),
-    ("T2", 0.02, "s", (0.0, 100.0), "transducer lag of the second input"),
-    ("T3", 10.0, "s", (0.0, 1000.0), "washout lead"),
+    ("K1", 5.0, *WITHIN_10000, "gain of the first input"),
+    ("K2", 0.0, *WITHIN_10000, "gain of the second input"),
+    *of_stabiliser(T1_OF_INPUT=0.02, T2_OF_INPUT=0.02),
+    ("T3", 10.0, *LONG_TIME, "washout lead"),
     ("T4", 10.0, "s", (0.001, 1000.0), "washout lag"),
-    ("T5", 0.3, "s", (0.0, 100.0), "first lead"),
-    ("T6", 0.03, "s", (0.0, 100.0), "first lag"),
-    ("T7", 0.3, "s", (0.0, 100.0), "second lead"),
-    ("T8", 0.03, "s", (0.0, 100.0), "second lag"),
-    ("T9", 0.0, "s", (0.0, 100.0), "third lead"),
-    ("T10", 0.0, "s", (0.0, 100.0), "third lag"),
-    ("LSMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
-    ("LSMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+    ("T5", 0.3, *TIME, "first lead"),
+    ("T6", 0.03, *TIME, "first lag"),
+    ("T7", 0.3, *TIME, "second lead"),
+    ("T8", 0.03, *TIME, "second lag"),
+    ("T9", 0.0, *TIME, "third lead"),
+    ("T10", 0.0, *TIME, "third lag"),
+    *of_stabiliser(LSMAX=0.1, LSMIN=-0.1),
 )
 
 RECORDS = (

@@ -8,20 +8,19 @@ The data sheet gives three ratios, as PSS/E does (there K/T, T1/T3 and T2/T4):
 K = K_T T, T1 = T1_T3 T3 and T2 = T2_T4 T4. T3 = 0 or T4 = 0 bypasses its block.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lead_lag, washout
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lead_lag, washout
+from exfit.models.sheet import TIME, WASHOUT_TIME, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("speed",)
 
 SHEET = sheet(
     ("K_T", 5.0, "pu/s", (-10000.0, 10000.0), "K/T: gain over washout time constant"),
-    ("T", 10.0, "s", (0.01, 1000.0), "washout time constant"),
+    ("T", 10.0, *WASHOUT_TIME, "washout time constant"),
     ("T1_T3", 10.0, "1", (0.0, 1000.0), "T1/T3: first lead over first lag"),
-    ("T3", 0.05, "s", (0.0, 100.0), "first lag"),
+    ("T3", 0.05, *TIME, "first lag"),
     ("T2_T4", 10.0, "1", (0.0, 1000.0), "T2/T4: second lead over second lag"),
-    ("T4", 0.05, "s", (0.0, 100.0), "second lag"),
-    ("HLIM", 0.05, "pu", (0.0001, 9999.0), "limit of the output, both ways"),
+    *of_stabiliser(T4=0.05, HLIM=0.05),
 )
 
 RECORDS = (record("STAB1", "K_T T T1_T3 T3 T2_T4 T4 HLIM"),)

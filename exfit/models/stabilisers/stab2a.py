@@ -12,21 +12,21 @@ bypasses its block. Typical data are those of a unit in a public library, whose
 drawing this is (OpenIPSL); that of PSS/E was not seen.
 """
 
-from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, washout
-from exfit.models.sheet import record, sheet
+from exfit.models.blocks import Signal, clip, lag, washout
+from exfit.models.sheet import LONG_TIME, WASHOUT_TIME, WITHIN_1000, record, sheet
+from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("p",)
 
 SHEET = sheet(
-    ("K2", 1.0, "pu", (-1000.0, 1000.0), "gain of each washout"),
-    ("T2", 4.4, "s", (0.01, 1000.0), "time constant of each washout"),
-    ("K3", 10.0, "pu", (-1000.0, 1000.0), "gain of the lagged branch"),
-    ("T3", 1.8, "s", (0.0, 1000.0), "lag of the lagged branch"),
-    ("K4", 1.0, "pu", (-1000.0, 1000.0), "gain of the direct branch"),
-    ("K5", 1.41, "pu", (-1000.0, 1000.0), "gain of each output lag"),
-    ("T5", 0.01, "s", (0.0, 1000.0), "each output lag"),
-    ("HLIM", 0.05, "pu", (0.0001, 9999.0), "limit of the output, both ways"),
+    ("K2", 1.0, *WITHIN_1000, "gain of each washout"),
+    ("T2", 4.4, *WASHOUT_TIME, "time constant of each washout"),
+    ("K3", 10.0, *WITHIN_1000, "gain of the lagged branch"),
+    ("T3", 1.8, *LONG_TIME, "lag of the lagged branch"),
+    ("K4", 1.0, *WITHIN_1000, "gain of the direct branch"),
+    ("K5", 1.41, *WITHIN_1000, "gain of each output lag"),
+    ("T5", 0.01, *LONG_TIME, "each output lag"),
+    *of_stabiliser(HLIM=0.05),
 )
 
 RECORDS = (
