@@ -14,33 +14,38 @@ from exfit.models.sheet import Model, model
 
 
 class Catalogue(Mapping[str, Model]):
-    """Models by name: a file each in a package, named after the model, loaded on first use.
+    """Models by name, in the order of the alphabet, each loaded on first use.
 
-    Their order is that of the alphabet.
+    A file of the package is named after its model, or after a family whose models it holds.
     """
 
     def __init__(self, package: ModuleType) -> None:
         self.package = package.__name__
-        self.names = tuple(sorted(file.name.upper() for file in iter_modules(package.__path__)))
+        families = vars(package).get("FAMILIES", {})
+        names = {
+            name: file.name
+            for file in iter_modules(package.__path__)
+            for name in families.get(file.name, file.name.upper()).split()
+        }
+        self.files = dict(sorted(names.items()))
 
     def __getitem__(self, name: str) -> Model:
-        if name not in self.names:
-            raise KeyError(name)
-        return _loaded(self.package, name)
+        return _loaded(name, f"{self.package}.{self.files[name]}")
 
     def __contains__(self, name: object) -> bool:
-        return name in self.names
+        return name in self.files
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.names)
+        return iter(self.files)
 
     def __len__(self) -> int:
-        return len(self.names)
+        return len(self.files)
 
 
 @cache
-def _loaded(package: str, name: str) -> Model:
-    return model(name, vars(import_module(f"{package}.{name.lower()}")))
+def _loaded(name: str, file: str) -> Model:
+    names = vars(import_module(file))
+    return names[name] if name in names else model(name, names)
 
 
 MODELS = Catalogue(exciters)

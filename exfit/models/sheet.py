@@ -1,8 +1,9 @@
 """A model as data: its data sheet, its states and its functions."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from inspect import cleandoc
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
@@ -355,6 +356,45 @@ class Model:
     doubt: str = ""
 
 
+def documented(
+    equations: Callable[..., Any],
+    rest: Callable[..., Any],
+    rows: Sheet,
+    states: str,
+    *,
+    text: str | None = None,
+    setpoints: str = "",
+    aliases: Sequence[str] = (),
+    records: Sequence[DynamicsRecord] = (),
+    pslf_records: Sequence[DynamicsRecord] = (),
+    inputs: Sequence[str] = (),
+    places: Sequence[str] = (),
+    doubt: str = "",
+) -> Model:
+    """Return the model that the docstring of its equations names and draws, or a ``text``.
+
+    It begins with ``NAME: title``; then comes the drawing.
+    """
+    heading, _, drawing = (text or cleandoc(equations.__doc__ or "")).partition("\n")
+    name, _, title = heading.partition(": ")
+    return Model(
+        name=name,
+        title=title.rstrip("."),
+        drawing=drawing.strip("\n"),
+        aliases=tuple(aliases),
+        sheet=tuple(rows),
+        states=tuple(states.split()),
+        setpoints=tuple(setpoints.split()),
+        records=tuple(records),
+        inputs=tuple(inputs),
+        equations=equations,
+        rest=rest,
+        pslf_records=tuple(pslf_records),
+        places=tuple(places),
+        doubt=doubt,
+    )
+
+
 def model(name: str, parts: Mapping[str, Any]) -> Model:
     """Return the model that a file's names define.
 
@@ -362,26 +402,23 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
     SHEET, STATES, equations and rest.
     """
     _refuse_incomplete(name, parts)
-    states, setpoints = parts["STATES"].split(), parts.get("SETPOINTS", "").split()
-    _refuse_repeated(name, "STATES", [*states, *setpoints])
-    _refuse_repeated(name, "SHEET", [row.symbol for row in parts["SHEET"]])
-    title, _, drawing = str(parts["__doc__"]).partition("\n")
-    return Model(
-        name=name,
-        title=title.partition(": ")[2].rstrip("."),
-        drawing=drawing.strip("\n"),
-        aliases=tuple(parts.get("ALIASES", ())),
-        sheet=tuple(parts["SHEET"]),
-        states=tuple(states),
-        setpoints=tuple(setpoints),
-        records=tuple(parts.get("RECORDS", ())),
-        inputs=tuple(parts.get("INPUTS", ())),
-        equations=parts["equations"],
-        rest=parts["rest"],
-        pslf_records=tuple(parts.get("PSLF_RECORDS", ())),
-        places=tuple(parts.get("PLACES", ())),
+    found = documented(
+        parts["equations"],
+        parts["rest"],
+        parts["SHEET"],
+        parts["STATES"],
+        text=str(parts["__doc__"]),
+        setpoints=parts.get("SETPOINTS", ""),
+        aliases=parts.get("ALIASES", ()),
+        records=parts.get("RECORDS", ()),
+        pslf_records=parts.get("PSLF_RECORDS", ()),
+        inputs=parts.get("INPUTS", ()),
+        places=parts.get("PLACES", ()),
         doubt=str(parts.get("DOUBT", "")),
     )
+    _refuse_repeated(name, "STATES", [*found.states, *found.setpoints])
+    _refuse_repeated(name, "SHEET", [row.symbol for row in found.sheet])
+    return replace(found, name=name)
 
 
 def _refuse_incomplete(name: str, parts: Mapping[str, Any]) -> None:

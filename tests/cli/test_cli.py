@@ -927,7 +927,7 @@ def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monk
     assert Path("runs/case-fit/trajectories.png").is_file()
 
 
-OWN = (ROOT / "exfit" / "models" / "exciters" / "ac1a.py").read_text(encoding="utf-8")
+OWN = (ROOT / "tests" / "support" / "own_model.py").read_text(encoding="utf-8")  # AC1A
 
 
 def own_case(text):

@@ -127,9 +127,9 @@ RECORDS = (
 PSLF_RECORDS = (
     record(
         "ggov1",
-        "R Rselect Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb "
-        "Wfnl Tb Tc Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET "
-        "Aset Ka Ta db Tsa Tsb Rup Rdown",
+        "R Rselect Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc "
+        "Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET Aset Ka Ta db Tsa Tsb "
+        "Rup Rdown",
         icons={"Rselect": 1, "Flag": 0},
         absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
         ignored="PMWSET",

@@ -62,8 +62,8 @@ SHEET = sheet(
 RECORDS = (
     record(
         "PSS5C",
-        "KVL FVL VVLMAX VVLMIN KL FL VLMAX VLMIN KI FI VIMAX VIMIN KH FH VHMAX VHMIN "
-        "K1 K2 K3 VSTMAX VSTMIN",
+        "KVL FVL VVLMAX VVLMIN KL FL VLMAX VLMIN KI FI VIMAX VIMIN KH FH VHMAX VHMIN K1 K2 K3 "
+        "VSTMAX VSTMIN",
         doubt="PSS/E has no PSS5C: its order is that of PowerWorld's list of parameters",
     ),
 )

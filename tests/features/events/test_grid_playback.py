@@ -14,7 +14,7 @@ from exfit.engine.trace import larger, sqrt, where
 from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.blocks import field_demand, pi_rest
-from exfit.models.exciters import ac8b
+from exfit.models.exciters.ac8 import ac8b
 from exfit.models.machines import MACHINES
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, VT0
 from exfit.plants.unit import UnitOnLoad
@@ -77,7 +77,7 @@ def rounded_rectifier(ve, load):
 
 
 def rounded_equations(s, u, p, d):
-    ac8b.equations(s, u, p, d)
+    ac8b(s, u, p, d)
     return rounded_rectifier(s.VE, p.KC * u.ifd)
 
 

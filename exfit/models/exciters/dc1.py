@@ -1,0 +1,414 @@
+"""Commutator exciters with a continuous regulator: DC1, DC2 and what came before them."""
+
+from exfit.models.blocks import (
+    Signal,
+    clip,
+    commutator_start,
+    exciter,
+    lag,
+    larger,
+    lead_lag,
+    limited_lag,
+    washout,
+)
+from exfit.models.commutators import (
+    COMMUTATOR_SETPOINTS,
+    COMMUTATOR_STATES,
+    commutator_rest,
+    excited,
+    regulator_input,
+)
+from exfit.models.sheet import OF_A_LIST, OF_TWO_PROGRAMS, documented, record, shared, sheet
+
+
+def dc1a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """DC1A: commutator exciter, continuous regulator (IEEE Std 421.5-2005, 5.1).
+
+                                      VRMAX          EFD >= 0
+    vref + vs ─►(+)─►[1 + sTC]─►HV───►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+               -▲ ▲- [1 + sTB]  ▲     [1+sTA]   -▲   [ sTE ] │
+                │ │             │     VRMIN      │           │
+    vc1 ►[  1  ]┘ │            VUEL              └── VFE ◄───┤
+         [1+sTR]  └─────────[  sKF  ]◄───────────────────────┘
+                            [1 + sTF]
+
+    VFE = KE EFD + VX(EFD). The limits are non-windup; EFD >= 0 is PSS/E's
+    (the standard is not clear there; ANDES has no such limit).
+    KE = 0 is self-excited: KE is computed at the start so that VR starts at
+    VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+    VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+    (SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
+    setpoints KE0, VRMAX0, VRMIN0.
+    Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+    """
+    vl = regulator_input(s, u, p, d)
+    return excited(larger(vl, u.vuel), 1.0, s, p, d)
+
+
+DC1A = documented(
+    dc1a,
+    commutator_rest,
+    sheet(
+        *shared(TR=0.0, KA=46.0, TA=0.06, TB=0.0, TC=0.0, VRMAX_OR_0=1.0, VRMIN=-0.9, KE_OR_0=0.0),
+        *shared(TE=0.46, KF=0.1, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
+    ),
+    COMMUTATOR_STATES,
+    aliases=("ESDC1A",),
+    records=(
+        record(
+            "ESDC1A",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+            absent={"Switch": 0.0},
+        ),
+    ),
+    pslf_records=(
+        record(
+            "esdc1a",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
+            ignored="SPDMLT UELIN",
+            absent={"EXCLIM": 1.0},
+            spelled={"TF": "tf1"},
+            doubt=OF_A_LIST,
+        ),
+    ),
+    setpoints=COMMUTATOR_SETPOINTS,
+)
+
+
+def dc1c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """DC1C: commutator exciter, continuous regulator (IEEE Std 421.5-2016).
+
+                                     UEL   OEL     VRMAX           VEMAX
+    vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]─►(+)─►[  1  ]─┬─► efd
+                      -▲ ▲- [1 + sTB]             [1+sTA]   -▲   [ sTE ] │
+                       │ │                         VRMIN     │    VEMIN  │
+           vc1 ►[  1  ]┘ │                                   └── VFE ◄───┤
+                [1+sTR]  └────────────[  sKF  ]◄─────────────────────────┘
+                                      [1 + sTF]
+
+    VFE = KE EFD + VX(EFD). DC1A with the places of the limiters of 2016: they act
+    at the summing point (vsum) or at the gates. The limits are non-windup. EFD is
+    limited as in PSS/E, with VEMAX and VEMIN; Dynawo has the floor alone, and the
+    sample data neither. Of the signs at the sum Dynawo adds OEL and SCL, PowerWorld
+    subtracts them: here vsum is what is added. KE = 0 is self-excited: KE is
+    computed at the start so that VR starts at VRMAX / 10, as in PSS/E (IEEE 421.5:
+    at VR = 0). VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of
+    E1, E2 (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the
+    setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
+    them.
+    """
+    vl = regulator_input(s, u, p, d, u.vsum)
+    gated = clip(vl, u.vuel, u.voel)
+    return excited(gated, 1.0, s, p, d, p.VEMIN, p.VEMAX)
+
+
+DC1C = documented(
+    dc1c,
+    commutator_rest,
+    (
+        *DC1A.sheet,
+        *shared(VEMAX=99.0, VEMIN=0.0),
+    ),
+    COMMUTATOR_STATES,
+    aliases=("ESDC1C",),
+    records=(
+        record(
+            "DC1C",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
+            icons={"OEL": 1, "UEL": 1},
+            ignored="OEL UEL",
+            doubt=OF_TWO_PROGRAMS,
+        ),
+    ),
+    setpoints=COMMUTATOR_SETPOINTS,
+)
+
+
+def dc2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """DC2A: commutator exciter, bus-fed regulator (IEEE Std 421.5-2005, 5.2).
+
+                                      VT VRMAX       EFD >= 0
+    vref + vs ─►(+)─►[1 + sTC]─►HV───►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+               -▲ ▲- [1 + sTB]  ▲     [1+sTA]   -▲   [ sTE ] │
+                │ │             │     VT VRMIN   │           │
+    vc1 ►[  1  ]┘ │            VUEL              └── VFE ◄───┤
+         [1+sTR]  └─────────[  sKF  ]◄───────────────────────┘
+                            [1 + sTF]
+
+    VFE = KE EFD + VX(EFD). As DC1A, but the regulator's limits are
+    proportional to the terminal voltage VT. They are non-windup; EFD >= 0 is
+    PSS/E's (ANDES has no such limit, and ignores TR).
+    KE = 0 is self-excited: KE is computed at the start so that VR starts at
+    VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+    VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+    (SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
+    setpoints KE0, VRMAX0, VRMIN0.
+    Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+    """
+    vl = regulator_input(s, u, p, d)
+    return excited(larger(vl, u.vuel), u.vt, s, p, d)
+
+
+DC2A = documented(
+    dc2a,
+    commutator_rest,
+    sheet(
+        *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0, VRMAX_AT_VT_OR_0=4.95, VRMIN_AT_VT=-4.9),
+        *shared(KE_OR_0=1.0, TE=1.33, KF=0.02, TF=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
+    ),
+    COMMUTATOR_STATES,
+    aliases=("ESDC2A",),
+    records=(
+        record(
+            "ESDC2A",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+            absent={"Switch": 0.0},
+        ),
+    ),
+    pslf_records=(
+        record(
+            "esdc2a",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
+            ignored="SPDMLT UELIN",
+            absent={"EXCLIM": 1.0},
+            spelled={"TF": "tf1"},
+            doubt=OF_A_LIST,
+        ),
+    ),
+    setpoints=COMMUTATOR_SETPOINTS,
+)
+
+
+def dc2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """DC2C: commutator exciter, bus-fed regulator (IEEE Std 421.5-2016).
+
+                                     UEL   OEL    VT VRMAX         VEMAX
+    vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]─►(+)─►[  1  ]─┬─► efd
+                      -▲ ▲- [1 + sTB]             [1+sTA]   -▲   [ sTE ] │
+                       │ │                        VT VRMIN   │    VEMIN  │
+           vc1 ►[  1  ]┘ │                                   └── VFE ◄───┤
+                [1+sTR]  └────────────[  sKF  ]◄─────────────────────────┘
+                                      [1 + sTF]
+
+    VFE = KE EFD + VX(EFD). As DC1C, but the regulator's limits are proportional to
+    the terminal voltage VT. It is DC2A with the places of the limiters of 2016:
+    they act at the summing point (vsum) or at the gates. The limits are non-windup.
+    EFD is limited as in PSS/E, with VEMAX and VEMIN. KE = 0 is self-excited: KE is
+    computed at the start so that VR starts at VRMAX / 10, as in PSS/E (IEEE 421.5:
+    at VR = 0). VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of
+    E1, E2 (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the
+    setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
+    them.
+    """
+    vl = regulator_input(s, u, p, d, u.vsum)
+    gated = clip(vl, u.vuel, u.voel)
+    return excited(gated, u.vt, s, p, d, p.VEMIN, p.VEMAX)
+
+
+DC2C = documented(
+    dc2c,
+    commutator_rest,
+    (
+        *DC2A.sheet,
+        *shared(VEMAX=99.0, VEMIN=0.0),
+    ),
+    COMMUTATOR_STATES,
+    aliases=("ESDC2C",),
+    records=(
+        record(
+            "DC2C",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
+            icons={"OEL": 1, "UEL": 1},
+            ignored="OEL UEL",
+            doubt=OF_TWO_PROGRAMS,
+        ),
+    ),
+    setpoints=COMMUTATOR_SETPOINTS,
+)
+
+
+def ieeet1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """IEEET1: commutator exciter, IEEE type 1 of 1968 (PSS/E IEEET1).
+
+                     VRMAX
+    vref + vs ─►(+)─►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+               -▲ ▲- [1+sTA]   -▲   [ sTE ] │
+                │ │  VRMIN      │           │
+    vc1 ►[  1  ]┘ │             └── VFE ◄───┤
+         [1+sTR]  └──[  sKF ]◄──────────────┘
+                     [1+sTF]
+
+    VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
+    KE = 0 is self-excited: KE is computed at the start so that VR starts at
+    VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+    VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+    (SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
+    setpoints KE0, VRMAX0, VRMIN0.
+    Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+    """
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
+    error = u.vref + u.vs - vc - vf
+    vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def ieeet1_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    error = start.vr / p.KA
+    x.VC, x.VR, x.EFD, x.VF = u.vc1, start.vr, efd, efd
+    return u.vc1 + error - u.vs
+
+
+IEEET1 = documented(
+    ieeet1,
+    ieeet1_rest,
+    sheet(
+        *shared(TR=0.02, KA=50.0, TA=0.06, VRMAX_OR_0=7.3, VRMIN=-7.3, KE_OR_0=1.0, TE=0.5),
+        *shared(KF=0.08, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
+    ),
+    "VC VR EFD VF",
+    records=(
+        record(
+            "IEEET1",
+            "TR KA TA VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+            absent={"Switch": 0.0},
+        ),
+    ),
+    setpoints="KE0 VRMAX0 VRMIN0",
+)
+
+
+def ieeex1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """IEEEX1: commutator exciter, type 1 of 1979, DC1 of 1981 (PSS/E IEEEX1).
+
+                                VRMAX
+    vref + vs ─►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+               -▲ ▲- [1 + sTB]  [1+sTA]   -▲   [ sTE ] │
+                │ │             VRMIN      │           │
+    vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
+         [1+sTR]  └──────[  sKF  ]◄────────────────────┘
+                         [1 + sTF1]
+
+    VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
+    The limits do not follow VT, as in OpenIPSL and the DC1 of 1981 (ANDES has them
+    proportional to VT here, and not in EXDC2: the two are interchanged).
+    KE = 0 is self-excited: KE is computed at the start so that VR starts at
+    VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+    VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+    (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the setpoints
+    KE0, VRMAX0, VRMIN0.
+    Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+    """
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF1)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def ieeex1_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    error = start.vr / p.KA
+    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
+    return u.vc1 + error - u.vs
+
+
+IEEEX1 = documented(
+    ieeex1,
+    ieeex1_rest,
+    sheet(
+        *shared(TR=0.0, KA=40.0, TA=0.04, TB=0.0, TC=0.0, VRMAX_OR_0=7.3, VRMIN=-7.3, KE_OR_0=1.0),
+        *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
+    ),
+    "VC VL VR EFD VF",
+    records=(
+        record(
+            "IEEEX1",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
+            absent={"Switch": 0.0},
+        ),
+    ),
+    pslf_records=(
+        record(
+            "exdc1",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 E1 SE1 E2 SE2",
+            doubt=OF_A_LIST,
+        ),
+    ),
+    setpoints="KE0 VRMAX0 VRMIN0",
+)
+
+
+def exdc2(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """EXDC2: commutator exciter, bus-fed regulator, DC2 of 1981 (PSS/E EXDC2).
+
+                                VT VRMAX
+    vref + vs ─►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+               -▲ ▲- [1 + sTB]  [1+sTA]   -▲   [ sTE ] │
+                │ │             VT VRMIN   │           │
+    vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
+         [1+sTR]  └──────[  sKF  ]◄────────────────────┘
+                         [1 + sTF1]
+
+    VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
+    The limits are proportional to VT, as in the DC2 of 1981, Opal-RT and InterPSS
+    (ANDES and GridPACK hold them constant). InterPSS and ANDES multiply efd by the
+    speed, Opal-RT does not; import takes it as multiplied (efd_times_speed).
+    KE = 0 is self-excited: KE is computed at the start so that VR starts at
+    VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+    VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+    (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the setpoints
+    KE0, VRMAX0, VRMIN0.
+    Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+    """
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF1)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
+    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, low, high)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def exdc2_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    error = start.vr / p.KA
+    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
+    return u.vc1 + error - u.vs
+
+
+EXDC2 = documented(
+    exdc2,
+    exdc2_rest,
+    sheet(
+        *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0, VRMAX_AT_VT_OR_0=4.95, VRMIN_AT_VT=-4.9),
+        *shared(KE_OR_0=1.0, TE=1.33, KF=0.02, TF1=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
+    ),
+    "VC VL VR EFD VF",
+    records=(
+        record(
+            "EXDC2",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
+            absent={"Switch": 0.0},
+            times_speed=True,
+        ),
+    ),
+    pslf_records=(
+        record(
+            "exdc2",
+            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2",
+            absent={"TF2": 0.0},
+            doubt=OF_A_LIST,
+        ),
+    ),
+    setpoints="KE0 VRMAX0 VRMIN0",
+)

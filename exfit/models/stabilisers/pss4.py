@@ -1,0 +1,310 @@
+"""Multi-band stabilisers: PSS4B and PSS4C."""
+
+from exfit.models.blocks import (
+    SHORTEST,
+    Signal,
+    clip,
+    lag,
+    rate,
+    second_order,
+    second_order_lead,
+    where,
+)
+from exfit.models.sheet import (
+    LIMIT,
+    POSITIVE_TIME,
+    SHORT_TIME,
+    TIME,
+    WITHIN_1000,
+    WITHIN_10000,
+    Parameter,
+    documented,
+    record,
+    sheet,
+    with_typical,
+)
+from exfit.models.stabiliser_parts import of_stabiliser
+
+SLOWEST = 1e-6  # rad/s
+
+
+def transduced(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
+    """Compute the inputs of the bands: of low and intermediate frequency, and of high frequency."""
+    low, d.XLI, d.YLI = second_order_lead(u.vsi1, s.XLI, s.YLI, p.DLI, p.CLI, p.BLI, p.ALI)
+    low, d.XLI1, d.YLI1 = notch(low, s.XLI1, s.YLI1, p.BWLI1, p.WLI1)
+    low, d.XLI2, d.YLI2 = notch(low, s.XLI2, s.YLI2, p.BWLI2, p.WLI2)
+    power, d.PH = lag(u.vsi2, s.PH, -1.0, p.TH)
+    _, steep, d.YH = second_order(power, s.XH, s.YH, p.BH, p.AH)
+    d.XH = steep
+    high, d.XH1, d.YH1 = notch(steep / p.M, s.XH1, s.YH1, p.BWH1, p.WH1)
+    high, d.XH2, d.YH2 = notch(high, s.XH2, s.YH2, p.BWH2, p.WH2)
+    return low, high
+
+
+def notch(u: Signal, x: Signal, v: Signal, BW: Signal, W: Signal) -> tuple[Signal, Signal, Signal]:
+    """(s^2 + W^2) / (s^2 + s BW + W^2), or 1 where W = 0; the states are ``second_order``'s."""
+    square = where(W < SLOWEST, 0.0, 1.0 / where(W < SLOWEST, 1.0, W * W))
+    return second_order_lead(u, x, v, 0.0, square, BW * square, square)
+
+
+def band(letter: str, u: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
+    """Return the output of a band, the difference of its branches; its names have its letter."""
+
+    def branch(first: int, gain: str, coefficient: str) -> Signal:
+        y = getattr(p, gain) * u
+        for k in range(first, first + 3):
+            x = getattr(s, f"{letter}{k}")
+            lead, slow = (getattr(p, f"T{letter}{n}") for n in (2 * k - 1, 2 * k))
+            constant = getattr(p, coefficient) if k == first else 1.0
+            y, slope = scaled_lead_lag(y, x, constant, lead, slow)
+            setattr(d, f"{letter}{k}", slope)
+        return y
+
+    upper = branch(1, f"K{letter}1", f"K{letter}11")
+    lower = branch(4, f"K{letter}2", f"K{letter}17")
+    ceiling, floor = getattr(p, f"V{letter}MAX"), getattr(p, f"V{letter}MIN")
+    return clip(getattr(p, f"K{letter}") * (upper - lower), floor, ceiling)
+
+
+def scaled_lead_lag(
+    u: Signal, x: Signal, K: Signal, TC: Signal, TB: Signal
+) -> tuple[Signal, Signal]:
+    """(K + sTC) / (1 + sTB), or K where TB = 0; the state is u seen through the lag TB."""
+    slope = (u - x) * rate(TB)
+    return where(TB < SHORTEST, K * u, K * x + TC * slope), slope
+
+
+def band_rest(letter: str, low: Signal, p: Signal, x: Signal) -> None:
+    """Write the states of a band into x that a still input leads to."""
+    upper, lower = getattr(p, f"K{letter}1") * low, getattr(p, f"K{letter}2") * low
+    coefficients = getattr(p, f"K{letter}11"), getattr(p, f"K{letter}17")
+    for k, (gained, constant) in enumerate(zip((upper, lower), coefficients, strict=True)):
+        for n in range(3):
+            setattr(x, f"{letter}{3 * k + n + 1}", gained if n == 0 else constant * gained)
+
+
+def pss4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """PSS4B: multi-band stabiliser, speed and power (IEEE Std 421.5-2005, 8.4).
+
+                                                                       VSTMAX
+    vsi1 ─►[1 + sDLI + s²CLI]─►[NLI1]─►[NLI2]─┬─►[ L ]─►(+)──────►(+)─►[clip]─► vs
+           [1 + sBLI + s²ALI]                 │          ▲         ▲   VSTMIN
+                                              └─►[ I ]───┘         │
+                                                                   │
+    vsi2 ─►[  -1   ]─►[       s²     ]─►[1 ]─►[NH1]─►[NH2]─►[ H ]──┘
+           [1 + sTH]  [1 + sBH + s²AH]  [sM]
+
+    L, I and H are the bands of low, intermediate and high frequency, NLI1, NLI2,
+    NH1 and NH2 notches. The low band, and the others with I and H in place of L:
+
+    KL1 (KL11 + sTL1)/(1 + sTL2) (1 + sTL3)/(1 + sTL4) (1 + sTL5)/(1 + sTL6)
+      - KL2 (KL17 + sTL7)/(1 + sTL8) (1 + sTL9)/(1 + sTL10) (1 + sTL11)/(1 + sTL12),
+      times KL, limited between VLMIN and VLMAX;
+    KI KI1 KI11 TI1 TI2 TI3 TI4 TI5 TI6, KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12, VIMIN
+      and VIMAX;
+    KH KH1 KH11 TH1 TH2 TH3 TH4 TH5 TH6, KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12, VHMIN
+      and VHMAX.
+
+    A notch is (s² + W²) / (s² + sBW + W²), with BWLI1 and WLI1, BWLI2 and WLI2,
+    BWH1 and WH1, BWH2 and WH2; W = 0 leaves it out. A lag of 0 bypasses its block,
+    ALI = 0 and AH = 0 leave a lag.
+
+    The first input is the speed, the second the electrical power. The standard of
+    2005 prints PE; IEC 61970-302 says that it should read -PE, the sign of the
+    swing equation, which is taken here. With typical data the power's transducer is
+    -80 s² / ((s³ + 82 s² + 161 s + 80) 2 H s): the standard's but for the sign. M
+    is 2 H; programs that read M = 0 as the 2 H of the machine need its value here.
+    Typical data are the standard's, as CIM has them, but for M.
+    """
+    low, high = transduced(s, u, p, d)
+    bands = band("L", low, s, p, d) + band("I", low, s, p, d) + band("H", high, s, p, d)
+    return clip(bands, p.VSTMIN, p.VSTMAX)
+
+
+def pss4b_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is 0 where the speed is 1."""
+    x.XLI = x.XLI1 = x.XLI2 = u.vsi1
+    x.PH = x.XH = -u.vsi2
+    x.YLI = x.YLI1 = x.YLI2 = x.YH = x.XH1 = x.YH1 = x.XH2 = x.YH2 = 0.0
+    for letter, low in (("L", u.vsi1), ("I", u.vsi1), ("H", 0.0)):
+        band_rest(letter, low, p, x)
+
+
+PSS4B = documented(
+    pss4b,
+    pss4b_rest,
+    sheet(
+        ("CLI", 0.0, "s2", (-1.0, 1.0), "second coefficient of the speed's numerator"),
+        ("DLI", -0.001759, "s", (-1.0, 1.0), "first coefficient of the speed's numerator"),
+        ("ALI", 0.00012739, "s2", (0.0, 1.0), "second coefficient of the speed's filter"),
+        ("BLI", 0.017823, "s", (0.0, 1.0), "first coefficient of the speed's filter"),
+        ("BWLI1", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the speed's first notch"),
+        ("WLI1", 0.0, "rad/s", (0.0, 10000.0), "frequency of the speed's first notch"),
+        ("BWLI2", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the speed's second notch"),
+        ("WLI2", 0.0, "rad/s", (0.0, 10000.0), "frequency of the speed's second notch"),
+        ("TH", 0.0125, *SHORT_TIME, "transducer lag of the power"),
+        ("AH", 1.0, "s2", (0.0, 1000.0), "second coefficient of the power's filter"),
+        ("BH", 2.0, "s", (0.001, 1000.0), "first coefficient of the power's filter"),
+        ("M", 7.0, *POSITIVE_TIME, "twice the inertia constant H"),
+        ("BWH1", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the power's first notch"),
+        ("WH1", 0.0, "rad/s", (0.0, 10000.0), "frequency of the power's first notch"),
+        ("BWH2", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the power's second notch"),
+        ("WH2", 0.0, "rad/s", (0.0, 10000.0), "frequency of the power's second notch"),
+        ("KL1", 66.0, *WITHIN_10000, "gain of the low band's upper branch"),
+        ("KL11", 1.0, *WITHIN_1000, "coefficient of the low band's upper branch"),
+        ("TL1", 1.73, *TIME, "first lead of the low band's upper branch"),
+        ("TL2", 2.075, *TIME, "first lag of the low band's upper branch"),
+        ("TL3", 0.0, *TIME, "second lead of the low band's upper branch"),
+        ("TL4", 0.0, *TIME, "second lag of the low band's upper branch"),
+        ("TL5", 0.0, *TIME, "third lead of the low band's upper branch"),
+        ("TL6", 0.0, *TIME, "third lag of the low band's upper branch"),
+        ("KL2", 66.0, *WITHIN_10000, "gain of the low band's lower branch"),
+        ("KL17", 1.0, *WITHIN_1000, "coefficient of the low band's lower branch"),
+        ("TL7", 2.075, *TIME, "first lead of the low band's lower branch"),
+        ("TL8", 2.491, *TIME, "first lag of the low band's lower branch"),
+        ("TL9", 0.0, *TIME, "second lead of the low band's lower branch"),
+        ("TL10", 0.0, *TIME, "second lag of the low band's lower branch"),
+        ("TL11", 0.0, *TIME, "third lead of the low band's lower branch"),
+        ("TL12", 0.0, *TIME, "third lag of the low band's lower branch"),
+        ("KL", 7.5, *WITHIN_10000, "gain of the low band"),
+        ("VLMAX", 0.075, *LIMIT, "ceiling of the low band"),
+        ("VLMIN", -0.075, *LIMIT, "floor of the low band"),
+        ("KI1", 66.0, *WITHIN_10000, "gain of the intermediate band's upper branch"),
+        ("KI11", 1.0, *WITHIN_1000, "coefficient of the intermediate band's upper branch"),
+        ("TI1", 0.173, *TIME, "first lead of the intermediate band's upper branch"),
+        ("TI2", 0.2075, *TIME, "first lag of the intermediate band's upper branch"),
+        ("TI3", 0.0, *TIME, "second lead of the intermediate band's upper branch"),
+        ("TI4", 0.0, *TIME, "second lag of the intermediate band's upper branch"),
+        ("TI5", 0.0, *TIME, "third lead of the intermediate band's upper branch"),
+        ("TI6", 0.0, *TIME, "third lag of the intermediate band's upper branch"),
+        ("KI2", 66.0, *WITHIN_10000, "gain of the intermediate band's lower branch"),
+        ("KI17", 1.0, *WITHIN_1000, "coefficient of the intermediate band's lower branch"),
+        ("TI7", 0.2075, *TIME, "first lead of the intermediate band's lower branch"),
+        ("TI8", 0.2491, *TIME, "first lag of the intermediate band's lower branch"),
+        ("TI9", 0.0, *TIME, "second lead of the intermediate band's lower branch"),
+        ("TI10", 0.0, *TIME, "second lag of the intermediate band's lower branch"),
+        ("TI11", 0.0, *TIME, "third lead of the intermediate band's lower branch"),
+        ("TI12", 0.0, *TIME, "third lag of the intermediate band's lower branch"),
+        ("KI", 30.0, *WITHIN_10000, "gain of the intermediate band"),
+        ("VIMAX", 0.6, *LIMIT, "ceiling of the intermediate band"),
+        ("VIMIN", -0.6, *LIMIT, "floor of the intermediate band"),
+        ("KH1", 66.0, *WITHIN_10000, "gain of the high band's upper branch"),
+        ("KH11", 1.0, *WITHIN_1000, "coefficient of the high band's upper branch"),
+        ("TH1", 0.01513, *TIME, "first lead of the high band's upper branch"),
+        ("TH2", 0.01816, *TIME, "first lag of the high band's upper branch"),
+        ("TH3", 0.0, *TIME, "second lead of the high band's upper branch"),
+        ("TH4", 0.0, *TIME, "second lag of the high band's upper branch"),
+        ("TH5", 0.0, *TIME, "third lead of the high band's upper branch"),
+        ("TH6", 0.0, *TIME, "third lag of the high band's upper branch"),
+        ("KH2", 66.0, *WITHIN_10000, "gain of the high band's lower branch"),
+        ("KH17", 1.0, *WITHIN_1000, "coefficient of the high band's lower branch"),
+        ("TH7", 0.01816, *TIME, "first lead of the high band's lower branch"),
+        ("TH8", 0.02179, *TIME, "first lag of the high band's lower branch"),
+        ("TH9", 0.0, *TIME, "second lead of the high band's lower branch"),
+        ("TH10", 0.0, *TIME, "second lag of the high band's lower branch"),
+        ("TH11", 0.0, *TIME, "third lead of the high band's lower branch"),
+        ("TH12", 0.0, *TIME, "third lag of the high band's lower branch"),
+        ("KH", 120.0, *WITHIN_10000, "gain of the high band"),
+        ("VHMAX", 0.6, *LIMIT, "ceiling of the high band"),
+        ("VHMIN", -0.6, *LIMIT, "floor of the high band"),
+        *of_stabiliser(VSTMAX=0.15, VSTMIN=-0.15),
+    ),
+    "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
+    "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6",
+    inputs=("speed", "p"),
+    records=(
+        record(
+            "PSS4B",
+            "CLI DLI ALI BLI BWLI1 WLI1 BWLI2 WLI2 TH AH BH M BWH1 WH1 BWH2 WH2 KL1 KL11 TL1 TL2 "
+            "TL3 TL4 TL5 TL6 KL2 KL17 TL7 TL8 TL9 TL10 TL11 TL12 KL VLMAX VLMIN KI1 KI11 TI1 TI2 "
+            "TI3 TI4 TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN KH1 KH11 TH1 TH2 "
+            "TH3 TH4 TH5 TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN VSTMAX VSTMIN",
+            doubt="its power has the sign of IEC 61970-302",
+        ),
+    ),
+)
+
+
+SAMPLE = {
+    **{"KVL": 0.5, "TVL1": 12.1, "TVL2": 14.5, "TVL7": 14.5, "TVL8": 17.4},
+    **{"VVLMAX": 0.01, "VVLMIN": -0.01},
+    "KL": 3.0,
+    **{"KI": 20.0, "TI1": 0.2018, "TI2": 0.2421, "TI7": 0.2421, "TI8": 0.2906},
+    **{"KH": 80.0, "TH1": 0.01345, "TH2": 0.01614, "TH7": 0.01614, "TH8": 0.01937},
+}
+
+
+def of_very_low(row: Parameter) -> Parameter:
+    """Return a row of the low band as one of the band of very low frequency."""
+    symbol, meaning = f"{row.symbol[0]}V{row.symbol[1:]}", row.meaning
+    return row._replace(symbol=symbol, meaning=meaning.replace("the low", "the very low"))
+
+
+VERY_LOW = tuple(of_very_low(row) for row in PSS4B.sheet if "the low band" in row.meaning)
+
+
+def pss4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """PSS4C: multi-band stabiliser of four bands (IEEE Std 421.5-2016).
+
+                                                                       VSTMAX
+    vsi1 ─►[1 + sDLI + s²CLI]─►[NLI1]─►[NLI2]─┬─►[VL ]─►(+)──────►(+)─►[clip]─► vs
+           [1 + sBLI + s²ALI]                 │          ▲         ▲   VSTMIN
+                                              ├─►[ L ]─►(+)        │
+                                              │          ▲         │
+                                              └─►[ I ]───┘         │
+                                                                   │
+    vsi2 ─►[  -1   ]─►[       s²     ]─►[1 ]─►[NH1]─►[NH2]─►[ H ]──┘
+           [1 + sTH]  [1 + sBH + s²AH]  [sM]
+
+    PSS4B with a band VL of very low frequency. VL, L, I and H are the bands of very
+    low, low, intermediate and high frequency, NLI1, NLI2, NH1 and NH2 notches. The
+    low band, and the others with VL, I and H in place of L:
+
+    KL1 (KL11 + sTL1)/(1 + sTL2) (1 + sTL3)/(1 + sTL4) (1 + sTL5)/(1 + sTL6)
+      - KL2 (KL17 + sTL7)/(1 + sTL8) (1 + sTL9)/(1 + sTL10) (1 + sTL11)/(1 + sTL12),
+      times KL, limited between VLMIN and VLMAX;
+    KVL KVL1 KVL11 TVL1 TVL2 TVL3 TVL4 TVL5 TVL6, KVL2 KVL17 TVL7 TVL8 TVL9 TVL10
+      TVL11 TVL12, VVLMIN and VVLMAX;
+    KI KI1 KI11 TI1 TI2 TI3 TI4 TI5 TI6, KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12, VIMIN
+      and VIMAX;
+    KH KH1 KH11 TH1 TH2 TH3 TH4 TH5 TH6, KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12, VHMIN
+      and VHMAX.
+
+    A notch is (s² + W²) / (s² + sBW + W²), with BWLI1 and WLI1, BWLI2 and WLI2,
+    BWH1 and WH1, BWH2 and WH2; W = 0 leaves it out. A lag of 0 bypasses its block,
+    ALI = 0 and AH = 0 leave a lag.
+
+    The first input is the speed, the second the electrical power, with the sign of
+    the swing equation as in PSS4B. The drawing is InterPSS's, with PowerWorld's
+    parameters; GridKit has the bands alone. M is 2 H; programs that read M = 0 as
+    the 2 H of the machine need its value here. Typical data of the bands are the
+    standard's, as GridKit has them, of the transducers PSS4B's.
+    """
+    low, high = transduced(s, u, p, d)
+    bands = band("VL", low, s, p, d) + band("L", low, s, p, d)
+    bands = bands + band("I", low, s, p, d) + band("H", high, s, p, d)
+    return clip(bands, p.VSTMIN, p.VSTMAX)
+
+
+def pss4c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is 0 where the speed is 1."""
+    pss4b_rest(vs, u, p, x)
+    band_rest("VL", u.vsi1, p, x)
+
+
+PSS4C = documented(
+    pss4c,
+    pss4c_rest,
+    with_typical((*PSS4B.sheet, *VERY_LOW), **SAMPLE),
+    "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
+    "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6 VL1 VL2 VL3 VL4 VL5 VL6",
+    doubt="rests on one public diagram, that of InterPSS",
+    inputs=PSS4B.inputs,
+    records=(
+        record(
+            "PSS4C",
+            " ".join((*PSS4B.records[0].cons, *(row.symbol for row in VERY_LOW))),
+            doubt="PSS/E has no PSS4C: its order is that of PowerWorld's list of parameters",
+        ),
+    ),
+)
