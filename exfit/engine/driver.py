@@ -1,13 +1,13 @@
 """Loops around the machine code of a system: many parameter sets in one call, sampled as they run.
 
 A call releases the interpreter's lock once, however many sets it runs. What it works on stands in
-tables of addresses and counts, whose rows `calls` describes.
+tables of addresses and counts, whose rows `sampling` describes.
 """
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from exfit.engine.calls import ALONG, AT_REST, JOB, SAMPLES, SPAN, WORK
+from exfit.engine.sampling import ALONG, AT_REST, JOB, SAMPLES, SPAN, WORK
 from exfit.engine.writer import Shape, Writer
 
 ARGUMENTS = (
@@ -51,38 +51,28 @@ def sampled(sets: int, outputs: int, directions: int, moving: int) -> str:
             w.put(f"call void @run({_pointers(*arrays)}, {steps})")
         with _loop(w, "lane", str(sets)) as lane:
             place = w.let(f"add i64 {w.let(f'mul i64 {k}, {sets}')}, {lane}")
-            _read_set(w, place, lane, work, (sets, outputs, directions))
+            reading = _row(w, "%lanes", place, SAMPLES)
+            still = w.let(f"icmp eq ptr {reading['slopes']}, null")
+            changing = w.let(f"select i1 {still}, i64 0, i64 %samples")
+            with _loop(w, "output", str(outputs)) as y:
+                column = w.let(f"add i64 {w.let(f'mul i64 {y}, {sets}')}, {lane}")
+
+                def read(shape: Shape, run: str, weights: str, out: str, samples: str) -> None:
+                    first = w.address(work[run], w.let(f"mul i64 {column}, {shape.lanes}"))
+                    into = w.address(reading[out], w.let(f"mul i64 {y}, {shape.lanes}"))
+                    arrays = _pointers(first, reading["rows"], reading[weights], into)
+                    counts = f"i64 {samples}, i64 %points, i64 {outputs * sets}, i64 {outputs}"
+                    w.put(f"call void @read_{shape.suffix}({arrays}, {counts})")
+
+                read(ONE, "out", "weights", "out", "%samples")
+                if directions:
+                    read(ONE, "out", "slopes", "change", changing)
+                    read(Shape(directions), "dout", "weights", "dout", "%samples")
     w.put("ret void")
     heads = [_reader(ONE), *([_reader(Shape(directions))] if directions else [])]
     if moving:
         heads.append(_moved(Shape(directions), moving))
     return "".join([*heads, _defined("void @sampled", ARGUMENTS, w)])
-
-
-def _read_set(
-    w: Writer, place: str, lane: str, work: dict[str, str], sizes: tuple[int, int, int]
-) -> None:
-    """Write the reading of one set's samples, and of their derivatives."""
-    sets, outputs, directions = sizes
-    reading = _row(w, "%lanes", place, SAMPLES)
-    still = w.let(f"icmp eq ptr {reading['slopes']}, null")
-    changing = w.let(f"select i1 {still}, i64 0, i64 %samples")
-    with _loop(w, "output", str(outputs)) as y:
-        column = w.let(f"add i64 {w.let(f'mul i64 {y}, {sets}')}, {lane}")
-
-        def read(shape: Shape, run: str, weights: str, out: str, samples: str) -> None:
-            lanes = shape.lanes
-            first = w.address(run, w.let(f"mul i64 {column}, {lanes}"))
-            into = w.address(out, w.let(f"mul i64 {y}, {lanes}"))
-            arrays = _pointers(first, reading["rows"], weights, into)
-            counts = f"i64 {samples}, i64 %points, i64 {outputs * sets}, i64 {outputs}"
-            w.put(f"call void @read_{shape.suffix}({arrays}, {counts})")
-
-        read(ONE, work["out"], reading["weights"], reading["out"], "%samples")
-        if directions:
-            read(ONE, work["out"], reading["slopes"], reading["change"], changing)
-            wide = Shape(directions)
-            read(wide, work["dout"], reading["weights"], reading["dout"], "%samples")
 
 
 def at_rest(parameters: int, states: int, directions: int) -> str:
@@ -186,8 +176,7 @@ def _defined(name: str, arguments: Sequence[str], body: Writer) -> str:
 @contextmanager
 def _loop(w: Writer, name: str, count: str) -> Iterator[str]:
     """Write a loop over what is written within, and give its counter."""
-    labels = [line[:-1] for line in w.lines if not line.startswith(" ")]
-    before = labels[-1] if labels else "entry"
+    before = w.block
     w.put(f"br label %{name}")
     w.label(name)
     w.put(f"%{name}.k = phi i64 [0, %{before}], [%{name}.next, %{name}.end]")

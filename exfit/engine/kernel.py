@@ -1,6 +1,5 @@
 """Machine code for a system: compiled, kept on disk by content, called from several threads."""
 
-import ctypes
 import hashlib
 import os
 import threading
@@ -13,9 +12,16 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.calls import ALONG, AT_REST, address, function
-from exfit.engine.sampling import Courses, Sampler, Sizes
-from exfit.engine.system import System, differentiate, trace
+from exfit.engine.sampling import (
+    ALONG,
+    AT_REST,
+    Courses,
+    Sampler,
+    Sizes,
+    address,
+    function,
+)
+from exfit.engine.system import System, trace
 from exfit.util.cache import keep_private, private_cache, read_private
 
 Array = NDArray[np.float64]
@@ -51,40 +57,33 @@ class Span(NamedTuple):
     parts: int
 
 
-class Target(NamedTuple):
-    """The target of machine code: a processor by LLVM's name, and its features."""
-
-    cpu: str
-    features: str
-
-
-def target() -> Target:
-    """Return the processor that code is made for: this one, or the one that EXFIT_CPU names.
+def target() -> tuple[str, str]:
+    """Name the processor that code is made for, and its features: this one, or EXFIT_CPU's.
 
     ``EXFIT_CPU=x86-64`` gives the code that every processor of 64 bits runs, as a check that no
     result depends on the machine; any name that LLVM knows will do.
     """
     chosen = os.environ.get("EXFIT_CPU")
     if chosen:
-        return Target(chosen, "")
-    return Target(llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+        return chosen, ""
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 @cache
-def _machine(made_for: Target) -> tuple[Any, str]:
+def _machine(cpu: str, features: str) -> tuple[Any, str]:
     """Return LLVM's idea of a processor, and what distinguishes it from others."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     platform = llvm.Target.from_default_triple()
     machine = platform.create_target_machine(
-        cpu=made_for.cpu,
-        features=made_for.features,
+        cpu=cpu,
+        features=features,
         opt=3,
         reloc="pic",
         codemodel="jitdefault",
         jit=True,
     )
-    return machine, " ".join((str(llvm.llvm_version_info), platform.triple, *made_for))
+    return machine, " ".join((str(llvm.llvm_version_info), platform.triple, cpu, features))
 
 
 def _build(ir: str, machine: Any) -> bytes:
@@ -121,7 +120,6 @@ def _cached(path: Path) -> bytes | None:
 
 
 def _keep(path: Path, code: bytes) -> None:
-    """Keep code on disk; a folder that cannot be written keeps nothing."""
     keep_private(path, _digest(path, code) + code)
 
 
@@ -164,7 +162,7 @@ def compiled(traced: str, write_ir: Callable[[], str]) -> Any:
     ``traced`` is a text that the IR follows from, with these modules.
     """
     with _lock:
-        machine, name = _machine(target())
+        machine, name = _machine(*target())
         key = _key(name, traced)
         if key not in _loaded:
             code = _code(traced, write_ir, machine, name)
@@ -176,15 +174,12 @@ def compiled(traced: str, write_ir: Callable[[], str]) -> Any:
 
 
 @cache
-def _text(system: System, outputs: tuple[str, ...]) -> str:
+def text_of(system: System, outputs: tuple[str, ...]) -> str:
     """Return the trace of a system as text: several of its kernels have the same.
 
     It is traced anew for the IR, which is seldom written: to differentiate a trace adds to it.
     """
     return trace(system, outputs).text
-
-
-RUN_ARGUMENTS = (ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
 class Kernel:
@@ -198,9 +193,9 @@ class Kernel:
 
             return simulation(trace(system, self.outputs), lanes)
 
-        engine = compiled(f"simulation {lanes} {_text(system, self.outputs)}", ir)
-        self._rest = function(engine, "rest", 4)
-        self._run = function(engine, "run", 4, RUN_ARGUMENTS)
+        engine = compiled(f"simulation {lanes} {text_of(system, self.outputs)}", ir)
+        self._rest = function(engine, "rest", "pppp")
+        self._run = function(engine, "run", "pppppdii")
         sizes = Sizes(len(system.setpoints), len(system.states), len(self.outputs), lanes)
         self._sampled = Sampler(engine, sizes)
 
@@ -228,7 +223,7 @@ class Kernel:
         """
         sets = side_by_side(courses.parts, self.lanes)
         together = np.ascontiguousarray(p[sets].transpose(0, 2, 1))
-        return self._sampled(together, courses, sets).outputs
+        return self._sampled(together, courses, sets)[0]
 
 
 def side_by_side(parts: NDArray[np.int64], lanes: int) -> NDArray[np.intp]:
@@ -242,72 +237,6 @@ def side_by_side(parts: NDArray[np.int64], lanes: int) -> NDArray[np.intp]:
     groups = np.split(order, np.flatnonzero(np.diff(parts[order])) + 1)
     padded = [np.pad(group, (0, -len(group) % lanes), mode="edge") for group in groups]
     return np.concatenate(padded).reshape(-1, lanes)
-
-
-def _blocks(tangents: Array, width: int) -> Array:
-    """Return tangents (K, ..., N) as blocks (K, blocks, ..., width) of directions, none missing."""
-    given = tangents.shape[-1]
-    count = max(1, -(-given // width))
-    blocks = np.zeros((len(tangents), count, *tangents.shape[1:-1], width))
-    for k in range(count):
-        own = tangents[..., k * width : (k + 1) * width]
-        blocks[:, k, ..., : own.shape[-1]] = own
-    return blocks
-
-
-class TangentKernel:
-    """Simulates one parameter set with its exact derivatives in any directions.
-
-    A direction may move the parameters that are ``free`` and the inputs that are ``moving``; as
-    many as ``directions`` run together.
-    """
-
-    def __init__(
-        self,
-        system: System,
-        outputs: Sequence[str],
-        free: Sequence[str],
-        moving: Sequence[str] = (),
-        directions: int = DIRECTIONS,
-    ) -> None:
-        self.system, self.outputs = system, tuple(outputs)
-        self.free, self.moving, self.directions = tuple(free), tuple(moving), directions
-
-        def ir() -> str:
-            from exfit.engine.emit import simulation_with_tangents
-
-            traced = trace(system, self.outputs)
-            derived = differentiate(traced, system, free, moving)
-            return simulation_with_tangents(traced, derived, directions)
-
-        traced = _text(system, self.outputs)
-        text = f"tangents {self.free} {self.moving} {directions} {traced}"
-        engine = compiled(text, ir)
-        counts = (len(system.setpoints), len(system.states), len(self.outputs))
-        sizes = Sizes(*counts, directions=directions, moving=len(self.moving))
-        self._sampled = Sampler(engine, sizes)
-
-    def samples(
-        self, p: Array, dp: Array, courses: Courses, rates: Array | None = None
-    ) -> tuple[Array, Array, Array | None]:
-        """Return outputs (K, M, ny) of sets p (K, np), their derivatives, and those to time.
-
-        ``dp`` (K, np, N) are the tangents of the parameters in N directions, zero but where these
-        are free; the inputs that move have theirs by ``rates`` (K, moving, columns, N) of the
-        shapes in their segments. The derivatives are (K, M, ny, N), those to time (K, M, ny) or
-        None where the readings have no weights for them. The derivative of the starting state is
-        part of the result.
-        """
-        sets = np.arange(len(p))[:, None]
-        moving = None if rates is None else _blocks(rates, self.directions)
-        outputs, slopes, change = self._sampled(
-            p, courses, sets, _blocks(dp, self.directions), moving
-        )
-        assert slopes is not None
-        flat = slopes[:, 0]
-        if slopes.shape[1] > 1:
-            flat = np.moveaxis(slopes, 1, -2).reshape(*flat.shape[:-1], -1)
-        return outputs, flat[..., : dp.shape[-1]], change
 
 
 class AtRest(NamedTuple):
@@ -326,27 +255,25 @@ class LinearKernel:
 
         def ir() -> str:
             from exfit.engine.emit import linearisation
+            from exfit.engine.tangents import differentiate
 
             traced = trace(system, ())
             return linearisation(traced, differentiate(traced, system, ()), DIRECTIONS)
 
-        engine = compiled(f"linearisation {DIRECTIONS} {_text(system, ())}", ir)
-        self._rest = function(engine, "rest", 8)
-        self._at_rest = function(engine, "at_rest", len(AT_REST), first=(ctypes.c_int64,))
-        self._along = function(engine, "along", len(ALONG), first=(ctypes.c_int64,))
+        engine = compiled(f"linearisation {DIRECTIONS} {text_of(system, ())}", ir)
+        self._rest = function(engine, "rest", 8 * "p")
+        self._at_rest = function(engine, "at_rest", "i" + len(AT_REST) * "p")
+        self._along = function(engine, "along", "i" + len(ALONG) * "p")
         # tangents of parameters, setpoints and states at rest: zero, and written over with zero
-        sizes = (len(system.parameters), len(system.setpoints), len(system.states))
-        states = sizes[-1]
+        states = len(system.states)
+        sizes = (len(system.parameters), len(system.setpoints), states)
+        still = [np.zeros((rows, DIRECTIONS)) for rows in sizes]
         whole_blocks = -(-states // DIRECTIONS) * DIRECTIONS
         columns = np.eye(states, whole_blocks).reshape(states, -1, DIRECTIONS)
         units = np.ascontiguousarray(columns.transpose(1, 0, 2))
-        still, no_input = (
-            [np.zeros((rows, DIRECTIONS)) for rows in sizes],
-            np.zeros(len(system.inputs)),
-        )
+        no_input = np.zeros(len(system.inputs))
         self._blocks, self._kept = units.shape, (still, units, no_input)
-        self._still, self._units = [address(zeros) for zeros in still], address(units)
-        self._no_input = address(no_input)
+        *self._still, self._units, self._no_input = map(address, (*still, units, no_input))
 
     def rest(self, p: Array) -> Start:
         """Return the rest of one parameter set (np,): setpoints (nr,) and states (nx,)."""
@@ -379,3 +306,7 @@ class LinearKernel:
         """Return Jacobians (..., nx, nx) of blocks (..., blocks, nx, DIRECTIONS) of columns."""
         rows = columns.swapaxes(-3, -2)
         return rows.reshape(*rows.shape[:-2], -1)[..., : rows.shape[-3]]
+
+
+# made once in a process
+kernel, linear_kernel = cache(Kernel), cache(LinearKernel)

@@ -1,4 +1,7 @@
-"""Runs of many parameter sets in one call of machine code, sampled where a record is."""
+"""Runs of many parameter sets in one call of machine code, sampled where a record is.
+
+Arrays are given by their addresses; a call releases the interpreter's lock.
+"""
 
 import ctypes
 import threading
@@ -8,15 +11,38 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.calls import JOB, SAMPLES, SPAN, address, place_of
-
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 
+# rows of eight bytes each, addresses and counts, of the tables that the loops of `driver` work on
+JOB = ("p", "dp", "rates", "spans")  # sets side by side, from rest through all segments
+SPAN = ("u", "shapes", "row", "n", "parts", "h")  # a segment of a run
+SAMPLES = ("rows", "weights", "slopes", "out", "dout", "change")  # of one of the sets of a job
+WORK = ("r", "x", "out", "dr", "dx", "dout", "du")  # where a job leaves what is not asked for
+
+# the arrays of the functions that linearise
+AT_REST = ("p", "r", "x", "slopes", "jacobian", "dp", "dr", "dx", "units", "u")
+ALONG = ("p", "r", "x", "u", "slopes", "jacobian", "dp", "dr", "units")
+
 CACHE_LINE = 8  # numbers: what a vector is read from begins at a multiple
 MOST_KEPT = 1 << 23  # numbers (64 MB) of a scratch buffer that is used again
+KINDS = {"p": ctypes.c_void_p, "i": ctypes.c_int64, "d": ctypes.c_double}
 
 _scratch = threading.local()  # new pages for every run would cost a fifth of it
+
+
+def address(array: NDArray[Any], kind: type = np.float64) -> int:
+    """Take the address of an array; raises TypeError where machine code could not read it."""
+    if array.dtype != kind or not array.flags.c_contiguous:
+        raise TypeError(f"the kernel takes C-contiguous arrays of {kind.__name__}")
+    place: int = array.__array_interface__["data"][0]  # a third of the time of array.ctypes
+    return place
+
+
+def function(engine: Any, name: str, kinds: str) -> Any:
+    """Return a function of the machine code: "ppi" takes two arrays and a whole number."""
+    prototype = ctypes.CFUNCTYPE(None, *(KINDS[kind] for kind in kinds))
+    return prototype(engine.get_function_address(name))
 
 
 class Segment(NamedTuple):
@@ -80,17 +106,6 @@ class Sizes(NamedTuple):
     moving: int = 0
 
 
-class Samples(NamedTuple):
-    """Outputs (K, M, ny) of K sets and their derivatives (K, blocks, M, ny, directions).
-
-    ``change`` (K, M, ny) are their time derivatives, where the readings have weights for them.
-    """
-
-    outputs: Array
-    slopes: Array | None
-    change: Array | None
-
-
 class Courses:
     """The courses of K sets: one that all share, or each its own on the same grid.
 
@@ -108,43 +123,38 @@ class Courses:
         self.arrays = courses, readings  # what the addresses below point into
         shapes = segments[0].shapes
         self.columns = 0 if shapes is None else shapes.shape[-1]
-        self.readings = _of_each([_places(reading) for reading in readings], self.sets)
-        self.spans = _of_each([_table(course.segments) for course in courses], self.sets)
-        self.spans[:, :, SPAN.index("parts")] = parts.reshape(self.sets, -1)
-        steps = np.array([segment.step for segment in segments])
-        h = steps / self.spans[:, :, SPAN.index("parts")]
+
+        def of_each(tables: Sequence[Any]) -> Table:
+            table = np.array(tables, dtype=np.int64)
+            return table if len(tables) == self.sets else np.repeat(table, self.sets, axis=0)
+
+        def place(array: Array | None) -> int:
+            return 0 if array is None else address(array)
+
+        self.readings = of_each(
+            [(address(rows, np.int64), address(w), place(slopes)) for rows, w, slopes in readings]
+        )
+        firsts = np.cumsum([0, *lengths]).tolist()
+        self.spans = of_each(
+            [
+                [
+                    (address(u), place(shapes), row, len(u) - 1, 0, 0)
+                    for row, (u, _, shapes) in zip(firsts, course.segments, strict=False)
+                ]
+                for course in courses
+            ]
+        )
+        substeps = self.spans[:, :, SPAN.index("parts")]
+        substeps[:] = parts.reshape(self.sets, -1)
+        h = np.array([segment.step for segment in segments]) / substeps
         self.spans[:, :, SPAN.index("h")] = h.view(np.int64)
-
-
-def _of_each(tables: Sequence[Any], sets: int) -> Table:
-    """Return a table of each set, where there is one for all as well."""
-    table = np.array(tables, dtype=np.int64)
-    return table if len(tables) == sets else np.repeat(table, sets, axis=0)
-
-
-def _places(reading: SampleRows) -> tuple[int, int, int]:
-    slopes = 0 if reading.slopes is None else address(reading.slopes)
-    return place_of(reading.rows), address(reading.weights), slopes
-
-
-def _table(segments: Sequence[Segment]) -> list[tuple[int, ...]]:
-    table: list[tuple[int, ...]] = []
-    row = 0
-    for u, _, shapes in segments:
-        table.append((address(u), 0 if shapes is None else address(shapes), row, len(u) - 1, 0, 0))
-        row += len(u)
-    return table
 
 
 class Sampler:
     """Calls the function ``sampled`` of some machine code."""
 
     def __init__(self, engine: Any, sizes: Sizes) -> None:
-        self.sizes = sizes
-        numbers, pointer = ctypes.c_int64, ctypes.c_void_p
-        arguments = (numbers, pointer, pointer, *[numbers] * 4, pointer)
-        prototype = ctypes.CFUNCTYPE(None, *arguments)
-        self._call = prototype(engine.get_function_address("sampled"))
+        self.sizes, self._call = sizes, function(engine, "sampled", "ippiiiip")
 
     def __call__(
         self,
@@ -153,79 +163,59 @@ class Sampler:
         sets: NDArray[np.intp],
         dp: Array | None = None,
         rates: Array | None = None,
-    ) -> Samples:
+    ) -> tuple[Array, Array | None, Array | None]:
         """Run jobs of sets side by side, and return the samples of all K sets of ``courses``.
 
         ``p`` (jobs, np, lanes) are their parameters, ``sets`` (jobs, lanes) the numbers of these
         sets; ``dp`` (K, blocks, np, directions) the tangents of sets that run one by one, a job
         for each block, and ``rates`` (K, blocks, moving, columns, directions) those of the inputs
-        that move.
+        that move. The samples are the outputs (K, M, ny), their derivatives (K, blocks, M, ny,
+        directions), and those to time (K, M, ny) where the readings have weights for them.
         """
-        sizes, count = self.sizes, courses.sets
+        sizes, count, jobs = self.sizes, courses.sets, len(sets)
         blocks = 1 if dp is None else dp.shape[1]
         shape = (courses.samples, sizes.outputs)
         outputs = np.empty((count, *shape))
         slopes = None if dp is None else np.empty((count, blocks, *shape, sizes.directions))
         changing = dp is not None and courses.readings[0, 2] != 0
         changes = np.empty((count, *shape)) if changing else None
-        jobs = np.zeros((len(sets), blocks, len(JOB)), np.int64)
-        jobs[:, :, 0] = _places_in(p, len(sets))[:, None]
-        if dp is not None:
-            jobs[:, :, 1] = _places_in(dp, len(sets) * blocks).reshape(-1, blocks)
-        if rates is not None:
-            jobs[:, :, 2] = _places_in(rates, len(sets) * blocks).reshape(-1, blocks)
-        jobs[:, :, 3] = _places_in(courses.spans, count)[sets[:, 0]][:, None]
-        lanes = np.zeros((len(sets), blocks, sets.shape[1], len(SAMPLES)), np.int64)
+        table = np.zeros((jobs, blocks, len(JOB)), np.int64)
+        table[:, :, 0] = _places(p, jobs)[:, None]
+        for column, array in ((1, dp), (2, rates)):
+            if array is not None:
+                table[:, :, column] = _places(array, jobs * blocks).reshape(-1, blocks)
+        table[:, :, 3] = _places(courses.spans, count, np.int64)[sets[:, 0]][:, None]
+        lanes = np.zeros((jobs, blocks, sets.shape[1], len(SAMPLES)), np.int64)
         lanes[..., :3] = courses.readings[sets][:, None]
-        lanes[..., 3] = _places_in(outputs, count)[sets][:, None]
+        lanes[..., 3] = _places(outputs, count)[sets][:, None]
         if slopes is not None:
-            lanes[..., 4] = _places_in(slopes, count * blocks).reshape(-1, blocks)[:, :, None]
+            lanes[..., 4] = _places(slopes, count * blocks).reshape(-1, blocks)[:, :, None]
         if changes is not None:
-            lanes[..., 5] = _places_in(changes, count)[sets][:, None]
+            lanes[..., 5] = _places(changes, count)[sets][:, None]
         work, scratch = self._work(courses)
-        self._call(
-            len(sets) * blocks,
-            place_of(jobs),
-            place_of(lanes),
-            courses.segments,
-            courses.samples,
-            courses.points,
-            courses.columns,
-            place_of(work),
-        )
+        tables = (address(table, np.int64), address(lanes, np.int64))
+        counts = (courses.segments, courses.samples, courses.points, courses.columns)
+        self._call(jobs * blocks, *tables, *counts, address(work, np.int64))
         del scratch
-        return Samples(outputs, slopes, changes)
+        return outputs, slopes, changes
 
     def _work(self, courses: Courses) -> tuple[Table, Array]:
-        """Lay out the work space of a job: its addresses, and the buffer that holds it."""
+        """Lay out the work space of a job: its addresses, and this thread's buffer with it."""
         setpoints, states, outputs, sets, directions, moving = self.sizes
-        wide = sets * directions
-        lengths = (
-            *(setpoints * sets, states * sets, courses.rows * outputs * sets),
-            *(setpoints * wide, states * wide, courses.rows * outputs * wide),
-            courses.longest * moving * directions,
-        )
-        offsets, end = [], 0
-        for length in lengths:
-            offsets.append(end)
-            end += -(-length // CACHE_LINE) * CACHE_LINE
-        scratch = _scratch_of(end + CACHE_LINE)
+        values = np.array([setpoints, states, courses.rows * outputs]) * sets
+        of_inputs = courses.longest * moving * directions
+        lengths = np.array([*values, *(values * directions), of_inputs])
+        ends = np.cumsum(-(-lengths // CACHE_LINE) * CACHE_LINE)
+        size = int(ends[-1]) + CACHE_LINE
+        scratch: Array | None = getattr(_scratch, "buffer", None)
+        if scratch is None or len(scratch) < size:
+            scratch = np.empty(size)
+            if size <= MOST_KEPT:
+                _scratch.buffer = scratch
         begin = -(-address(scratch) // (8 * CACHE_LINE)) * (8 * CACHE_LINE)
-        return np.array([begin + 8 * offset for offset in offsets]), scratch
+        return begin + 8 * np.array([0, *ends[:-1]]), scratch
 
 
-def _places_in(array: NDArray[Any], count: int) -> Table:
+def _places(array: NDArray[Any], count: int, kind: type = np.float64) -> Table:
     """Take the addresses of ``count`` equal parts of an array."""
-    begin = place_of(array) if array.dtype == np.int64 else address(array)
-    return begin + np.arange(count) * (array.nbytes // max(count, 1))
-
-
-def _scratch_of(size: int) -> Array:
-    """Return a buffer of at least so many numbers, this thread's own."""
-    kept: Array | None = getattr(_scratch, "buffer", None)
-    if kept is not None and len(kept) >= size:
-        return kept
-    buffer = np.empty(size)
-    if size <= MOST_KEPT:
-        _scratch.buffer = buffer
-    return buffer
+    return address(array, kind) + np.arange(count) * (array.nbytes // max(count, 1))

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
-from exfit.engine.trace import Graph, Node, Signal
+from exfit.engine.trace import Graph, Node, Signal, in_order
 
 Signals = Mapping[str, Signal]
 
@@ -63,20 +64,6 @@ class Trace:
         return "\n".join([*lines, *map(str, groups)])
 
 
-@dataclass(frozen=True)
-class Tangents:
-    """The derivatives of a trace in several directions at once."""
-
-    p: tuple[Node | None, ...]  # the tangent of each parameter; None where it is not free
-    r: tuple[Node, ...]
-    x: tuple[Node, ...]
-    u: tuple[Node | None, ...]  # the tangent of each input; None where it does not move
-    rest: tuple[Node, ...]
-    slopes: tuple[Node, ...]
-    outputs: tuple[Node, ...]
-    clamped: tuple[Node, ...]
-
-
 def trace(system: System, outputs: Sequence[str]) -> Trace:
     """Run the equations of a system once on symbols; ``outputs`` are those wanted of it."""
     graph = Graph()
@@ -105,37 +92,18 @@ def trace(system: System, outputs: Sequence[str]) -> Trace:
     )
 
 
-def differentiate(
-    traced: Trace, system: System, free: Sequence[str], moving: Sequence[str] = ()
-) -> Tangents:
-    """Return the derivatives of a trace where the free parameters and the moving inputs move."""
-    from exfit.engine.tangents import tangents
+@cache
+def parameters_used(system: System, outputs: tuple[str, ...] | None = None) -> frozenset[str]:
+    """Name parameters on which a response of the system, or of some outputs, can depend."""
+    traced = trace(system, system.outputs if outputs is None else outputs)
+    targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
+    reached = {node.index for node in in_order(targets)}
+    pairs = zip(system.parameters, traced.p, strict=True)
+    return frozenset(name for name, node in pairs if node.index in reached)
 
-    graph = traced.x[0].graph
 
-    def symbols(nodes: Sequence[Node], varies: bool) -> tuple[Node, ...]:
-        return tuple(graph.symbol(f"d{n.args[0]}", varies=varies, wide=True) for n in nodes)
-
-    def some(
-        nodes: Sequence[Node], names: Sequence[str], chosen: Sequence[str], varies: bool
-    ) -> tuple[Node | None, ...]:
-        pairs = zip(nodes, names, strict=True)
-        return tuple(symbols([n], varies)[0] if name in chosen else None for n, name in pairs)
-
-    p = some(traced.p, system.parameters, free, False)
-    r, x = symbols(traced.r, False), symbols(traced.x, True)
-    u = some(traced.u, system.inputs, moving, True)
-    seeds = {node: dp for node, dp in zip(traced.p, p, strict=True) if dp is not None}
-    nodes, derived = (*traced.r, *traced.x, *traced.u), (*r, *x, *u)
-    pairs = zip(nodes, derived, strict=True)
-    every = {**seeds, **{node: symbol for node, symbol in pairs if symbol is not None}}
-    return Tangents(
-        p=p,
-        r=r,
-        x=x,
-        u=u,
-        rest=tuple(tangents(traced.rest, seeds)),
-        slopes=tuple(tangents(traced.slopes, every)),
-        outputs=tuple(tangents(traced.outputs, every)),
-        clamped=tuple(tangents(traced.clamped, every)),
-    )
+@cache
+def time_constants(system: System) -> tuple[str, ...]:
+    """Return the parameters in seconds that matter to the response."""
+    used = parameters_used(system)
+    return tuple(name for name in system.time_constants if name in used)

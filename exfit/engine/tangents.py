@@ -1,16 +1,73 @@
-"""Exact derivatives of a graph in several directions at once, by the chain rule.
+"""Exact derivatives in several directions at once, by the chain rule, and the code that runs them.
 
 A derivative is kept as a factor, one number, times a tangent, one number per direction, wherever
 it can be: a chain of operations on one value then multiplies factors, which is cheap, and a sum of
 two derivatives is the product of a sum where their tangents are the same.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import NamedTuple
 
+import numpy as np
+
+from exfit.engine.kernel import DIRECTIONS, Array, compiled, text_of
+from exfit.engine.sampling import Courses, Sampler, Sizes
+from exfit.engine.system import System, Trace, trace
 from exfit.engine.trace import TRUTHS, Node, in_order
 
 PARTIAL = ("/", "sqrt", "log", "exp")  # what makes infinity or no number of a number
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """The derivatives of a trace in several directions at once."""
+
+    p: tuple[Node | None, ...]  # the tangent of each parameter; None where it is not free
+    r: tuple[Node, ...]
+    x: tuple[Node, ...]
+    u: tuple[Node | None, ...]  # the tangent of each input; None where it does not move
+    rest: tuple[Node, ...]
+    slopes: tuple[Node, ...]
+    outputs: tuple[Node, ...]
+    clamped: tuple[Node, ...]
+
+
+def differentiate(
+    traced: Trace, system: System, free: Sequence[str], moving: Sequence[str] = ()
+) -> Tangents:
+    """Return the derivatives of a trace where the free parameters and the moving inputs move."""
+    graph = traced.x[0].graph
+
+    def symbol(node: Node, varies: bool) -> Node:
+        return graph.symbol(f"d{node.args[0]}", varies=varies, wide=True)
+
+    def some(
+        nodes: Sequence[Node], names: Sequence[str], chosen: Sequence[str], varies: bool
+    ) -> tuple[Node | None, ...]:
+        pairs = zip(nodes, names, strict=True)
+        return tuple(symbol(node, varies) if name in chosen else None for node, name in pairs)
+
+    p = some(traced.p, system.parameters, free, False)
+    r, x = (
+        tuple(symbol(n, v) for n in nodes) for nodes, v in ((traced.r, False), (traced.x, True))
+    )
+    u = some(traced.u, system.inputs, moving, True)
+    seeds = {node: dp for node, dp in zip(traced.p, p, strict=True) if dp is not None}
+    pairs = zip((*traced.r, *traced.x, *traced.u), (*r, *x, *u), strict=True)
+    every = seeds | {node: derived for node, derived in pairs if derived is not None}
+    return Tangents(
+        p=p,
+        r=r,
+        x=x,
+        u=u,
+        rest=tuple(tangents(traced.rest, seeds)),
+        slopes=tuple(tangents(traced.slopes, every)),
+        outputs=tuple(tangents(traced.outputs, every)),
+        clamped=tuple(tangents(traced.clamped, every)),
+    )
 
 
 class Slope(NamedTuple):
@@ -103,43 +160,21 @@ def _times(slope: Slope | None, factor: Node) -> Slope | None:
 
 
 def _sum(a: Slope | None, b: Slope | None) -> Slope | None:
-    if a is None or b is None:
-        return a or b
-    if a.tangent is b.tangent:
-        return a._replace(factor=a.factor + b.factor)
-    if a.factor is b.factor:
-        return a._replace(tangent=a.tangent + b.tangent)
-    return _whole(a.product + b.product)
+    return a or b if a is None or b is None else _joined(operator.add, a, b)
 
 
 def _difference(a: Slope | None, b: Slope | None) -> Slope | None:
     if b is None:
         return a
-    if a is None:
-        return b._replace(factor=0.0 - b.factor)
-    if a.tangent is b.tangent:
-        return a._replace(factor=a.factor - b.factor)
-    if a.factor is b.factor:
-        return a._replace(tangent=a.tangent - b.tangent)
-    return _whole(a.product - b.product)
+    return b._replace(factor=0.0 - b.factor) if a is None else _joined(operator.sub, a, b)
 
 
 def _chosen(condition: Node | bool, a: Slope | None, b: Slope | None) -> Slope | None:
     """Return a where the condition holds, else b; what is not chosen may be no number."""
     if isinstance(condition, bool):
         return a if condition else b
-    if a is None or b is None:
-        return _switched(condition, a, b)
-    graph = condition.graph
-    if a.tangent is b.tangent:
-        return a._replace(factor=graph.select(condition, a.factor, b.factor))
-    if a.factor is b.factor:
-        return a._replace(tangent=graph.select(condition, a.tangent, b.tangent))
-    return _whole(graph.select(condition, a.product, b.product))
-
-
-def _switched(condition: Node, a: Slope | None, b: Slope | None) -> Slope | None:
-    """Return a choice between a derivative and none."""
+    if a is not None and b is not None:
+        return _joined(partial(condition.graph.select, condition), a, b)
     slope = a or b
     if slope is None:
         return None
@@ -148,6 +183,15 @@ def _switched(condition: Node, a: Slope | None, b: Slope | None) -> Slope | None
     taken = slope.factor if symbol else slope.product
     chosen = condition.graph.select(condition, *(taken if s else 0.0 for s in (a, b)))
     return slope._replace(factor=chosen) if symbol else _whole(chosen)
+
+
+def _joined(join: Callable[[Node, Node], Node], a: Slope, b: Slope) -> Slope:
+    """Return a sum, a difference or a choice of two derivatives."""
+    if a.tangent is b.tangent:
+        return a._replace(factor=join(a.factor, b.factor))
+    if a.factor is b.factor:
+        return a._replace(tangent=join(a.tangent, b.tangent))
+    return _whole(join(a.product, b.product))
 
 
 def _needed(value: Node, factor: Node) -> Node:
@@ -180,3 +224,72 @@ def _finite(node: Node) -> bool:
 
 def _whole(tangent: Node) -> Slope:
     return Slope(tangent.graph.constant(1.0), tangent)
+
+
+def _blocks(tangents: Array, width: int) -> Array:
+    """Return tangents (K, ..., N) as blocks (K, blocks, ..., width) of directions, none missing."""
+    given = tangents.shape[-1]
+    count = max(1, -(-given // width))
+    blocks = np.zeros((len(tangents), count, *tangents.shape[1:-1], width))
+    for k in range(count):
+        own = tangents[..., k * width : (k + 1) * width]
+        blocks[:, k, ..., : own.shape[-1]] = own
+    return blocks
+
+
+class TangentKernel:
+    """Simulates one parameter set with its exact derivatives in any directions.
+
+    A direction may move the parameters that are ``free`` and the inputs that are ``moving``; as
+    many as ``directions`` run together.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        outputs: Sequence[str],
+        free: Sequence[str],
+        moving: Sequence[str] = (),
+        directions: int = DIRECTIONS,
+    ) -> None:
+        self.system, self.outputs = system, tuple(outputs)
+        self.free, self.moving, self.directions = tuple(free), tuple(moving), directions
+
+        def ir() -> str:
+            from exfit.engine.emit import simulation_with_tangents
+
+            traced = trace(system, self.outputs)
+            derived = differentiate(traced, system, free, moving)
+            return simulation_with_tangents(traced, derived, directions)
+
+        traced = text_of(system, self.outputs)
+        text = f"tangents {self.free} {self.moving} {directions} {traced}"
+        engine = compiled(text, ir)
+        counts = (len(system.setpoints), len(system.states), len(self.outputs))
+        sizes = Sizes(*counts, directions=directions, moving=len(self.moving))
+        self._sampled = Sampler(engine, sizes)
+
+    def samples(
+        self, p: Array, dp: Array, courses: Courses, rates: Array | None = None
+    ) -> tuple[Array, Array, Array | None]:
+        """Return outputs (K, M, ny) of sets p (K, np), their derivatives, and those to time.
+
+        ``dp`` (K, np, N) are the tangents of the parameters in N directions, zero but where these
+        are free; the inputs that move have theirs by ``rates`` (K, moving, columns, N) of the
+        shapes in their segments. The derivatives are (K, M, ny, N), those to time (K, M, ny) or
+        None where the readings have no weights for them. The derivative of the starting state is
+        part of the result.
+        """
+        sets = np.arange(len(p))[:, None]
+        moving = None if rates is None else _blocks(rates, self.directions)
+        outputs, slopes, change = self._sampled(
+            p, courses, sets, _blocks(dp, self.directions), moving
+        )
+        assert slopes is not None
+        flat = slopes[:, 0]
+        if slopes.shape[1] > 1:
+            flat = np.moveaxis(slopes, 1, -2).reshape(*flat.shape[:-1], -1)
+        return outputs, flat[..., : dp.shape[-1]], change
+
+
+tangent_kernel = cache(TangentKernel)  # made once in a process

@@ -159,7 +159,7 @@ class Experiment:
     def _averages(self) -> Averages | None:
         """Short windows of averages of the simulation, None where those are its samples."""
         filterings = [channel.filtering for channel in self.channels]
-        return averages_of(filterings) if self.simulator.responder.alone else None
+        return averages_of(filterings) if self.simulator.responder is None else None
 
     @cached_property
     def _reader(self) -> Simulator:

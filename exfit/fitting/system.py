@@ -8,7 +8,7 @@ from traceback import extract_tb
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, RecordFile, Recording
 from exfit.case.ties import Ties
-from exfit.engine.system import System, trace
+from exfit.engine.system import System, parameters_used, trace
 from exfit.errors import CaseError, ModelError
 from exfit.models.sheet import Model
 from exfit.plants import (
@@ -22,7 +22,6 @@ from exfit.plants import (
     inputs_at,
     inputs_for_limiters,
 )
-from exfit.simulation.kernels import parameters_used
 
 Values = Mapping[str, float]
 

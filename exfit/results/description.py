@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Annotated, NamedTuple
 
-from exfit.simulation.limit_hits import LimitHit
-from exfit.simulation.limits import LIMITER_PREFIXES
+from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
 from exfit.simulation.small_signal import SmallSignal
 from exfit.util.sources import NOT_STATED, TYPICAL
 

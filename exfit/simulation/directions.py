@@ -1,17 +1,26 @@
-"""Directions of differentiation as arrays, as the machine code takes them."""
+"""Derivatives of responses: their directions as the machine code takes them, and its runs."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.engine.kernel import DIRECTIONS
+from exfit.engine.sampling import Courses
 from exfit.engine.system import System
+from exfit.engine.tangents import tangent_kernel
 from exfit.simulation.inputs import Direction, Inputs
 from exfit.simulation.interpolation import GridSegment
+from exfit.simulation.substeps import NO_SUBSTEPS
+from exfit.util.processes import in_threads
+
+if TYPE_CHECKING:
+    from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 
 
 class InputShape(NamedTuple):
@@ -46,11 +55,6 @@ class Moves:
     delayed: tuple[int, ...]
     free: tuple[str, ...]
     shapes: dict[str, tuple[InputShape, ...]]
-
-    @property
-    def moving(self) -> tuple[str, ...]:
-        """Inputs that move."""
-        return tuple(self.shapes)
 
     def tangents(self, system: System, directions: Sequence[Sequence[Direction]]) -> Array:
         """Move of each parameter in each direction that needs a run, (K, np, N)."""
@@ -90,43 +94,74 @@ class Moves:
 def moves_of(system: System, inputs: Inputs, directions: Sequence[Sequence[Direction]]) -> Moves:
     """Collect the moves of the directions of several sets."""
     every = [(k, move) for own in directions for k, move in enumerate(own)]
-    shapes = {shape for _, move in every if move.steps for shape in _shapes_of(move)}
+    free = {name for _, move in every for name in move.parameters}
+    shapes = {
+        InputShape(step, instant)
+        for _, move in every
+        for step, rates in move.steps.items()
+        for instant, rate in zip((True, False), rates, strict=True)
+        if rate
+    }
+    pairs = [(inputs.steps[shape.step].signal, shape) for shape in sorted(shapes)]
+    moving = {signal for signal, _ in pairs}
     return Moves(
-        columns=_places(every, lambda move: bool(move.parameters or move.steps)),
-        delayed=_places(every, lambda move: move.delay != 0.0),
-        free=_moving_parameters(system, [move for _, move in every]),
-        shapes=_by_signal(system, inputs, shapes) if shapes else {},
+        columns=tuple(sorted({k for k, move in every if move.parameters or move.steps})),
+        delayed=tuple(sorted({k for k, move in every if move.delay != 0.0})),
+        free=tuple(name for name in system.parameters if name in free),
+        shapes={
+            name: tuple(shape for signal, shape in pairs if signal == name)
+            for name in system.inputs
+            if name in moving
+        },
     )
 
 
-def _places(
-    every: Iterable[tuple[int, Direction]], among: Callable[[Direction], bool]
-) -> tuple[int, ...]:
-    """Return the places of the directions of which something is true, of any set."""
-    return tuple(sorted({k for k, move in every if among(move)}))
+def tangents_by_equations(
+    simulator: "Simulator",
+    sets: Sequence[Mapping[str, float]],
+    outputs: tuple[str, ...],
+    directions: Sequence[Sequence[Direction]],
+    tests: "Sequence[Simulator] | None",
+) -> tuple[Array, Array, Counts]:
+    """Simulate as `Simulator.tangents_of_many`, by the equations of the system."""
+    system = simulator.system
+    p, parts = simulator.prepared(sets)
+    reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
+    if not reached:
+        samples = np.full((len(sets), len(simulator.times), len(outputs)), np.nan)
+        return samples, np.full((*samples.shape, len(directions[0])), np.nan), parts
+    own = [directions[k] for k in reached]
+    moves = moves_of(system, simulator.inputs, own)
+    simulators = [simulator] if tests is None else [tests[k] for k in reached]
+    courses = Courses([test.course(moves) for test in simulators], parts[reached])
+    width = DIRECTIONS if len(moves.columns) <= DIRECTIONS else 2 * DIRECTIONS
+    code = tangent_kernel(system, outputs, moves.free, tuple(moves.shapes), width)
+    p, tangents, rates = p[reached], moves.tangents(system, own), moves.rates(own)
 
+    def block(first: int) -> tuple[Array, Array, Array | None]:
+        some = slice(first, first + width)
+        growing = None if rates is None else rates[..., some]
+        return code.samples(p, tangents[..., some], courses, growing)
 
-def _moving_parameters(system: System, moves: Sequence[Direction]) -> tuple[str, ...]:
-    free = {name for move in moves for name in move.parameters}
-    return tuple(name for name in system.parameters if name in free)
+    firsts = range(0, len(moves.columns), width)
+    if len(p) > 1 or len(firsts) <= 1:
+        samples, slopes, change = code.samples(p, tangents, courses, rates)
+    else:  # of a single set each block of directions in a thread
+        blocks = [*in_threads(block, firsts)]
+        samples, _, change = blocks[0]
+        slopes = np.concatenate([each for _, each, _ in blocks], axis=-1)
+    if len(moves.columns) < len(own[0]):
+        driven, slopes = slopes, np.zeros((*samples.shape, len(own[0])))
+        slopes[..., list(moves.columns)] = driven
+    for k in moves.delayed if change is not None else ():
+        delays = np.array([of_set[k].delay for of_set in own])
+        slopes[..., k] -= delays[:, None, None] * change
 
+    def of_all(results: Array) -> Array:
+        if len(reached) == len(sets):
+            return results
+        every = np.full((len(sets), *results.shape[1:]), np.nan)
+        every[reached] = results
+        return every
 
-def _shapes_of(move: Direction) -> Iterator[InputShape]:
-    for step, (at, size) in move.steps.items():
-        if at:
-            yield InputShape(step, True)
-        if size:
-            yield InputShape(step, False)
-
-
-def _by_signal(
-    system: System, inputs: Inputs, shapes: Collection[InputShape]
-) -> dict[str, tuple[InputShape, ...]]:
-    """Return the shapes of each input that moves."""
-    pairs = [(inputs.steps[shape.step].signal, shape) for shape in sorted(shapes)]
-    moving = {signal for signal, _ in pairs}
-    return {
-        name: tuple(shape for signal, shape in pairs if signal == name)
-        for name in system.inputs
-        if name in moving
-    }
+    return of_all(samples), of_all(slopes), parts

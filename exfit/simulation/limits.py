@@ -1,17 +1,26 @@
-"""The limits in a system's equations: what each holds, and the parameter that sets it."""
+"""The limits in a system's equations: what sets each, and how a response meets it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from functools import cache
+from math import isfinite
 from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from exfit.engine.system import System, Trace, trace
 from exfit.engine.trace import Node, Signal, evaluate, in_order, larger, smaller
-from exfit.plants import LIMITER_KINDS
+from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
+from exfit.simulation.simulator import Run, Simulator
 
+Array = NDArray[np.float64]
 Values = Mapping[str, float]
+Spans = tuple[tuple[float, float], ...]
 
-LIMITER_PREFIXES = tuple(f"{kind}." for kind in LIMITER_KINDS)  # of what belongs to a limiter
 ROUNDING_AT_REST = 1e-9  # pu
+# of a limit: a state put back on it is that near, one that passes by does not
+LIMIT_ROUNDING = 1e-9
+POINTS_AT_ONCE = 16384  # of a run: the values of a whole graph along them take 50 MB
 
 
 class EquationLimit(NamedTuple):
@@ -28,6 +37,22 @@ class EquationLimit(NamedTuple):
     value: Node
     bound: Node
     clamped: bool
+
+
+class Extreme(NamedTuple):
+    """Largest move of a signal towards a limit: its ``share`` of the way from zero to it."""
+
+    limit: str
+    share: float
+
+
+class Followed(NamedTuple):
+    """A limiter along a run: its value and its bound (n,), and where it is held."""
+
+    limiter: EquationLimit
+    value: Array
+    bound: Array
+    held: NDArray[np.bool_]
 
 
 @cache
@@ -52,7 +77,7 @@ def limits_passed(system: System, values: Values) -> str:
     for node in [node for node in everything if node.op == "clip"]:
         x, low, high = (everything[operand] for operand in node.operands)
         for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
-            name = limit_name(node.operands[limit])
+            name = _limit_name(node.operands[limit])
             if passed and name and not name.startswith(LIMITER_PREFIXES):
                 faults.append(
                     f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
@@ -60,11 +85,18 @@ def limits_passed(system: System, values: Values) -> str:
     return "; ".join(dict.fromkeys(faults))
 
 
-def limit_name(node: Node) -> str:
-    """Name the parameter that gives a limit: of all from which it is computed, the one named so."""
-    symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
-    limits = [_name(n) for n in symbols if _is_limit(n)]
-    return ", ".join(limits or map(_name, symbols))
+def acting_at_rest(system: System, values: Values) -> str:
+    """Name the limiters of excitation that act at the start already, and by how much."""
+    rest = at_rest(traced(system), values)
+    faults: dict[str, str] = {}
+    for limit, output in _limiter_gates(system):
+        numbers = evaluate([limit.value, limit.bound], rest)
+        value, bound = float(numbers[limit.value]), float(numbers[limit.bound])
+        if limit.sign * (value - bound) > ROUNDING_AT_REST:
+            own = f"with {value:.4g} pu" if limit.value is output else f"at {bound:.4g} pu"
+            gate = "" if limit.value is output else f", where its gate has {value:.4g} pu"
+            faults.setdefault(limit.limit, f"{limit.limit} acts at the start already, {own}{gate}")
+    return "; ".join(faults.values())
 
 
 @cache
@@ -75,64 +107,74 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     that force a value to one; neither the arcs of a rectifier nor what only cannot be negative. A
     limiter of excitation is one limit by the name of its output, oel.OEL2C, whatever it has inside.
     """
-    of = traced(system)
-    states = {node: node for node in of.x}
-    clamps = [(node, held) for node, held in zip(of.x, of.clamped, strict=True) if node is not held]
-    found: list[EquationLimit | None] = []
-    for state, held in clamps:
+    of, found = traced(system), list[EquationLimit]()
+    states = set(of.x)
+    clamps = {held: x for x, held in zip(of.x, of.clamped, strict=True) if x is not held}
+    for held, state in clamps.items():
         _, low, high = held.operands
-        found += [_limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))]
-    ours = {held for _, held in clamps}
+        found += [*_limit(state, low, -1.0, state), *_limit(state, high, 1.0, state)]
     for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
-        if node not in ours:
-            found += list(_clamp(node, states))
-    limits = [limit for limit in found if limit is not None and not _inside_limiter(limit)]
-    limits += _of_limiters(system)
+        if node.op == "clip" and node not in clamps:
+            x, low, high = node.operands
+            for bound, sign in ((low, -1.0), (high, 1.0)):
+                clamped_there = x.op == "clip" and any(bound is operand for operand in x.operands)
+                if _limit_name(bound) and not clamped_there:
+                    found += _limit(x, bound, sign, _state_in(x, states))
+        elif node.op == "select" and node.operands[0].varies:
+            found += _choice(node, states)
+    limits = [
+        limit
+        for limit in found
+        if not limit.limit.startswith(LIMITER_PREFIXES)
+        if not limit.signal.startswith(LIMITER_PREFIXES)
+    ]
+    limits += [limit for limit, _ in _limiter_gates(system)]
     return tuple(sorted(dict.fromkeys(limits), key=lambda limit: limit.value.index))
+
+
+def _choice(node: Node, states: Container[Node]) -> Iterator[EquationLimit]:
+    """Yield the limits of the higher or lower of two values, or of one forced by a contact."""
+    condition, chosen, other = node.operands
+    gate = condition.op == "<" and {*condition.operands} == {chosen, other}
+    for bound, x in ((chosen, other), (other, chosen)):
+        if gate and not bound.varies and any(_is_limit(n) for n in in_order([bound])):
+            ceiling = chosen is condition.operands[0]
+            yield from _limit(x, bound, 1.0 if ceiling else -1.0, _state_in(x, states))
+        elif not gate and _is_limit(bound):
+            sign = 1.0 if "MAX" in _name(bound) else -1.0
+            yield EquationLimit(_given(bound), "", sign, node, bound, True)
+
+
+def _limit(value: Node, bound: Node, sign: float, state: Node | None) -> Iterator[EquationLimit]:
+    """Yield a limit that is not infinite."""
+    fixed = bound.constant
+    if fixed is None or isfinite(fixed):
+        name = _given(bound) if fixed is None else f"{fixed:g}"
+        signal = "" if state is None else _name(state)
+        yield EquationLimit(name, signal, sign, value, bound, value is state)
+
+
+def _limiter_gates(system: System) -> Iterator[tuple[EquationLimit, Node]]:
+    """Yield the gates at which a limiter takes over, with its output; the sum where it is added."""
+    for name, output in limiter_outputs(system).items():
+        # an overexcitation limiter is a ceiling
+        ceiling = "oel" in name.split(".")
+        sign = 1.0 if ceiling else -1.0
+        values = _values_at_gates(system, output, smaller if ceiling else larger)
+        for value in values:
+            yield EquationLimit(name, "", sign, value, output, False), output
+        if not values:
+            zero = output.graph.constant(0.0)
+            yield EquationLimit(name, "", -sign, output, zero, False), output
 
 
 def limiter_outputs(system: System) -> dict[str, Node]:
     """Return the outputs of a system's limiters by name."""
-    names, of = set(system.states), traced(system)
     return {
         name: node
-        for name, node in zip(system.outputs, of.outputs, strict=True)
-        if name.startswith(LIMITER_PREFIXES) and name not in names
+        for name, node in zip(system.outputs, traced(system).outputs, strict=True)
+        if name.startswith(LIMITER_PREFIXES) and name not in system.states
     }
-
-
-def acting_at_rest(system: System, values: Values) -> str:
-    """Name the limiters of excitation that act at the start already, and by how much."""
-    rest = at_rest(traced(system), values)
-    faults: dict[str, str] = {}
-    for name, output in limiter_outputs(system).items():
-        for limit in _gates_of(system, name, output):
-            numbers = evaluate([limit.value, limit.bound], rest)
-            value, bound = float(numbers[limit.value]), float(numbers[limit.bound])
-            if limit.sign * (value - bound) > ROUNDING_AT_REST:
-                own = f"with {value:.4g} pu" if limit.value is output else f"at {bound:.4g} pu"
-                gate = "" if limit.value is output else f", where its gate has {value:.4g} pu"
-                faults.setdefault(name, f"{name} acts at the start already, {own}{gate}")
-    return "; ".join(faults.values())
-
-
-def _of_limiters(system: System) -> Iterator[EquationLimit]:
-    """Find limits that are limiters of excitation."""
-    for name, output in limiter_outputs(system).items():
-        yield from _gates_of(system, name, output)
-
-
-def _gates_of(system: System, name: str, output: Node) -> Iterator[EquationLimit]:
-    """Yield the gates at which a limiter takes over; the sum where it is added."""
-    # an overexcitation limiter is a ceiling
-    ceiling = "oel" in name.split(".")
-    sign = 1.0 if ceiling else -1.0
-    values = _values_at_gates(system, output, smaller if ceiling else larger)
-    for value in values:
-        yield EquationLimit(name, "", sign, value, output, False)
-    if not values:
-        zero = output.graph.constant(0.0)
-        yield EquationLimit(name, "", -sign, output, zero, False)
 
 
 def _values_at_gates(
@@ -140,9 +182,9 @@ def _values_at_gates(
 ) -> list[Node]:
     """Values in place of which a limiter acts: another's at its gate and the regulator's both."""
     of, limiters = traced(system), set(limiter_outputs(system).values())
-    gates = {node: _gated(node, output) for node in in_order([*of.slopes, *of.outputs])}
     values: dict[Node, None] = {}
-    for gate, value in gates.items():
+    for gate in in_order([*of.slopes, *of.outputs]):
+        value = _gated(gate, output)
         if value in limiters:
             others = _values_at_gates(system, gate, nearer)
             values |= dict.fromkeys(output.graph.lift(nearer(value, other)) for other in others)
@@ -163,45 +205,11 @@ def _gated(node: Node, output: Node) -> Node | None:
     return other if chosen is output else chosen
 
 
-def _inside_limiter(limit: EquationLimit) -> bool:
-    """Test whether a limit belongs to the equations of a limiter."""
-    return limit.limit.startswith(LIMITER_PREFIXES) or limit.signal.startswith(LIMITER_PREFIXES)
-
-
-def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | None]:
-    """Yield the limits of a node that is a clamp, or a choice between a limit and a value."""
-    if node.op == "clip":
-        x, low, high = node.operands
-        for bound, sign in ((low, -1.0), (high, 1.0)):
-            clamped_there = x.op == "clip" and any(bound is operand for operand in x.operands)
-            if limit_name(bound) and not clamped_there:
-                yield _limiter(x, bound, sign, _state_in(x, states))
-    elif node.op == "select" and node.operands[0].varies:
-        yield from _choice(node, states)
-
-
-def _choice(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | None]:
-    """Yield the limits of the higher or lower of two values, or of one forced by a contact."""
-    condition, chosen, other = node.operands
-    gate = condition.op == "<" and {*condition.operands} == {chosen, other}
-    for bound, x in ((chosen, other), (other, chosen)):
-        if gate and not bound.varies and any(_is_limit(n) for n in in_order([bound])):
-            ceiling = chosen is condition.operands[0]
-            yield _limiter(x, bound, 1.0 if ceiling else -1.0, _state_in(x, states))
-        elif not gate and _is_limit(bound):
-            yield EquationLimit(
-                _given(bound), "", 1.0 if "MAX" in _name(bound) else -1.0, node, bound, True
-            )
-
-
-def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> EquationLimit | None:
-    """Return a limit, None where it is infinite."""
-    fixed = bound.constant
-    if fixed is not None and abs(fixed) == float("inf"):
-        return None
-    name = _given(bound) if fixed is None else f"{fixed:g}"
-    signal = "" if state is None else _name(state)
-    return EquationLimit(name, signal, sign, value, bound, value is state)
+def _limit_name(node: Node) -> str:
+    """Name the parameter that gives a limit: of all from which it is computed, the one named so."""
+    symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
+    limits = [_name(n) for n in symbols if _is_limit(n)]
+    return ", ".join(limits or map(_name, symbols))
 
 
 def _given(bound: Node) -> str:
@@ -210,15 +218,15 @@ def _given(bound: Node) -> str:
     Where a parameter may select that by being 0, the setpoint has its name with a 0 behind it.
     """
     computed = any(n.op == "symbol" and n.args[0].startswith("r.") for n in in_order([bound]))
-    return limit_name(bound).removesuffix("0") if computed else limit_name(bound)
+    return _limit_name(bound).removesuffix("0") if computed else _limit_name(bound)
 
 
-def _state_in(node: Node, states: Mapping[Node, Node]) -> Node | None:
+def _state_in(node: Node, states: Container[Node]) -> Node | None:
     """State that a node is, or is unless its lag is bypassed."""
     if node.op == "select":
         branch_states = (_state_in(branch, states) for branch in node.operands[1:])
         return next((state for state in branch_states if state is not None), None)
-    return states.get(node)
+    return node if node in states else None
 
 
 def _is_limit(node: Node) -> bool:
@@ -230,3 +238,100 @@ def _is_limit(node: Node) -> bool:
 def _name(symbol: Node) -> str:
     """Return the name of what a symbol of a trace stands for."""
     return str(symbol.args[0]).partition(".")[2]
+
+
+def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
+    """Find the limits that the response to these values meets, in the order of their instants.
+
+    A state is at its non-windup limit while it is on it, within rounding; any other value
+    while it would be beyond. Found at every point of the simulation's grid, whose step is how
+    exactly the times are known. ``values`` are the parameters of the system; per unit.
+
+    Raises SimulationError where the start is no rest.
+    """
+    run, followed = _along_run(simulator, values)
+    alike: dict[tuple[str, str, float], list[Followed]] = {}
+    for each in followed:  # a drawing has once what holds one signal at one limit
+        alike.setdefault(each.limiter[:3], []).append(each)
+    hits = []
+    for (limit, signal, _), same in alike.items():
+        held = np.any([each.held for each in same], axis=0)
+        if not np.any(held):
+            continue
+        first = int(np.argmax(held))
+        value = next(float(each.bound[first]) for each in same if each.held[first])
+        seconds = float(np.trapezoid(held.astype(np.float64), run.time))
+        at, share = float(run.time[first]), seconds / float(run.time[-1] - run.time[0])
+        hits.append(LimitHit(limit, signal, value, seconds, at + simulator.delay, share))
+    return tuple(sorted(hits, key=lambda hit: hit.first))
+
+
+def limiters_held(simulator: Simulator, values: Values) -> Iterator[tuple[str, Spans]]:
+    """Yield the limiters of excitation that act, with the first and last instant of each time."""
+    run, followed = _along_run(simulator, values)
+    time = run.time + simulator.delay
+    for name in limiter_outputs(simulator.system):
+        held = np.any([side.held for side in followed if side.limiter.limit == name], axis=0)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
+        if len(edges):
+            ends = time[edges[::2]].tolist(), time[edges[1::2] - 1].tolist()
+            yield name, tuple(zip(*ends, strict=True))
+
+
+def extremes(simulator: Simulator, values: Values) -> tuple[Extreme, ...]:
+    """Largest move of the response towards each of its limits, 1 or more where it met them.
+
+    Left out is what was always on the other side of zero. Raises SimulationError where the start
+    is no rest.
+    """
+    reached = []
+    for limiter, value, bound, held in _along_run(simulator, values)[1]:
+        sides = limiter.sign * bound > 0.0
+        if np.any(sides):
+            share = float(np.max(value[sides] / bound[sides]))
+            if share > 0.0 and np.isfinite(share):
+                reached.append(Extreme(limiter.limit, max(share, 1.0) if np.any(held) else share))
+    return tuple(reached)
+
+
+def limits_at_rest(system: System, values: Values) -> tuple[str, ...]:
+    """Find limits on which a system rests, so that even a small deviation may meet them.
+
+    ``values`` are the parameters of the system.
+    """
+    limiters = equation_limits(system)
+    targets = [node for limiter in limiters for node in (limiter.value, limiter.bound)]
+    rest = evaluate(targets, at_rest(traced(system), values))
+    names = []
+    for limiter in limiters:
+        value, bound = float(rest[limiter.value]), float(rest[limiter.bound])
+        near = LIMIT_ROUNDING * max(abs(value), abs(bound))
+        if isfinite(bound) and abs(value - bound) <= near:
+            names.append(limiter.limit)
+    return tuple(dict.fromkeys(names))
+
+
+def _along_run(simulator: Simulator, values: Values) -> tuple[Run, list[Followed]]:
+    """Return a run with every limiter of the system along it."""
+    system, run = simulator.system, simulator.run(values)
+    of, limiters, count = traced(system), equation_limits(system), len(run.time)
+    fixed = at_rest(of, values)
+    signals = [run.outputs[name] for name in system.states]
+    signals += [run.inputs[name] for name in system.inputs]
+    targets = [node for limiter in limiters for node in (limiter.value, limiter.bound)]
+    along = np.empty((len(targets), count))
+    for first in range(0, count, POINTS_AT_ONCE):
+        now = slice(first, first + POINTS_AT_ONCE)
+        here = {node: y[now] for node, y in zip((*of.x, *of.u), signals, strict=True)}
+        evaluated = evaluate(targets, {**fixed, **here})
+        for row, node in zip(along, targets, strict=True):
+            row[now] = evaluated[node]
+    followed = []
+    for limiter, value, bound in zip(limiters, along[::2], along[1::2], strict=True):
+        beyond = limiter.sign * (value - bound)
+        near = LIMIT_ROUNDING * np.maximum(np.abs(bound), np.abs(value))
+        # a limit of zero has no size of its own
+        near = np.maximum(near, LIMIT_ROUNDING * np.max(np.abs(value), initial=0.0))
+        held = beyond >= -near if limiter.clamped else beyond > near
+        followed.append(Followed(limiter, value, bound, held & np.isfinite(bound)))
+    return run, followed

@@ -3,22 +3,19 @@
 from collections.abc import Container, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import DIRECTIONS, SIDE_BY_SIDE, Span, TangentKernel
+from exfit.engine.kernel import SIDE_BY_SIDE, Span, kernel, linear_kernel
 from exfit.engine.sampling import Course, Courses, Segment
-from exfit.engine.system import System
+from exfit.engine.system import System, time_constants
 from exfit.plants import REFERENCES
-from exfit.simulation.directions import Moves, moves_of
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
-from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel, time_constants
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
-    among_all,
     groups,
     spectral_radii,
     substeps_at_rest,
@@ -26,6 +23,9 @@ from exfit.simulation.substeps import (
     why_unreachable,
 )
 from exfit.util.sorting import distinct
+
+if TYPE_CHECKING:
+    from exfit.simulation.directions import Moves
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -60,11 +60,7 @@ class Response:
 
 
 class Responder(Protocol):
-    """What gives the response of a simulator: the equations of its system, or another program."""
-
-    @property
-    def alone(self) -> bool:
-        """Whether the signals are those of the system, which may be simulated in other ways."""
+    """What gives the response of a simulator in place of the equations of its system."""
 
     def outputs(self, simulator: "Simulator") -> tuple[str, ...]:
         """Name the outputs of a response for which no others are asked."""
@@ -92,50 +88,13 @@ class Responder(Protocol):
         """Simulate as `Simulator.tangents_of_many`."""
 
 
-class Equations:
-    """The responder of a simulator by the machine code of its system."""
-
-    alone = True
-
-    def outputs(self, simulator: "Simulator") -> tuple[str, ...]:
-        """Name the outputs of the system."""
-        return simulator.system.outputs
-
-    def confirm(self, simulator: "Simulator", values: Values) -> None:
-        """Accept every start at rest."""
-
-    def samples_of_many(
-        self,
-        simulator: "Simulator",
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        tests: "Sequence[Simulator] | None",
-    ) -> tuple[Array, Counts]:
-        """Simulate as `Simulator.samples_of_many`."""
-        return simulator.samples_by_equations(sets, outputs, tests)
-
-    def tangents_of_many(
-        self,
-        simulator: "Simulator",
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        directions: Sequence[Sequence[Direction]],
-        tests: "Sequence[Simulator] | None",
-    ) -> tuple[Array, Array, Counts]:
-        """Simulate as `Simulator.tangents_of_many`."""
-        return simulator.tangents_by_equations(sets, outputs, directions, tests)
-
-
-EQUATIONS = Equations()
-
-
 class Simulator:
     """Simulates one system through a test's inputs, sampled at ``times`` (M,) in s.
 
     ``step`` (s) is the largest step; where the system is faster, every step is divided, into no
     fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
-    at ``times - delay``: before the start, where all is at rest, and after the end that there. The
-    ``responder`` gives the response at these times; on the grid it is that of the equations.
+    at ``times - delay``: before the start, where all is at rest, and after the end that there. A
+    ``responder`` gives the response at these times in place of the equations, not that on the grid.
     """
 
     def __init__(
@@ -146,11 +105,10 @@ class Simulator:
         step: float,
         least: int = 1,
         delay: float = 0.0,
-        responder: Responder = EQUATIONS,
+        responder: Responder | None = None,
     ) -> None:
         self.system, self.inputs, self.times = system, inputs, times
-        self.step, self.least, self.delay = step, least, delay
-        self.responder = responder
+        self.step, self.least, self.delay, self.responder = step, least, delay, responder
         self._share = 1.0  # of the inputs
         self._grid = grid_segments(inputs, step)
         # a long record is read on the grid once, whatever else a fit moves
@@ -161,8 +119,8 @@ class Simulator:
         self._segments = self._segments_of()
         self._sampling: Interpolation | GridPoints = Interpolation(self._grid, times, delay)
 
-    def with_responder(self, responder: Responder) -> "Simulator":
-        """Make the simulator of the same test whose response another responder gives."""
+    def with_responder(self, responder: Responder | None) -> "Simulator":
+        """Make the simulator of the same test whose response another gives, or the equations."""
         result = copy(self)
         result.responder = responder
         return result
@@ -203,7 +161,7 @@ class Simulator:
         times = np.concatenate([segment.times for segment in self._grid])
         count = len(times)
         rows = np.arange(count) if points is None else np.linspace(0, count - 1, points).astype(int)
-        result = self.with_responder(EQUATIONS)
+        result = self.with_responder(None)
         result.times, result._sampling = times[rows], GridPoints(rows)
         return result
 
@@ -213,7 +171,7 @@ class Simulator:
         It simulates a small share of them, so that no limit is met, and enlarges how the response
         deviates from the rest.
         """
-        result = self.with_responder(EQUATIONS)
+        result = self.with_responder(None)
         result.least, result._share = 1, SMALL_SHARE
         result._segments = result._segments_of()
         return result
@@ -236,16 +194,22 @@ class Simulator:
         ``with_enough_substeps``. Raises SimulationError where the start is no rest, or the rule
         asks for too many.
         """
-        p = self._vectors([values])
-        parts = int(self._substeps_of_many(p)[0])
-        if parts == NO_SUBSTEPS:
+        p, parts = self.prepared([values])
+        if parts[0] == NO_SUBSTEPS:
             raise why_unreachable(self.system, self.step, values, p[0])
-        self.responder.confirm(self, values)
-        return parts
+        if self.responder is not None:
+            self.responder.confirm(self, values)
+        return int(parts[0])
 
-    def substeps_of_many(self, sets: Sequence[Values]) -> Counts:
-        """Find the sub-steps of sets of values (K,), NO_SUBSTEPS where there is no rest."""
-        return self._substeps_of_many(self._vectors(sets))
+    def prepared(self, sets: Sequence[Values]) -> tuple[Array, Counts]:
+        """Return the parameters of sets as machine code takes them (K, np), and sub-steps (K,).
+
+        These are NO_SUBSTEPS where there is no rest.
+        """
+        names = self.system.parameters
+        p = np.array([[values[name] for name in names] for values in sets], dtype=np.float64)
+        parts = substeps_at_rest(self.system, self.step, p)
+        return p, np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
 
     def rates_at_rest(self, values: Values) -> ComplexArray:
         """Return the eigenvalues (1/s) of the system at rest, zero for a state that stays put.
@@ -253,13 +217,9 @@ class Simulator:
         Raises SimulationError where the start is no rest.
         """
         self.substeps(values)
-        jacobian = linear_kernel(self.system).at_rest(self._vectors([values])).jacobian[0]
+        p, _ = self.prepared([values])
+        jacobian = linear_kernel(self.system).at_rest(p).jacobian[0]
         return np.asarray(np.linalg.eigvals(jacobian), dtype=np.complex128)
-
-    def _substeps_of_many(self, p: Array) -> Counts:
-        """Return the sub-steps of parameter sets p (K, np), NO_SUBSTEPS where there are none."""
-        parts = substeps_at_rest(self.system, self.step, p)
-        return np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
 
     def substeps_along(self, values: Values, points: int = POINTS_ALONG) -> tuple[int, int]:
         """Return the sub-steps of a response, and those that the rule requires all along it."""
@@ -267,8 +227,9 @@ class Simulator:
         signals, parts = some.samples(values, system.outputs)
         states = signals[:, [system.outputs.index(name) for name in system.states]]
         inputs = some._sampling([segment.u for segment in self._segments])
-        code, p = linear_kernel(system), self._vectors([values])[0]
-        _, jacobians = code.motion(p, code.rest(p).r, np.ascontiguousarray(states), inputs)
+        code, (p, _) = linear_kernel(system), self.prepared([values])
+        r = code.rest(p[0]).r
+        _, jacobians = code.motion(p[0], r, np.ascontiguousarray(states), inputs)
         radius = float(spectral_radii(jacobians).max())
         return parts, substeps_for(system, self.step, values, radius)
 
@@ -308,7 +269,8 @@ class Simulator:
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
         """Simulate the outputs (those of the responder by default) at the sample times."""
-        wanted = self.responder.outputs(self) if outputs is None else tuple(outputs)
+        own = self.system.outputs if self.responder is None else self.responder.outputs(self)
+        wanted = own if outputs is None else tuple(outputs)
         samples, parts = self.samples(values, wanted)
         return Response(self.times, dict(zip(wanted, samples.T, strict=True)), parts)
 
@@ -326,20 +288,15 @@ class Simulator:
 
     def run(self, values: Values) -> Run:
         """Return all outputs and inputs of the system on the grid, without the recorder's delay."""
-        code = kernel(self.system, self.system.outputs, 1)
-        p, parts = self._vectors([values]).T.copy(), self.substeps(values)
+        system, parts = self.system, self.substeps(values)
+        code, p = kernel(system, system.outputs, 1), self.prepared([values])[0].T.copy()
         spans = [Span(segment.u, segment.step, parts) for segment in self._segments]
-        run = code.run(p, code.start(p), spans)
+        outputs = joined(code.run(p, code.start(p), spans))[:, :, 0]
+        inputs = joined([segment.u for segment in self._segments])
         return Run(
             np.concatenate([segment.times for segment in self._grid]),
-            dict(zip(self.system.outputs, joined(run)[:, :, 0].T, strict=True)),
-            dict(
-                zip(
-                    self.system.inputs,
-                    np.concatenate([segment.u for segment in self._segments]).T,
-                    strict=True,
-                )
-            ),
+            dict(zip(system.outputs, outputs.T, strict=True)),
+            dict(zip(system.inputs, inputs.T, strict=True)),
         )
 
     def samples_of_many(
@@ -354,7 +311,9 @@ class Simulator:
         are not all the same. A set without a start at rest has outputs that are no numbers, and
         NO_SUBSTEPS sub-steps; the others are what they are alone.
         """
-        return self.responder.samples_of_many(self, sets, outputs, tests)
+        if self.responder is not None:
+            return self.responder.samples_of_many(self, sets, outputs, tests)
+        return self.samples_by_equations(sets, outputs, tests)
 
     def samples_by_equations(
         self,
@@ -363,8 +322,7 @@ class Simulator:
         tests: "Sequence[Simulator] | None" = None,
     ) -> tuple[Array, Counts]:
         """Simulate as `samples_of_many`, by the equations of the system."""
-        p = self._vectors(sets)
-        parts = self._substeps_of_many(p)
+        p, parts = self.prepared(sets)
         courses = [test.course() for test in tests or [self]]
         alike = tests is None or all(test._segments is tests[0]._segments for test in tests)
         samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
@@ -399,7 +357,9 @@ class Simulator:
 
         Each set has its own N directions; all else is as in ``samples_of_many``.
         """
-        return self.responder.tangents_of_many(self, sets, outputs, directions, tests)
+        if self.responder is not None:
+            return self.responder.tangents_of_many(self, sets, outputs, directions, tests)
+        return self.tangents_by_equations(sets, outputs, directions, tests)
 
     def tangents_by_equations(
         self,
@@ -409,34 +369,14 @@ class Simulator:
         tests: "Sequence[Simulator] | None" = None,
     ) -> tuple[Array, Array, Counts]:
         """Simulate as `tangents_of_many`, by the equations of the system."""
-        p = self._vectors(sets)
-        parts = self._substeps_of_many(p)
-        reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
-        if not reached:
-            samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-            return samples, np.full((*samples.shape, len(directions[0])), np.nan), parts
-        own = [directions[k] for k in reached]
-        moves = moves_of(self.system, self.inputs, own)
-        simulators = [self] if tests is None else [tests[k] for k in reached]
-        courses = [test.course(moves, changing=bool(moves.delayed)) for test in simulators]
-        code = self._tangent_code(outputs, moves)
-        tangents, rates = moves.tangents(self.system, own), moves.rates(own)
-        if len(own) < len(sets):
-            p = p[reached]
-        together = Courses(courses, parts[reached])
-        samples, slopes, change = _in_blocks(code, p, together, tangents, rates)
-        if len(moves.columns) < len(own[0]):
-            driven, slopes = slopes, np.zeros((*samples.shape, len(own[0])))
-            slopes[..., list(moves.columns)] = driven
-        for k in moves.delayed if change is not None else ():
-            delays = np.array([of_set[k].delay for of_set in own])
-            slopes[..., k] -= delays[:, None, None] * change
-        return among_all(samples, parts), among_all(slopes, parts), parts
+        from exfit.simulation.directions import tangents_by_equations
 
-    def course(self, moves: Moves | None = None, changing: bool = False) -> Course:
+        return tangents_by_equations(self, sets, outputs, directions, tests)
+
+    def course(self, moves: "Moves | None" = None) -> Course:
         """Arrays for the machine code to run through, with the tangents of inputs that move.
 
-        A run that is ``changing`` is sampled with its time derivative.
+        Where a delay moves it is sampled with its time derivative.
         """
         segments = self._segments
         if moves is not None and moves.shapes:
@@ -444,13 +384,8 @@ class Simulator:
                 segment._replace(shapes=self._share * moves.shapes_on(part, self.inputs))
                 for segment, part in zip(segments, self._grid, strict=True)
             ]
-        reading = self._sampling.reading(changing)
+        reading = self._sampling.reading(changing=moves is not None and bool(moves.delayed))
         return Course(segments, reading.enlarged(1.0 / self._share))
-
-    def _tangent_code(self, outputs: tuple[str, ...], moves: Moves) -> TangentKernel:
-        """Return the machine code whose derivatives cover what moves."""
-        width = DIRECTIONS if len(moves.columns) <= DIRECTIONS else 2 * DIRECTIONS
-        return tangent_kernel(self.system, outputs, moves.free, moves.moving, width)
 
     def _segments_of(self, changed: Container[str] | None = None) -> list[Segment]:
         """Return the inputs at the grid points of each segment, (n + 1, nu).
@@ -468,32 +403,6 @@ class Simulator:
                     u[:, column] = self._segments[k].u[:, column]
             segments.append(Segment(u, part.step))
         return segments
-
-    def _vectors(self, sets: Sequence[Values]) -> Array:
-        """Return the parameters of sets as the machine code takes them, (K, np)."""
-        names = self.system.parameters
-        return np.array([[values[name] for name in names] for values in sets], dtype=np.float64)
-
-
-def _in_blocks(
-    code: TangentKernel, p: Array, courses: Courses, tangents: Array, rates: Array | None
-) -> tuple[Array, Array, Array | None]:
-    """Return samples with derivatives; of a single set each block of directions in a thread."""
-    from exfit.util.processes import in_threads
-
-    width = code.directions
-    firsts = range(0, tangents.shape[-1], width)
-    if len(p) > 1 or len(firsts) <= 1:
-        return code.samples(p, tangents, courses, rates)
-
-    def block(first: int) -> tuple[Array, Array, Array | None]:
-        own = slice(first, first + width)
-        growing = None if rates is None else rates[..., own]
-        return code.samples(p, tangents[..., own], courses, growing)
-
-    blocks = list(in_threads(block, firsts))
-    outputs, _, change = blocks[0]
-    return outputs, np.concatenate([slopes for _, slopes, _ in blocks], axis=-1), change
 
 
 def _fixed(change: InputStep) -> InputStep:

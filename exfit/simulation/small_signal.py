@@ -13,7 +13,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.system import System, Tangents, Trace, differentiate, trace
+from exfit.engine.system import System, Trace, trace
+from exfit.engine.tangents import Tangents, differentiate
 from exfit.engine.trace import Node, evaluate
 from exfit.errors import SimulationError
 from exfit.plants import MEASURED

@@ -2,18 +2,17 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import AtRest
-from exfit.engine.system import System
+from exfit.engine.kernel import AtRest, linear_kernel
+from exfit.engine.system import System, time_constants
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.plants import VT0
 from exfit.simulation.interpolation import ON_GRID
-from exfit.simulation.kernels import linear_kernel, places_of_time_constants, time_constants
-from exfit.simulation.limits import acting_at_rest, limits_passed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -43,14 +42,16 @@ def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]
     with np.errstate(all="ignore"):
         parts = _parts(step, lag_rate)
         enough = step * _radius_bounds(rest.jacobian) - ON_GRID <= parts
-        sure = enough & _surely_still(rest)
-    if sure.all():
-        return parts
-    unsure = AtRest(*(part[~sure] for part in rest))
-    radius = spectral_radii(unsure.jacobian)
-    moves = np.any(_moving(unsure, radius), axis=1)
-    required = _parts(step, np.maximum(lag_rate[~sure], radius))
-    parts[~sure] = np.where(moves, NO_SUBSTEPS, required)
+        # at rest whatever the spectral radius, where that is finite; a sum is finite where all
+        # numbers are, or at most too large: then eigenvalues decide
+        finite = np.isfinite(rest.x.sum(axis=1))
+        sure = enough & finite & (np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE)
+    if not sure.all():
+        unsure = AtRest(*(part[~sure] for part in rest))
+        radius = spectral_radii(unsure.jacobian)
+        moves = np.any(_moving(unsure, radius), axis=1)
+        required = _parts(step, np.maximum(lag_rate[~sure], radius))
+        parts[~sure] = np.where(moves, NO_SUBSTEPS, required)
     return parts
 
 
@@ -73,18 +74,10 @@ def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
         yield 1, alone
 
 
-def among_all(results: Array, parts: Counts) -> Array:
-    """Return the results of the sets that have sub-steps among all, no numbers for the others."""
-    reached = parts != NO_SUBSTEPS
-    if len(results) == len(parts):
-        return results
-    every = np.full((len(parts), *results.shape[1:]), np.nan)
-    every[reached] = results
-    return every
-
-
 def why_unreachable(system: System, step: float, values: Values, p: Array) -> SimulationError:
     """Error to raise for values, as a vector p (np,), that have no sub-steps."""
+    from exfit.simulation.limits import acting_at_rest, limits_passed
+
     rest = linear_kernel(system).at_rest(p[None])
     radius = spectral_radii(rest.jacobian)
     moving = _moving(rest, radius)[0]
@@ -141,9 +134,14 @@ def spectral_radii(jacobians: Array) -> Array:
     return radii
 
 
+@cache
+def _places_of_lags(system: System) -> NDArray[np.intp]:
+    return np.array([system.parameters.index(name) for name in time_constants(system)], np.intp)
+
+
 def _lag_rates(system: System, p: Array) -> Array:
     """Return 1/T of the shortest time constant of each set that is not bypassed."""
-    lags = p.take(places_of_time_constants(system), axis=1)
+    lags = p.take(_places_of_lags(system), axis=1)
     shortest = np.where(lags >= SHORTEST, lags, np.inf).min(axis=1, initial=np.inf)
     return np.asarray(1.0 / shortest)
 
@@ -159,13 +157,6 @@ def _needed(step: float, rates: Array | float) -> Array:
     """Return ceil(step * rate), at least one, inf where that is no number any more."""
     with np.errstate(over="ignore"):
         return np.asarray(np.maximum(np.ceil(np.multiply(step, rates) - ON_GRID), 1.0))
-
-
-def _surely_still(rest: AtRest) -> Mask:
-    """Mask of systems at rest whatever their spectral radius, where that is finite."""
-    # a sum is finite where all numbers are, or at most too large: then eigenvalues decide
-    finite = np.isfinite(rest.x.sum(axis=1))
-    return np.asarray(finite & (np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE))
 
 
 def _moving(rest: AtRest, radius: Array) -> Mask:

@@ -9,7 +9,7 @@ from exfit.fitting.experiment import Experiment
 from exfit.fitting.setup import ExperimentSetup
 from exfit.results.description import Behaviour, FlatRun, HitLimits, SmallSignalView
 from exfit.simulation.inputs import Inputs
-from exfit.simulation.limit_hits import limits_hit
+from exfit.simulation.limits import limits_hit
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import small_signal
 

@@ -25,7 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from estimators import ByHand
 from oracle import system_of, tangent_run, typical_values, vector
 
-from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
+from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span
+from exfit.engine.tangents import TangentKernel
 from exfit.simulation.inputs import Direction, Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 

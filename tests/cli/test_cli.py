@@ -25,13 +25,14 @@ from tiers import few_of
 
 from exfit import workflows
 from exfit.engine import kernel as engine
+from exfit.engine.kernel import kernel, linear_kernel
+from exfit.engine.tangents import tangent_kernel
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.results.model import Iteration
 from exfit.show import figures as plots
 from exfit.show import terminal
 from exfit.show.figure_files import FigureFiles
-from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel
 from exfit.util import files
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))

@@ -1,7 +1,7 @@
 """The order of computing: in a branch what it alone needs, and one branch for equal conditions."""
 
-from exfit.engine.choices import Choice, plan
 from exfit.engine.trace import Graph, exp, log, sqrt, where
+from exfit.engine.writer import Choice, plan
 
 
 def steps(targets, known):
@@ -15,7 +15,7 @@ def steps(targets, known):
             for step in plan
         ]
 
-    return numbers(plan(targets, known, lambda node: node.op == "select"))
+    return numbers(plan(targets, known))
 
 
 def symbols(names="xy"):

@@ -15,8 +15,9 @@ from oracle import drawn_values, float_run, levels, system_of, tangent_run, vect
 from exfit.engine import emit
 from exfit.engine import kernel as engine
 from exfit.engine.emit import simulation_with_tangents
-from exfit.engine.kernel import Kernel, LinearKernel, Span, TangentKernel
-from exfit.engine.system import Motion, Rest, System, differentiate, trace
+from exfit.engine.kernel import Kernel, LinearKernel, Span
+from exfit.engine.system import Motion, Rest, System, trace
+from exfit.engine.tangents import TangentKernel, differentiate
 from exfit.engine.trace import clip, cos, exp, larger, log, sin, smaller, sqrt, where
 from exfit.plants import VT0
 

@@ -8,8 +8,9 @@ import transfer_functions
 from oracle import fastest_rate, float_run, leads_of, tangent_run, vector
 from scipy.integrate import solve_ivp
 
-from exfit.engine.kernel import Kernel, Span, TangentKernel
+from exfit.engine.kernel import Kernel, Span
 from exfit.engine.system import Rest, System
+from exfit.engine.tangents import TangentKernel
 from exfit.models import GOVERNORS
 from exfit.models.blocks import SHORTEST, Limited
 from exfit.models.sheet import crossed_limits, typical

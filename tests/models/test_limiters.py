@@ -33,8 +33,8 @@ from exfit.plants import (
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.parts import motion, values_named
 from exfit.simulation.inputs import Inputs, InputStep, each
-from exfit.simulation.limit_hits import limiter_actions, limits_hit
-from exfit.simulation.limits import acting_at_rest, equation_limits, limiter_outputs
+from exfit.simulation.limit_hits import limiter_actions
+from exfit.simulation.limits import acting_at_rest, equation_limits, limiter_outputs, limits_hit
 from exfit.simulation.simulator import Simulator
 
 SIGNALS = ("ifd", "vt", "p", "q")

@@ -26,7 +26,7 @@ from tiers import few_of
 
 from exfit import models
 from exfit.engine.kernel import Kernel, LinearKernel, Span
-from exfit.engine.system import trace
+from exfit.engine.system import parameters_used, trace
 from exfit.engine.trace import in_order
 from exfit.errors import ModelError, SimulationError
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, find, from_file
@@ -37,7 +37,6 @@ from exfit.models.sheet import model as build
 from exfit.plants import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
 from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}

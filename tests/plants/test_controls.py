@@ -6,6 +6,7 @@ from on_load import QUADRATIC, system, values_on_load
 from oracle import vector
 
 from exfit.engine.kernel import LinearKernel
+from exfit.engine.system import parameters_used
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
@@ -13,7 +14,6 @@ from exfit.plants import BREAKER, GOVERNOR, NETWORK
 from exfit.plants.controls import rests_at
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.simulation.inputs import Inputs, InputStep, each
-from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator
 
 POWER = 0.7  # pu

@@ -14,6 +14,7 @@ from scipy.optimize import fsolve
 from typed_on_load import Typed
 
 from exfit.engine.kernel import LinearKernel
+from exfit.engine.system import parameters_used
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
@@ -22,7 +23,6 @@ from exfit.plants.controls import HEARD
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, each
-from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator
 
 CLOCK = np.linspace(0.0, 4.0, 401)

@@ -13,8 +13,7 @@ from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import free_parameters
 from exfit.models import MODELS
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.simulation.limit_hits import limits_hit, nearest
-from exfit.simulation.limits import equation_limits
+from exfit.simulation.limits import equation_limits, limits_hit
 from exfit.simulation.simulator import Simulator
 
 STEP = 1e-3  # s
@@ -220,36 +219,3 @@ def test_long_runs_are_followed_to_their_end():
     (coarse,) = limits_hit(simulator("SEXS", 0.4), values)
     (fine,) = limits_hit(simulator("SEXS", 0.4, step=1e-4), values)
     assert fine.seconds == pytest.approx(coarse.seconds, abs=2.0 * STEP)
-
-
-def test_the_nearest_limit_is_that_whose_distance_is_smallest():
-    values = typical_values("SEXS")
-    efd = simulator("SEXS", BUMP).response(values).signals["efd"]
-    listed = nearest(simulator("SEXS", BUMP), values)
-    percents = [one.percent for one in listed]
-    assert len(percents) > 1
-    assert percents == sorted(percents)
-    found = by_name(listed)
-    width = values["EMAX"] - values["EMIN"]
-    assert found["EMAX", "EFD"].percent == pytest.approx(
-        100.0 * (values["EMAX"] - efd.max()) / width, rel=1e-3
-    )
-    assert found["EMIN", "EFD"].percent == pytest.approx(
-        100.0 * (efd.min() - values["EMIN"]) / width, rel=1e-3
-    )
-    assert CLOCK[np.argmax(efd)] == pytest.approx(found["EMAX", "EFD"].at, abs=0.01)
-
-
-def test_a_delayed_recorder_is_near_a_limit_later():
-    values = typical_values("SEXS")
-    ours, late = (
-        by_name(nearest(simulator("SEXS", BUMP, delay=delay), values))["EMAX", "EFD"]
-        for delay in (0.0, 0.25)
-    )
-    assert late.at == pytest.approx(ours.at + 0.25)
-    assert late.percent == ours.percent
-
-
-def test_a_limit_that_is_met_is_not_near():
-    values = typical_values("SEXS")
-    assert ("EMAX", "EFD") not in by_name(nearest(simulator("SEXS", 0.4), values))

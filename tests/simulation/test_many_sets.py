@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from oracle import drawn_values, lively_values, system_of
 
+from exfit.engine.kernel import linear_kernel
+from exfit.engine.system import parameters_used, time_constants
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.simulation.inputs import Direction, Inputs, InputStep, each
-from exfit.simulation.kernels import linear_kernel, parameters_used, time_constants
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.substeps import NO_SUBSTEPS, spectral_radii, substeps_at_rest, too_fast
 

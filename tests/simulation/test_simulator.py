@@ -15,7 +15,7 @@ from oracle import (
 )
 from scipy.integrate import solve_ivp
 
-from exfit.engine.system import Motion, Rest, System, trace
+from exfit.engine.system import Motion, Rest, System, parameters_used, trace
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
@@ -31,7 +31,6 @@ from exfit.simulation.inputs import (
     grid_segments,
 )
 from exfit.simulation.interpolation import GridSegment, Interpolation
-from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.substeps import MOST_SUBSTEPS
 

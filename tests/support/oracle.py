@@ -6,9 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from exfit.engine.kernel import LinearKernel, Span, TangentKernel
+from exfit.engine.kernel import LinearKernel, Span
 from exfit.engine.sampling import Course, Courses, SampleRows, Segment
-from exfit.engine.system import System
+from exfit.engine.system import System, parameters_used
+from exfit.engine.tangents import TangentKernel
 from exfit.engine.trace import clip
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
@@ -17,7 +18,6 @@ from exfit.models.sheet import Parameter, typical
 from exfit.plants import MACHINE, SATURATION, VT0
 from exfit.plants.alone import alone
 from exfit.plants.open_circuit import open_circuit
-from exfit.simulation.kernels import parameters_used
 
 WITHOUT_PLANT = ("FIRST_ORDER",)
 EXCITERS = tuple(name for name in MODELS if name not in WITHOUT_PLANT)

@@ -32,7 +32,7 @@ from exfit.fitting.program import Differences, Setups
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import jacobian_error
 from exfit.fitting.setup import ExperimentSetup
-from exfit.simulation.simulator import EQUATIONS, Simulator
+from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -245,7 +245,7 @@ def _settled(setup: ExperimentSetup, values: Values, moving: Residuals | None) -
         linear = LinearResponder(responder, simulator, parameters, directions)
         return _with_simulator(setup, simulator.with_responder(linear))
     assert isinstance(responder, RunResponder)
-    twin, _ = simulator.with_responder(EQUATIONS).samples(parameters, signals)
+    twin, _ = simulator.with_responder(None).samples(parameters, signals)
     differences = dict(zip(signals, (outside - twin).T, strict=True))
     corrected = CorrectedResponder(responder.given, differences)
     return _with_simulator(setup, setup.experiment.simulator.with_responder(corrected))

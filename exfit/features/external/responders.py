@@ -93,7 +93,6 @@ class RunResponder:
     """Responds by a run of the program each time; exact derivatives are those of the twin."""
 
     given: ProgramSignals
-    alone = False
 
     def outputs(self, simulator: Simulator) -> tuple[str, ...]:
         """Name the outputs of the twin."""
@@ -118,7 +117,7 @@ class RunResponder:
         """
         if set(outputs) <= set(self.given.signals):
             samples = np.full((len(sets), len(simulator.times), len(outputs)), np.nan)
-            parts = simulator.substeps_of_many(sets)
+            _, parts = simulator.prepared(sets)
         else:
             samples, parts = simulator.samples_by_equations(sets, outputs, tests)
         return self._with_runs(samples, parts, tests or [simulator] * len(sets), sets, outputs)
@@ -218,8 +217,6 @@ class LinearResponder:
     the program remembers a run, that run is the response.
     """
 
-    alone = False
-
     def __init__(
         self,
         runs: QuotientResponder,
@@ -308,7 +305,6 @@ class CorrectedResponder:
 
     given: ProgramSignals
     differences: Mapping[str, Array]
-    alone = False
 
     def outputs(self, simulator: Simulator) -> tuple[str, ...]:
         """Name the outputs of the twin."""

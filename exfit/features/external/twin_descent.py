@@ -22,7 +22,6 @@ from exfit.features.external.responders import QUOTIENT_STEP
 from exfit.fitting.descents import Announce, following
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals
-from exfit.simulation.simulator import EQUATIONS
 
 Array = NDArray[np.float64]
 
@@ -142,7 +141,7 @@ def _rms(errors: Array) -> float:
 def twin_of(residuals: Residuals) -> Residuals:
     """Return the residuals of the twin alone."""
     experiments = [
-        replace(experiment, simulator=experiment.simulator.with_responder(EQUATIONS))
+        replace(experiment, simulator=experiment.simulator.with_responder(None))
         for experiment in residuals.experiments
     ]
     return replace(residuals, experiments=experiments, counter=None)

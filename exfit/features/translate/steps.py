@@ -25,8 +25,7 @@ from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.plants.plant import Equipment, PlantKind
 from exfit.results.model import FitResult
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.simulation.limit_hits import limits_hit
-from exfit.simulation.limits import at_rest, equation_limits, traced
+from exfit.simulation.limits import at_rest, equation_limits, limits_hit, traced
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]

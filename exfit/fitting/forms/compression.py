@@ -94,7 +94,7 @@ def _compressed_experiment(whole: Experiment) -> Experiment:
     simulator = whole.simulator.on_grid()
     changing = any(nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances)
     plain = all(channel.plain for channel in whole.channels)
-    added = whole.sines or whole.whitening or not whole.simulator.responder.alone
+    added = whole.sines or whole.whitening or whole.simulator.responder is not None
     possible = plain and not (changing or added)
     errors_on_grid = NEIGHBOURS * len(simulator.times) * len(whole.channels)
     if not possible or LEAST_GAIN * errors_on_grid >= sum(whole.sizes):

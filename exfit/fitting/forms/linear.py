@@ -10,7 +10,7 @@ from dataclasses import replace
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.residuals import Residuals
 from exfit.plants import BREAKER, REFERENCES
-from exfit.simulation.limit_hits import limits_at_rest
+from exfit.simulation.limits import limits_at_rest
 
 Values = Mapping[str, float]
 

@@ -14,7 +14,7 @@ from exfit.inference.wording import listed
 from exfit.plants import MACHINE
 from exfit.results.influences import DEVIATION, first_of, moved_parameters
 from exfit.results.verdict import Cause
-from exfit.simulation.limit_hits import Extreme, extremes
+from exfit.simulation.limits import Extreme, extremes
 from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, likelihood
 from exfit.verdict.causes.lines import freeing
 from exfit.verdict.causes.trials import (
