@@ -1,6 +1,6 @@
 """Models on a page: their block diagrams, and a step of the exciters' typical data."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
 
@@ -71,37 +71,26 @@ def sample_response(model: Model) -> Response:
 
 def write_overview(folder: Path, models: Iterable[Model | Machine]) -> list[Path]:
     """Write the diagram of every model, a figure of every exciter, and a page that shows them."""
+    from exfit.show import figures as plots
+
     written, sections = [], []
     for model in models:
+        sections.append(f"<h2>{escape(model.name)}: {escape(model.title)}</h2>")
+        files: dict[str, str | bytes] = {}
         diagram = block_diagram(model.drawing, model.name, model.title)
-        files = dict(_files(model, diagram))
+        if diagram:
+            files[f"{model.name}.svg"] = document(diagram)
+            sections.append(f'<div class="wide" tabindex="0">{diagram}</div>')
+        _, remarks = diagram_and_remarks(model.drawing)
+        sections += [f"<p>{escape(remark)}</p>" for remark in remarks]
+        if isinstance(model, Model) and not model.inputs and model.name not in GOVERNORS:
+            figure = plots.overview(f"{model.name}: {model.title}", sample_response(model))
+            files[f"{model.name}.png"] = plots.png(figure)
+            picture = f'<img src="{model.name}.png" alt="Response of {model.name}">'
+            sections.append(f"<p>{picture}</p>")
         for name, content in files.items():
-            written.append(folder / name)
             write(folder / name, content)
-        sections.append(_section(model, diagram, f"{model.name}.png" in files))
+            written.append(folder / name)
     page = PAGE.format(about=escape(ABOUT), models="\n".join(sections))
     write(folder / "index.html", page)
     return [*written, folder / "index.html"]
-
-
-def _files(model: Model | Machine, diagram: str) -> Iterator[tuple[str, str | bytes]]:
-    """Yield the files of a model: its diagram, and what an exciter does."""
-    from exfit.show import figures as plots
-
-    if diagram:
-        yield f"{model.name}.svg", document(diagram)
-    if isinstance(model, Model) and not model.inputs and model.name not in GOVERNORS:
-        figure = plots.overview(f"{model.name}: {model.title}", sample_response(model))
-        yield f"{model.name}.png", plots.png(figure)
-
-
-def _section(model: Model | Machine, diagram: str, has_figure: bool) -> str:
-    """Write the section of a model as HTML."""
-    _, remarks = diagram_and_remarks(model.drawing)
-    lines = [f"<h2>{escape(model.name)}: {escape(model.title)}</h2>"]
-    if diagram:
-        lines.append(f'<div class="wide" tabindex="0">{diagram}</div>')
-    lines += [f"<p>{escape(remark)}</p>" for remark in remarks]
-    if has_figure:
-        lines.append(f'<p><img src="{model.name}.png" alt="Response of {model.name}"></p>')
-    return "\n".join(lines)

@@ -37,6 +37,14 @@ class Styled:
     text: str
     style: Style
 
+    @property
+    def width(self) -> float:
+        """Its width in px, in a wide font of the kind."""
+        size = SIZE if self.style in ("plain", "italic") else SMALL
+        return size * sum(
+            WIDTHS.get(letter, CAPITAL if letter.isupper() else OTHER) for letter in self.text
+        )
+
 
 @dataclass(frozen=True)
 class Typeset:
@@ -46,8 +54,8 @@ class Typeset:
 
     @property
     def width(self) -> float:
-        """Its width in px, in a wide font of the kind."""
-        return sum(map(_width, self.runs))
+        """Its width in px."""
+        return sum(run.width for run in self.runs)
 
     @property
     def letters(self) -> str:
@@ -90,20 +98,16 @@ def formula(rows: tuple[str, ...]) -> tuple[Piece, ...]:
 
 
 def _pieces(letters: str) -> Iterator[Piece]:
-    """Yield the texts and fractions of a row."""
+    """Yield the texts and fractions of a row; a bar takes the place of brackets."""
     end = 0
     for match in FRACTION.finditer(letters):
         if match.start() > end:
             yield text(letters[end : match.start()])
-        yield Stack(text(_bare(match[1])), text(_bare(match[2])), bar=True)
+        upper, lower = (part.removeprefix("(").removesuffix(")").strip() for part in match.groups())
+        yield Stack(text(upper), text(lower), bar=True)
         end = match.end()
     if end < len(letters):
         yield text(letters[end:])
-
-
-def _bare(letters: str) -> str:
-    """Return letters without the brackets around them: a bar takes their place."""
-    return letters[1:-1].strip() if letters.startswith("(") else letters
 
 
 def _runs(letters: str) -> Iterator[Styled]:
@@ -111,30 +115,19 @@ def _runs(letters: str) -> Iterator[Styled]:
     for token in TOKEN.findall(letters):
         if token.startswith("^") or token == "²":
             yield Styled(token.strip("^").replace("²", "2"), "sup")
-        elif token in WORDS or not SYMBOL.fullmatch(token):
+            continue
+        if token in WORDS or not SYMBOL.fullmatch(token):
             yield Styled(SIGNS.get(token, token), "plain")
-        else:
-            head, primes, tail = _symbol(token)
-            yield Styled(head, "italic")
-            yield from [Styled("′" * primes, "plain")] if primes else []
-            yield from [Styled(tail, "sub")] if tail else []
-
-
-def _symbol(token: str) -> tuple[str, int, str]:
-    """Return a symbol's letter, its number of primes, its subscript."""
-    if token in FLUXES:
-        return FLUXES[token]
-    primed = PRIMED.fullmatch(token)
-    if primed:
-        return primed[1], len(primed[2]), primed[3]
-    return token[0], 0, token[1:]
-
-
-def _width(run: Styled) -> float:
-    size = SIZE if run.style in ("plain", "italic") else SMALL
-    return size * sum(
-        WIDTHS.get(letter, CAPITAL if letter.isupper() else OTHER) for letter in run.text
-    )
+            continue
+        primed = PRIMED.fullmatch(token)
+        head, primes, tail = FLUXES.get(token, (token[0], 0, token[1:]))
+        if primed:
+            head, primes, tail = primed[1], len(primed[2]), primed[3]
+        yield Styled(head, "italic")
+        if primes:
+            yield Styled("′" * primes, "plain")
+        if tail:
+            yield Styled(tail, "sub")
 
 
 def width(pieces: Iterable[Piece]) -> float:

@@ -11,9 +11,8 @@ import pytest
 
 from exfit.features.drawings.diagram import block_diagram, document
 from exfit.features.drawings.formulas import SIZE
-from exfit.features.drawings.layout import picture
+from exfit.features.drawings.layout import CLIP, picture
 from exfit.features.drawings.letters import SIDES, diagram_and_remarks, read
-from exfit.features.drawings.parts import CLIP
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 
