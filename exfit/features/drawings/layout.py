@@ -127,7 +127,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Grid:
+class DiagramGrid:
     """Where the columns and rows of a diagram lie: their edges, upright lines, the middles."""
 
     letters: Letters
@@ -177,7 +177,7 @@ def picture(letters: Letters) -> Picture:
     uprights = {
         line: _upright(line, parts, middles, edges) for line in letters.lines if line.upright
     }
-    raw = Grid(letters, parts, edges, uprights, middles)
+    raw = DiagramGrid(letters, parts, edges, uprights, middles)
     grid = replace(raw, middles={e: _moved(part, raw) for e, part in parts.items()})
     rows = _rows(grid)
     heights = {e: _height(part, parts, rows) for e, part in parts.items()}
@@ -309,7 +309,7 @@ def _is_within(line: Wire, element: Element) -> bool:
     return abs(2 * line.along + 1 - element.left - element.right) <= OFF_MIDDLE
 
 
-def _moved(part: DiagramPart, raw: Grid) -> float:
+def _moved(part: DiagramPart, raw: DiagramGrid) -> float:
     """Place a part: a text keeps to its box or its line, one without against an upright line."""
     element, x = part.element, raw.middles[part.element]
     if part.owner is not None:
@@ -347,7 +347,7 @@ class Obstacle:
         return self.left < other.right + GAP and other.left < self.right + GAP
 
 
-def _rows(grid: Grid) -> list[float]:
+def _rows(grid: DiagramGrid) -> list[float]:
     """Return the middle of each row."""
     needed = list(_distances(grid))
     middles = [0.0]
@@ -366,7 +366,7 @@ def _height(part: DiagramPart, parts: Parts, rows: Sequence[float]) -> float:
     return rows[block.row] + (away if part.element.top > part.owner.top else -away)
 
 
-def _distances(grid: Grid) -> Iterator[tuple[int, int, float]]:
+def _distances(grid: DiagramGrid) -> Iterator[tuple[int, int, float]]:
     """Yield the least distances of rows: the upper, the lower, the distance."""
     obstacles = sorted(_obstacles(grid), key=lambda obstacle: obstacle.row)
     for k, upper in enumerate(obstacles):
@@ -384,7 +384,7 @@ def _distances(grid: Grid) -> Iterator[tuple[int, int, float]]:
             yield first, last, down + up + LEG
 
 
-def _obstacles(grid: Grid) -> Iterator[Obstacle]:
+def _obstacles(grid: DiagramGrid) -> Iterator[Obstacle]:
     for element, part in grid.parts.items():
         row, up, down = _reach(part, grid.parts)
         left, right = (grid.middles[element] + side * part.half_width for side in (-1, 1))
@@ -412,7 +412,7 @@ def _reach(part: DiagramPart, parts: Parts) -> tuple[int, float, float]:
     return part.row, part.half_height, part.half_height
 
 
-def _stroke(line: Wire, grid: Grid) -> Stroke:
+def _stroke(line: Wire, grid: DiagramGrid) -> Stroke:
     if line.upright:
         x = grid.uprights[line]
         first, last = ((x, grid.down(line, end)) for end in line.ends)
@@ -422,14 +422,14 @@ def _stroke(line: Wire, grid: Grid) -> Stroke:
     return Stroke(first, last, (line.ends[0].arrow, line.ends[1].arrow))
 
 
-def _dots(grid: Grid) -> Iterator[Point]:
+def _dots(grid: DiagramGrid) -> Iterator[Point]:
     for row, column in grid.letters.dots:
         x = grid.upright_at(column, row)
         if x is not None:
             yield x, grid.rows[row]
 
 
-def _signs(grid: Grid) -> Iterator[Word]:
+def _signs(grid: DiagramGrid) -> Iterator[Word]:
     """Yield the sign of each arrow into a sum, beside its tip, on the outer side of two arrows."""
     for element, part in grid.parts.items():
         for line, end in part.lines if element.kind == "sum" else ():
