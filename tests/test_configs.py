@@ -7,7 +7,7 @@ import pytest
 from places import CONFIGS
 
 from exfit.case.load import load_case
-from exfit.fitting.recordings import measured
+from exfit.fitting.recordings import record_of
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.workflows import fit, simulate
@@ -38,7 +38,7 @@ def test_a_case_reads_and_its_records_are_there(path):
     case = load_case(path)
     assert case.recordings
     for one in (*case.recordings, *case.validations):
-        assert measured(case, one.test, one.record).time.size > 100
+        assert record_of(case, one).time.size > 100
 
 
 @pytest.mark.parametrize(

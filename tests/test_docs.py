@@ -25,7 +25,7 @@ from exfit.case.load import load_case
 from exfit.cli import main
 from exfit.cli.options import NOT_CONVERGED
 from exfit.errors import CaseError
-from exfit.fitting.recordings import measured, phasors_of
+from exfit.fitting.recordings import phasors_of, record_of
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.show import run_folder
@@ -209,9 +209,9 @@ def test_the_case_of_the_page_is_valid_and_its_records_can_be_read(cases):
     path = cases / "case.yaml"
     path.write_text(block("case_file.md", "yaml"), encoding="utf-8")
     case = load_case(path)
-    assert measured(case, case.test, case.record).time.size > 1
+    assert record_of(case, case.recordings[0]).time.size > 1
     for recording in case.validations:
-        assert measured(case, recording.test, recording.record).time.size > 1
+        assert record_of(case, recording).time.size > 1
 
 
 def test_the_faults_of_a_case_are_reported_as_the_page_says(tmp_path, monkeypatch):
@@ -226,7 +226,7 @@ def test_the_record_of_the_page_is_read_in_the_recorders_units(cases):
     head = block("case_file.md", "yaml").partition("record:")[0]
     (cases / "case.yaml").write_text(head + block("records.md", "yaml"), encoding="utf-8")
     case = load_case(cases / "case.yaml")
-    record = measured(case, case.test, case.record)
+    record = record_of(case, case.recordings[0])
     assert record.signals["vt"][0] == pytest.approx(1.0, abs=0.01)
     assert record.signals["ifd"][0] == pytest.approx(1.12, abs=0.01)
 

@@ -23,10 +23,17 @@ from typing import TYPE_CHECKING
 from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
-    from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
-    from exfit.estimate.problem import Functions, OneByOne, half_square
-    from exfit.estimate.profile_side import ProfileEnd
-    from exfit.estimate.profiling import CostProfile, LowerMinimum, profile, profiles
+    from exfit.estimate.problem import (
+        STATUS,
+        Functions,
+        OneByOne,
+        Progress,
+        Result,
+        SolverIteration,
+        Stop,
+        half_square,
+    )
+    from exfit.estimate.profiling import CostProfile, LowerMinimum, ProfileEnd, profile, profiles
     from exfit.estimate.searches import (
         ArmijoDamping,
         LineSearch,
@@ -78,14 +85,14 @@ _MODULES = {
     "LocalMinimum": "exfit.estimate.starts",
     "MultistartResult": "exfit.estimate.starts",
     "OneByOne": "exfit.estimate.problem",
-    "ProfileEnd": "exfit.estimate.profile_side",
-    "Progress": "exfit.estimate.answer",
+    "ProfileEnd": "exfit.estimate.profiling",
+    "Progress": "exfit.estimate.problem",
     "RatioDamping": "exfit.estimate.searches",
-    "Result": "exfit.estimate.answer",
-    "STATUS": "exfit.estimate.answer",
+    "Result": "exfit.estimate.problem",
+    "STATUS": "exfit.estimate.problem",
     "Searches": "exfit.estimate.searches",
-    "SolverIteration": "exfit.estimate.answer",
-    "Stop": "exfit.estimate.answer",
+    "SolverIteration": "exfit.estimate.problem",
+    "Stop": "exfit.estimate.problem",
     "TrustRegion": "exfit.estimate.searches",
     "half_square": "exfit.estimate.problem",
     "least_squares": "exfit.estimate.solver",

@@ -1,31 +1,403 @@
-"""Profile likelihood: how far a parameter can move if all others may follow.
+"""One side of a profile: a parameter moves away from a minimum, and all others follow it.
 
-Source: Venzon & Moolgavkar 1988; Bates & Watts 1988, chapter 6; Raue et al. 2009.
+From point to point the others are predicted along the tangent of the profile and its bend, then
+refitted as far as the cost needs. A point has the slope of the profile as well as its cost, so that
+few are enough to find where the cost has risen as far as asked.
+
+Source: Bates & Watts 1988, sections 6.1 (profile t, profile traces) and A3.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import partial
-from math import inf
+from math import inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exfit.estimate.answer import Progress
-from exfit.estimate.linear import linearise
+from exfit.estimate.linear import LinearModel, bounded_minimum, linearise, solve
 from exfit.estimate.lockstep import finish, finish_all
 from exfit.estimate.problem import (
+    TINY,
+    UNSEEN,
     Array,
     Box,
     Function,
     Functions,
     OneByOne,
+    Point,
     Problem,
+    Progress,
     Steps,
     checked,
+    half_square,
 )
-from exfit.estimate.profile_side import NOTHING, ProfileEnd, Side, Spot, Valley
 from exfit.estimate.solver import Descent
+
+FINE = 2e-3  # of the rise: what a refit may leave, a thousandth of the way to the crossing
+MOST_CORRECTIONS = 15  # of a refit: it starts near its end
+NEXT_TO = 1e-3  # units: a variable no farther from its bound lies on it
+REACH = 1.0  # of a correction, in units of each variable
+FAR = 30.0  # rises that a correction promises: where it fails, take a shorter step instead
+ENOUGH = 0.1  # of what a correction promises: it is not too long
+DAMPINGS = tuple(10.0**-k for k in range(2, 9))  # of the largest squared singular value
+LENGTHS = (0.5, 0.2, 0.05)  # of a correction that is too long
+SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the linear model on the other side of a kink
+LAST = 1.05  # height that the last step aims at: beyond the crossing
+LEAPS = 2.5  # times the height that a step aims at: take a shorter one instead
+MOST_HALVINGS = 5  # of a step: what then remains is a jump
+MOST_GROWTH = 2.0  # of a step
+MOST_POINTS = 4  # times the points: a side that needs more is flat
+CLOSE = 0.005  # of the way from the minimum: how certain the crossing must be
+MOST_REFITS = 12  # to make it so
+CUBICS = 4  # of them, then halves: a jump lets no interpolation come near
+
+
+NOTHING = (inf, -inf)  # an interval that holds no value
+
+
+class ProfileEnd(Enum):
+    """Why one side of a profile ends."""
+
+    RISE = "the cost has risen as far as asked"
+    BOUND = "the parameter is at its bound"
+    FLAT = "the cost hardly rises"
+    FAILED = "no residuals beyond are finite"
+    KNOWN = "the interval about another minimum begins"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A point x (N,) of a profile, the others refitted.
+
+    place    the parameter's value
+    height   the root of the rise of the cost, in units of the rise asked
+    slope    of the height over the distance from the minimum; 0 where it has none, as at a kink
+    best     all parameters where the linear model here has its minimum (N,)
+    tangent  how fast all move with the parameter (N,)
+    """
+
+    x: Array
+    cost: float
+    place: float
+    height: float
+    slope: float
+    best: Array
+    tangent: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Valley:
+    """What all profiles about one minimum share; ``lowest`` is the cost that rises count from."""
+
+    functions: Functions
+    box: Box
+    scaled: bool
+    bottom: LinearModel
+    lowest: float
+    points: int
+
+
+@dataclass(eq=False)
+class Side:
+    """One side of a profile, as far as it has come; ``sign`` is -1 below the minimum.
+
+    ``stride`` is how far the last step aimed, ``failed`` where residuals were not finite. It ends
+    where it enters an interval that is ``known``, as from another minimum.
+    """
+
+    valley: Valley
+    index: int
+    sign: int
+    rise: float
+    known: tuple[float, float] = NOTHING
+    spots: list[Spot] = field(init=False)
+    curvature: float = field(init=False)
+    end: ProfileEnd = ProfileEnd.INTERRUPTED
+    crossing: float | None = None
+    stride: float = 0.0
+    failed: float = inf
+
+    def __post_init__(self) -> None:
+        """Begin at the minimum."""
+        linear = self.valley.bottom
+        x, cost = linear.point.x, linear.point.cost
+        tangent, effect = self.tangent(linear, x)
+        self.curvature = effect / sqrt(2.0 * self.rise)
+        height = self.height(cost)
+        slope = 0.0 if height > 0.0 else self.curvature
+        self.spots = [Spot(x, cost, float(x[self.index]), height, slope, x, tangent)]
+
+    def walk(self, limit: float) -> Steps["Side"]:
+        """Go to where the cost has risen as far as asked, or as far as there is a way.
+
+        An interruption ends it, and so does a point with a cost below the limit.
+        """
+        try:
+            end = None
+            while end is None and self.spots[-1].cost >= limit:
+                end = yield from self.go_on()
+            if end is ProfileEnd.RISE:
+                self.crossing = yield from self.crossed()
+            self.end = end or ProfileEnd.INTERRUPTED
+        except KeyboardInterrupt:
+            self.end = ProfileEnd.INTERRUPTED
+        return self
+
+    def go_on(self) -> Steps[ProfileEnd | None]:
+        """Add a point; return why there are no more to come, if so."""
+        last, points = self.spots[-1], self.valley.points
+        if last.place == self.bound:
+            return ProfileEnd.BOUND
+        low, high = self.known
+        if low <= last.place <= high and not low <= self.spots[0].place <= high:
+            return ProfileEnd.KNOWN
+        if abs(self.failed - last.place) <= CLOSE * abs(last.place - self.spots[0].place):
+            return ProfileEnd.FAILED
+        if len(self.spots) > MOST_POINTS * points:
+            return ProfileEnd.FLAT
+        self.stride = self.step()
+        step = min(self.stride, self.way_to_corner())
+        for tries in range(MOST_HALVINGS + 1):
+            patient = tries == MOST_HALVINGS
+            spot = yield from self.refit(self.predicted(step), patient)
+            if spot is not None and spot.height - last.height <= LEAPS / points:
+                break
+            self.stride = step = 0.5 * step
+        if spot is None:
+            return ProfileEnd.FAILED
+        self.spots.append(spot)
+        return ProfileEnd.RISE if spot.height >= 1.0 else None
+
+    @property
+    def bound(self) -> float:
+        """The bound that the parameter moves towards."""
+        box = self.valley.box
+        return float((box.high if self.sign > 0 else box.low)[self.index])
+
+    @property
+    def room(self) -> float:
+        """How far the bound is."""
+        return abs(self.bound - self.spots[-1].place)
+
+    def step(self) -> float:
+        """Length of the step to the next height, by the slope of the profile and its bend."""
+        last, share = self.spots[-1], 1.0 / self.valley.points
+        higher = last.height + share
+        gain = (LAST if higher > 1.0 - 0.5 * share else higher) - last.height
+        if len(self.spots) == 1:
+            return self.first_step(last.height + gain)
+        before = self.spots[-2]
+        risen = last.height - before.height
+        longest = MOST_GROWTH * max(1.0, gain / share) * self.stride
+        way = abs(last.place - before.place)
+        steepness = last.slope or (risen / way if way else 0.0)
+        if not steepness > 0.0:
+            return longest
+        straight = min(gain / steepness, longest)
+        if not min(last.slope, before.slope, risen) > 0.0:
+            return straight
+        bend = (1.0 / last.slope - 1.0 / before.slope) / risen
+        bent = straight + 0.5 * bend * (straight * steepness) ** 2
+        return min(max(bent, 0.5 * straight), longest)
+
+    def way_to_corner(self) -> float:
+        """Length of the way until another variable, which follows, meets its bound."""
+        last, box = self.spots[-1], self.valley.box
+        moves = self.sign * last.tangent
+        room = np.where(moves > 0.0, box.high - last.best, last.best - box.low)
+        meeting = (moves != 0.0) & (room > 0.0)
+        meeting[self.index] = False
+        return float(np.min(room[meeting] / np.abs(moves[meeting]), initial=inf))
+
+    def first_step(self, height: float) -> float:
+        """Distance of a height from the minimum, where the cost is a parabola."""
+        if self.curvature > 0.0:
+            way = sqrt(height**2 - self.spots[0].height ** 2) / self.curvature
+            if isfinite(way):
+                return way
+        unit = float(self.valley.box.unit[self.index])
+        return min(unit, self.room) / self.valley.points
+
+    def predicted(self, step: float) -> Array:
+        """Return all parameters a step farther, by the tangent of the profile and its bend."""
+        last, move = self.spots[-1], self.sign * step
+        x = last.best + move * last.tangent
+        if len(self.spots) > 1:
+            before = self.spots[-2]
+            x += 0.5 * move**2 * (last.tangent - before.tangent) / (last.place - before.place)
+        return self.at(self.bound if step >= self.room else last.place + move, x)
+
+    def at(self, place: float, x: Array) -> Array:
+        """Return x within the bounds, with the parameter at a place."""
+        inside = self.snapped(x)
+        inside[self.index] = place
+        return inside
+
+    def snapped(self, x: Array) -> Array:
+        """Return x within the bounds, on those that it is next to."""
+        box = self.valley.box
+        near = NEXT_TO * box.unit
+        return np.where(x <= box.low + near, box.low, np.where(x >= box.high - near, box.high, x))
+
+    def refit(self, guess: Array, patient: bool = True) -> Steps[Spot | None]:
+        """Fit all parameters but one, from a guess; None where the residuals are not finite.
+
+        Not ``patient``: also where the full step fails far from the minimum.
+        """
+        valley, fine = self.valley, FINE * self.rise
+        low, high = (
+            self.at(guess[self.index], valley.box.low),
+            self.at(guess[self.index], valley.box.high),
+        )
+        held = replace(valley.box, low=low, high=high)
+        problem = Problem(valley.functions, None, held, valley.scaled)
+        point = yield from problem.evaluate(guess)
+        if point.cost == inf:
+            self.failed = float(guess[self.index])
+            return None
+        linear, before = (yield from linearise(problem, point, valley.bottom)), None
+        for _ in range(MOST_CORRECTIONS):
+            if not linear.finite or linear.full.promise <= fine:
+                break
+            trial = yield from problem.evaluate(solve(linear, reach=REACH).target)
+            if trial.cost > point.cost - ENOUGH * linear.full.promise:
+                if not patient and linear.full.promise > FAR * self.rise:
+                    return None
+                shorter = yield from best_of_shorter(problem, linear, before)
+                trial = min(trial, shorter, key=lambda point: point.cost)
+            gain = point.cost - trial.cost
+            if gain > 0.0:
+                point, before = trial, linear
+                linear = yield from linearise(problem, point, linear)
+            if gain <= fine:
+                break
+        return self.spot(linear)
+
+    def spot(self, linear: LinearModel) -> Spot:
+        """Return the point of the profile that a linear model with the parameter held shows."""
+        x, cost = linear.point.x, linear.point.cost
+        place = float(x[self.index])
+        if not linear.finite:
+            return Spot(x, cost, place, self.height(cost), 0.0, x, self.alone())
+        smooth = linear.full.promise <= FINE * self.rise
+        best, left = (self.snapped(linear.full.target), linear.full.promise) if smooth else (x, 0.0)
+        tangent, _ = self.tangent(linear, best)
+        height = self.height(cost - left)
+        moved, along = effect_of(linear, best - x), effect_of(linear, tangent)
+        steepness = self.sign * float(along @ (linear.amounts + moved))
+        slope = steepness / (2.0 * self.rise * height) if smooth and height > FINE else 0.0
+        return Spot(x, cost, place, height, slope, best, tangent)
+
+    def height(self, cost: float) -> float:
+        """Return the root of the rise of a cost, in units of that asked."""
+        return sqrt(max(0.0, cost - self.valley.lowest) / self.rise)
+
+    def alone(self) -> Array:
+        """Return the direction in which the parameter moves and no other (N,)."""
+        direction = np.zeros(len(self.valley.box.low))
+        direction[self.index] = 1.0
+        return direction
+
+    def tangent(self, linear: LinearModel, x: Array) -> tuple[Array, float]:
+        """Rates of all variables along the parameter (N,), and of the residuals with them.
+
+        Others on a bound stay there.
+        """
+        box, direction = self.valley.box, self.alone()
+        others = (x > box.low) & (x < box.high) & (direction == 0.0)
+        alone = effect_of(linear, direction)
+        if others.any():
+            scale = linear.scale[others]
+            rows = linear.singular[:, None] * linear.directions[:, others]
+            direction[others] = -np.linalg.lstsq(rows, alone, rcond=UNSEEN)[0] / scale
+        effect = float(np.linalg.norm(effect_of(linear, direction)))
+        flat = effect <= UNSEEN * float(np.linalg.norm(alone)) + TINY
+        return direction, 0.0 if flat else effect
+
+    def crossed(self) -> Steps[float]:
+        """Find the point where the cost has risen as asked, by refits between the last points."""
+        inside, outside = self.spots[-2:]
+        for count in range(MOST_REFITS):
+            place, doubt = interpolated(inside, outside)
+            if doubt <= CLOSE * abs(place - self.spots[0].place):
+                break
+            if count >= CUBICS:
+                place = 0.5 * (inside.place + outside.place)
+            share = (place - inside.place) / (outside.place - inside.place)
+            guess = self.at(place, inside.best + share * (outside.best - inside.best))
+            spot = yield from self.refit(guess)
+            if spot is None:
+                break
+            self.spots.append(spot)
+            inside, outside = (inside, spot) if spot.height >= 1.0 else (spot, outside)
+        self.spots.sort(key=lambda spot: self.sign * spot.place)
+        return interpolated(inside, outside)[0]
+
+
+def effect_of(linear: LinearModel, direction: Array) -> Array:
+    """Change of the residuals by a move, in the directions that these have (K,)."""
+    along: Array = linear.directions @ (linear.scale * direction)
+    return linear.singular * along
+
+
+def best_of_shorter(
+    problem: Problem, linear: LinearModel, before: LinearModel | None
+) -> Steps[Point]:
+    """Return the best of many steps that are shorter than the full one, tried at once.
+
+    At a kink, whose other side the linear model ``before`` shows, steps along it are among them.
+    """
+    largest = float(linear.singular[0]) ** 2
+    targets = [solve(linear, share * largest, REACH).target for share in DAMPINGS]
+    targets += [linear.full.at(length) for length in LENGTHS]
+    if before is not None:
+        targets += [along_kink(linear, before, share) for share in SHARES]
+    residuals = yield from problem.residuals(targets)
+    points = [Point(x, r, half_square(r)) for x, r in zip(targets, residuals, strict=True)]
+    return min(points, key=lambda point: point.cost)
+
+
+def along_kink(linear: LinearModel, before: LinearModel, share: float) -> Array:
+    """Minimise the weighted mean of two linear models within the bounds."""
+    x, box = linear.point.x, linear.box
+    rows = np.vstack(
+        [
+            sqrt(1.0 - share) * (linear.singular[:, None] * linear.directions * linear.scale),
+            sqrt(share) * (before.singular[:, None] * before.directions * before.scale),
+        ]
+    )
+    amounts = np.append(
+        sqrt(1.0 - share) * linear.amounts,
+        sqrt(share) * (before.amounts + effect_of(before, x - before.point.x)),
+    )
+    unit = box.unit
+    low, high = np.maximum(box.low - x, -REACH * unit), np.minimum(box.high - x, REACH * unit)
+    y = bounded_minimum(rows * unit, amounts, low / unit, high / unit, linear.unseen)
+    return box.inside(x + y * unit)
+
+
+def interpolated(inside: Spot, outside: Spot) -> tuple[float, float]:
+    """Find the point of height one between two points, and its uncertainty.
+
+    The place is a cubic of the height, which both places and slopes give; without slopes a line.
+    """
+    risen, way = outside.height - inside.height, outside.place - inside.place
+    share = (1.0 - inside.height) / risen
+    straight = inside.place + share * way
+    near = min(share, 1.0 - share)
+    if not min(inside.slope, outside.slope) > 0.0:
+        return straight, abs(way) * near
+    bends = [risen / spot.slope / abs(way) - 1.0 for spot in (inside, outside)]
+    cubic = share + share * (1.0 - share) * ((1.0 - share) * bends[0] - share * bends[1])
+    if not 0.0 <= cubic <= 1.0:
+        return straight, abs(way)
+    # less the parabola through both places with the slope at the nearer one
+    doubt = share * (1.0 - share) * near * abs(sum(bends))
+    return inside.place + cubic * way, doubt * abs(way)
+
 
 POINTS = 5  # from the minimum to the rise: enough for a smooth figure
 LOWER = 1e-3  # of the rise: what is farther below the minimum refutes it

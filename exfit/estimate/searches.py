@@ -11,9 +11,8 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from exfit.estimate.answer import Stop
 from exfit.estimate.linear import DampedStep, LinearModel, bounded_minimum, solve, step_to
-from exfit.estimate.problem import EPS, TINY, Array, Point, Problem, Steps, norm
+from exfit.estimate.problem import EPS, TINY, Array, Point, Problem, Steps, Stop, norm
 
 ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
 MOST_TRIALS = 60

@@ -1,28 +1,400 @@
-"""Nonlinear least squares within bounds: one descent, by the method and tolerances chosen."""
+"""The one loop of all methods, its log, its rules to stop, and the methods by name."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from math import inf
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from math import inf, nan, sqrt
+from typing import Any, Literal, Self
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from exfit.estimate.answer import Result, SolverIteration
+from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.lockstep import finish
 from exfit.estimate.problem import (
+    EPS,
     RELATIVE_STEP,
+    STATUS,
+    TINY,
     Array,
+    Box,
     Differences,
     EvaluationLimit,
     Functions,
+    Mask,
     OneByOne,
+    Point,
     Problem,
+    Result,
+    SolverIteration,
     Steps,
+    Stop,
     checked,
+    norm,
 )
-from exfit.estimate.run import MOST_ITERATIONS, STRATEGIES, Rules, SearchRun
-from exfit.estimate.searches import BENDING, USUAL, Searches
+from exfit.estimate.searches import BENDING, USUAL, FullStep, Move, Search, Searches
 from exfit.util.strategies import DEFAULT_STRATEGY
+
+LULL = 10  # iterations
+CREEP = 1e-6  # of the cost: less than the noise of any record leaves open
+ROUNDING = 10.0 * EPS  # of what the residuals are made of: what is left is no more than this
+ORTHOGONAL = 1e-6  # cosine of the residuals and a column of J: what rounding of f leaves open
+KINK = 1e-3  # of the cost: what a derivative from one side may promise at a minimum
+MOST_ITERATIONS = 100  # of a phase for which nothing is given
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The tolerances, of which `least_squares` says what they mean, and what they refer to.
+
+    ``scaled``: whether units are given; ``seen``: the variables that no end may lose sight of.
+    """
+
+    max_iterations: int | Mapping[str, int]
+    gtol: float
+    ftol: float
+    xtol: float
+    gtol_absolute: float | None = None
+    matches: Callable[[Array], bool] | None = None
+    scaled: bool = True
+    first_cost: float = nan
+    first_gradient: float = nan
+    seen: Mask = field(default_factory=lambda: np.zeros(1, dtype=np.bool_))
+
+    def starting_at(self, start: LinearModel, scaled: bool) -> Self:
+        """Return the rules that measure by the start.
+
+        Without units (``scaled``) nothing says that the start is sensible: a cost is not small
+        because that of the start was large, and variables that were seen there may get lost.
+        """
+        rules = replace(self, scaled=scaled, first_gradient=start.gradient_norm)
+        if scaled:
+            return replace(rules, first_cost=start.point.cost)
+        return replace(rules, first_cost=0.0, seen=seen(start))
+
+    def most_iterations(self, phase: str) -> int:
+        """Limit of the iterations of a phase."""
+        if isinstance(self.max_iterations, int):
+            return self.max_iterations
+        return self.max_iterations.get(phase, MOST_ITERATIONS)
+
+    def at_rest(self, linear: LinearModel) -> Stop | None:
+        """Find a reason to stop at a point: there is nothing to gain."""
+        if not linear.finite:
+            return Stop.JACOBIAN
+        cost = linear.point.cost
+        nothing = cost <= self.gtol**2 * self.first_cost
+        flat = linear.gradient_norm <= self.gtol * self.first_gradient + TINY
+        if flat and (nothing or linear.full.promise <= self.ftol * cost):
+            return Stop.GRADIENT
+        if not linear.surely_longer(self.xtol):
+            full = linear.full
+            if self.tiny(full.target, full.origin, linear.box):
+                return Stop.STEP
+        return self.good_enough(linear)
+
+    def good_enough(self, linear: LinearModel) -> Stop | None:
+        """Find the tolerance of the user's own that a point is within, if any."""
+        if self.matches is not None and self.matches(linear.point.residuals):
+            return Stop.MATCH
+        if self.gtol_absolute is None:
+            return None
+        flat = linear.gradient_norm <= self.gtol * self.first_gradient + self.gtol_absolute
+        return Stop.FLAT if flat else None
+
+    def after(self, before: LinearModel, linear: LinearModel, move: Move) -> Stop | None:
+        """Find a reason to stop after an iteration."""
+        cost = before.point.cost
+        if not linear.finite:
+            return Stop.JACOBIAN
+        if move.point is None:
+            return self.stuck(before, move.stop)
+        gained = cost - linear.point.cost > self.ftol * cost
+        if not gained and before.full.promise <= self.ftol * cost:
+            return Stop.FLOOR
+        if move.stop is None and self.tiny(linear.point.x, before.point.x, linear.box):
+            return self.at_rest(linear) or self.stuck(linear, Stop.STALLED)
+        return move.stop
+
+    def creeping(self, log: Sequence[SolverIteration], linear: LinearModel) -> Stop | None:
+        """Find a reason to stop after these iterations of a phase: a valley of kinks has no end.
+
+        It is no minimum where the linear model still promises much: then the search has stalled.
+        """
+        last = log[-LULL:]
+        if len(log) <= LULL or min(line.inner for line in last) == 0:
+            return None
+        gain, cost = log[-1 - LULL].cost - log[-1].cost, log[-1].cost
+        if gain > CREEP * cost:
+            return None
+        resting = linear.full.promise <= KINK * cost or self.orthogonal(linear)
+        return Stop.CREEPING if resting else Stop.STALLED
+
+    def stuck(self, linear: LinearModel, stop: Stop | None) -> Stop | None:
+        """Name the reason to stop at a point from which no step led lower."""
+        promise = linear.full.promise / linear.point.cost
+        if stop is Stop.ILL_CONDITIONED:
+            return stop
+        if promise <= sqrt(EPS) or rounding(linear):
+            return Stop.FLOOR
+        if self.orthogonal(linear):
+            return Stop.GRADIENT
+        return Stop.KINK if stop is Stop.STALLED and promise <= KINK else stop
+
+    def orthogonal(self, linear: LinearModel) -> bool:
+        """Tell whether the residuals are at right angles to the effect of each free variable.
+
+        Without units that makes a minimum, whatever the linear model promises for a direction that
+        it hardly sees: J may be singular at the minimum.
+        """
+        r = float(np.linalg.norm(linear.point.residuals))
+        norms = np.linalg.norm(linear.jacobian, axis=0)
+        flat = np.all(abs(linear.projected) <= ORTHOGONAL * r * norms)
+        return not self.scaled and bool(flat)
+
+    def lost(self, linear: LinearModel) -> bool:
+        """Tell whether the residuals depend no longer on a variable that they depended on."""
+        return bool(np.any(self.seen & ~seen(linear)))
+
+    def tiny(self, there: Array, here: Array, box: Box) -> bool:
+        """Tell whether a step is below the tolerance in every variable."""
+        size = np.maximum(abs(here), box.unit)
+        return bool(np.all(abs(there - here) <= self.xtol * size))
+
+
+def seen(linear: LinearModel) -> Mask:
+    """Return on which variables the residuals depend by more than rounding, unit by unit."""
+    norms = np.linalg.norm(linear.jacobian, axis=0) * linear.box.unit
+    return np.asarray(norms > linear.unseen * np.max(norms, initial=0.0))
+
+
+def rounding(linear: LinearModel) -> bool:
+    """Tell whether the residuals are no more than the rounding of their parts."""
+    parts = abs(linear.jacobian) @ abs(linear.point.x)
+    return linear.point.cost <= 0.5 * ROUNDING**2 * float(parts @ parts)
+
+
+NOT_FINITE = "the residuals at x0 are not finite"
+
+
+class NotFinite(ValueError):
+    """Residuals that are not finite where a search should begin."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where a phase ended and why."""
+
+    linear: LinearModel
+    stop: Stop
+
+    @property
+    def converged(self) -> bool:
+        """Whether it ended at a minimum."""
+        return STATUS[self.stop] > 0
+
+
+class SearchRun:
+    """A search from its start to its end, perhaps in several phases."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        rules: Rules,
+        searches: Searches,
+        callback: Callable[[SolverIteration], object] | None,
+    ) -> None:
+        self.problem, self.rules, self.callback = problem, rules, callback
+        self.searches = searches
+        self.history: list[SolverIteration] = []
+        self.iterations = 0
+        self.best: LinearModel | None = None
+
+    def begin(self, x0: Array) -> Steps[LinearModel]:
+        """Return the linear model at the start, or raise NotFinite."""
+        point = yield from self.problem.evaluate(x0)
+        if point.cost == inf:
+            raise NotFinite(NOT_FINITE)
+        start = yield from self.linearise(point)
+        self.rules = self.rules.starting_at(start, self.problem.scaled)
+        return start
+
+    def linearise(self, point: Point, before: LinearModel | None = None) -> Steps[LinearModel]:
+        """Return the linear model at a point; remember the best one."""
+        linear = yield from linearise(self.problem, point, before)
+        if self.best is None or point.cost <= self.best.point.cost:
+            self.best = linear
+        return linear
+
+    def descend(self, search: Search, linear: LinearModel) -> Steps[Outcome]:
+        """Go down from a point until there is a reason to stop."""
+        if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
+            self.announce(search.phase, linear)
+        first = len(self.history) - 1
+        for _ in range(self.rules.most_iterations(search.phase)):
+            stop = self.rules.at_rest(linear)
+            if stop is not None:
+                return self.end(linear, stop)
+            before = linear
+            move, search = yield from search.advance(self.problem, before)
+            if move.point is not None:
+                linear = yield from self.linearise(move.point, before)
+            self.iterations += 1
+            self.announce(search.phase, linear, move, before)
+            stop = self.rules.after(before, linear, move)
+            stop = stop or self.rules.creeping(self.history[first:], linear)
+            if stop is not None:
+                return self.end(linear, stop)
+        return self.end(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)
+
+    def end(self, linear: LinearModel, stop: Stop) -> Outcome:
+        """End a phase, at no minimum where a variable got lost."""
+        outcome = Outcome(linear, stop)
+        lost = outcome.converged and self.rules.lost(linear)
+        return Outcome(linear, Stop.LOST) if lost else outcome
+
+    def announce(
+        self,
+        phase: str,
+        linear: LinearModel,
+        move: Move | None = None,
+        before: LinearModel | None = None,
+    ) -> None:
+        """Write a line of the log and call the callback."""
+        x = linear.point.x
+        move = move or Move(None, nan, 0)
+        line = SolverIteration(
+            number=len(self.history),
+            phase=phase,
+            x=x.copy(),
+            cost=linear.point.cost,
+            gradient_norm=linear.gradient_norm,
+            step_norm=norm(x - before.point.x) if before else 0.0,
+            damping=move.damping,
+            inner=move.inner,
+            nfev=self.problem.nfev,
+            njev=self.problem.njev,
+            quality=move.quality,
+            capped=move.capped if before else None,
+        )
+        self.history.append(line)
+        if self.callback is not None:
+            try:
+                self.callback(line)
+            except StopIteration:
+                raise KeyboardInterrupt from None
+
+    def best_of(self, outcome: Outcome) -> Steps[Outcome]:
+        """Return the outcome, moved to a trial that was rejected and yet is the best."""
+        best = self.problem.best
+        if best is not None and best.cost < outcome.linear.point.cost:
+            return Outcome((yield from linearise(self.problem, best)), outcome.stop)
+        return outcome
+
+    def exhausted(self) -> Steps[Outcome]:
+        """Return the best point seen within the limit of evaluations, with its Jacobian."""
+        self.problem.most_evaluations = None
+        point = self.problem.best
+        if point is None or point.cost == inf:
+            raise NotFinite(NOT_FINITE)
+        linear = self.best or (yield from linearise(self.problem, point))
+        return (yield from self.best_of(Outcome(linear, Stop.EVALUATIONS)))
+
+    def interrupted(self) -> Outcome:
+        """Return the best point seen, with its Jacobian if that was there in time.
+
+        Raises KeyboardInterrupt where there is none.
+        """
+        point = self.problem.best
+        if point is None or point.cost == inf:
+            raise KeyboardInterrupt
+        if self.best is not None and self.best.point.cost <= point.cost:
+            return Outcome(self.best, Stop.INTERRUPTED)
+        unknown = np.full((len(point.residuals), len(point.x)), nan)
+        return Outcome(blind(self.problem, point, unknown), Stop.INTERRUPTED)
+
+    def result(self, outcome: Outcome) -> Result:
+        """Make the result for the user."""
+        linear, stop = outcome.linear, outcome.stop
+        return Result(
+            x=linear.point.x,
+            cost=linear.point.cost,
+            fun=linear.point.residuals,
+            jac=linear.jacobian,
+            grad=linear.gradient,
+            optimality=float(np.max(abs(linear.projected))),
+            promise=linear.full.promise if linear.finite else nan,
+            nfev=self.problem.nfev,
+            njev=self.problem.njev,
+            nit=self.iterations,
+            status=STATUS[stop],
+            message=stop.value,
+            success=outcome.converged,
+            history=tuple(self.history),
+            stop=stop,
+            active_mask=active(linear.point.x, linear.box),
+        )
+
+
+def active(x: Array, box: Box) -> NDArray[np.int_]:
+    """Return -1 where a variable is at its lower bound, 1 at its upper one, else 0."""
+    return np.where(x <= box.low, -1, np.where(x >= box.high, 1, 0))
+
+
+Strategy = Callable[[SearchRun, LinearModel, float | None], Steps[Outcome]]
+
+
+def alone(search: Callable[[Searches], Search]) -> Strategy:
+    """Return the strategy that is one method from start to end."""
+    return lambda run, start, _: run.descend(search(run.searches), start)
+
+
+def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Outcome]:
+    """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
+    lm, dgn = run.searches.lm, run.searches.dgn
+    outcome = yield from relay(run, start, lm.handing_over(), dgn)
+    if outcome.stop is not Stop.STALLED:
+        return outcome
+    return (yield from run.descend(lm, outcome.linear))
+
+
+def robust(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Outcome]:
+    """Go on with lm where gn quits."""
+    return relay(run, start, FullStep(), run.searches.lm)
+
+
+def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> Steps[Outcome]:
+    """Go on with the second search where the first ends short of a minimum."""
+    outcome = yield from run.descend(first, start)
+    if outcome.converged or outcome.stop is Stop.JACOBIAN:
+        return outcome
+    return (yield from run.descend(second, outcome.linear))
+
+
+def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Steps[Outcome]:
+    """Try dgn; where that is not good enough, lm and dgn from the same start."""
+    first = yield from run.descend(run.searches.dgn, start)
+    if matches(first, good_enough):
+        return first
+    second = yield from lm_then_dgn(run, start, good_enough)
+    return second if second.linear.point.cost <= first.linear.point.cost else first
+
+
+def matches(outcome: Outcome, good_enough: float | None) -> bool:
+    """Tell whether the residuals are small enough; without a limit, whether it converged."""
+    if good_enough is None:
+        return outcome.converged
+    point = outcome.linear.point
+    return sqrt(2.0 * point.cost / len(point.residuals)) <= good_enough
+
+
+STRATEGIES: dict[str, Strategy] = {
+    "gn": alone(lambda searches: searches.gn),
+    "dgn": alone(lambda searches: searches.dgn),
+    "lm": alone(lambda searches: searches.lm),
+    "lm-then-dgn": lm_then_dgn,
+    "auto": auto,
+    "robust": robust,
+}
 
 
 @dataclass(frozen=True, kw_only=True)

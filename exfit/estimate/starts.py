@@ -9,11 +9,9 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exfit.estimate.answer import Progress, Result, Stop
 from exfit.estimate.lockstep import finish_all
-from exfit.estimate.problem import Array, Functions, Steps, checked
-from exfit.estimate.run import NotFinite
-from exfit.estimate.solver import Descent
+from exfit.estimate.problem import Array, Functions, Progress, Result, Steps, Stop, checked
+from exfit.estimate.solver import Descent, NotFinite
 from exfit.util.sorting import median
 
 BITS = 30  # of each number

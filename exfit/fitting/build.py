@@ -1,47 +1,51 @@
 """The experiments of a case: its tests, ready to be simulated, with or without a record."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
+from exfit.case.schema import (
+    BumpTest,
+    RecordFile,
+    Recording,
+    StepSection,
+    Switch,
+    Unknown,
+    start_value,
+)
 from exfit.errors import CaseError
-from exfit.fitting.channels import channel_of, with_filter, without_masked
-from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.input_steps import input_steps
-from exfit.fitting.levels import deviation, levels_of
-from exfit.fitting.nuisances.kinds import Nuisance
-from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
-from exfit.fitting.nuisances.sine_parameters import with_sines
-from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.recorded.detected_steps import with_detected_steps
-from exfit.fitting.recorded.event import (
-    event_inputs,
-    offset_step,
-    with_even_clock,
-    with_rest,
-)
-from exfit.fitting.recorded.references import references_of, span_of
-from exfit.fitting.recorded.switchings import (
+from exfit.fitting.channels import channel_of, filtered_end, with_filter, without_masked
+from exfit.fitting.experiment import (
+    Channel,
+    Experiment,
+    ExperimentSetup,
     Switching,
-    announced,
-    masked,
-    switchings_as_steps,
-    switchings_of,
+    with_enough_substeps,
 )
-from exfit.fitting.recordings import record_of
-from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
+from exfit.fitting.nuisances import TURN, Found, nuisances_of, prefix_from
+from exfit.fitting.recordings import deviation, levels_of, record_of, span_of
 from exfit.fitting.system import system_of
-from exfit.plants import NETWORK, REFERENCES, VT0, PlantKind
+from exfit.plants import BREAKER, NETWORK, REFERENCES, VT0
 from exfit.records.record import Record
-from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput, SplinedInput
+from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+
+
+def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:
+    """Build the tests of a case with the records that it is fitted to; CaseError without any.
+
+    ``start`` are the case's values, where they are at hand.
+    """
+    if not case.recordings:
+        raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
+    values = case.values() if start is None else start
+    return tuple(build_experiment(case, recording, values) for recording in case.recordings)
 
 
 def build_experiment(case: Case, recording: Recording, values: Values) -> ExperimentSetup:
@@ -50,78 +54,40 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
     """
     view, file = case.seen_from(recording), recording.record
-    system = system_of(view, recording)
-    driven = (*system.inputs, *view.kind.required_one_of)  # some in another form
+    kind, system = view.kind, system_of(view, recording)
+    driven = (*system.inputs, *kind.required_one_of)  # some in another form
     driving = [signal for signal in file.channels if signal in driven]
-    read = record_of(case, recording)
-    whole = with_filter(with_even_clock(read) if view.kind.finds_rest else read, file.filter)
-    switchings = switchings_of(view, whole)
-    record = without_masked(whole, masked(file, whole, switchings), driving)
-    references = references_of(case, recording.test, span_of(recording.test, record), record, file)
-    resolved = recording.model_copy(update={"test": references.test})
-    test = with_detected_steps(case, resolved, record)
-    test = with_rest(test, record) if view.kind.finds_rest else test
+    whole, record, switchings = _records(case, recording, driving, kind.finds_rest)
+    test, references, files = _as_recorded(case, recording, record, kind.finds_rest)
     network = {} if view is case else _network_values(view)
-    begin, end = span_of(test, record)
-    offset = offset_step(test, begin, end)
-    given = input_steps(view, test, {**values, **network})
-    played = _driving(view, test, record, file, driving, switchings)
-    switched = switchings_as_steps(played, file, switchings, prefix_of(recording), len(given))
-    steps = (*given, *switched.steps, *offset)
-    nuisances, free = nuisance_parameters(
-        prefix_of(recording),
-        test,
-        file,
-        steps,
-        alone=not references.recorded,
-        scaled=view.kind.scaled,
-    )
-    if any(nuisance.kind == "shift" for nuisance in nuisances):
-        steps = tuple(step._replace(smooth=False) for step in steps)
-    delay = start_value(file.delay) or 0.0
-    recorded = {**switched.inputs, **references.recorded}
-    inputs = Inputs(begin, end + _beyond(nuisances, free, delay), steps, recorded)
+    at = {**values, **network}
+    inputs, found = _moved(view, recording, test, record, driving, switchings, references, at)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
+    delay = start_value(file.delay)
+    compared = {*system.outputs}.difference(driving)
     experiment = Experiment(
-        simulator.with_inputs(steps, delay) if delay else simulator,
-        _channels(case, file, record, [s for s in system.outputs if s not in driving]),
+        simulator.with_inputs(inputs.steps, delay) if delay else simulator,
+        tuple(channel_of(case, file, record, name) for name in file.channels if name in compared),
         {**network, **levels_of(case, test, record)},
-        (*nuisances, *switched.nuisances),
+        tuple(nuisance for nuisance, _ in found),
         recording.name,
     )
-    plain = ExperimentSetup(
+    setup = ExperimentSetup(
         case.path,
         test,
         record,
         experiment,
-        (*free, *switched.free),
-        references.files,
-        _played(view.kind, driving),
-        switchings=announced(file, switchings),
+        tuple(free for _, free in found),
+        files,
+        tuple(name for name in kind.driving if name in driving) if kind.plays_back else (),
+        switchings=() if file.switchings == "compare" else switchings,
         whole=whole,
     )
-    setup = with_sines(case, recording, plain, values)
-    return replace(setup, free=tuple(_with_given_start(case, each) for each in setup.free))
+    if any(file.channels[channel.signal].sine is not None for channel in setup.channels):
+        from exfit.fitting.sines import with_sines
 
-
-def _played(kind: PlantKind, driving: Collection[str]) -> tuple[str, ...]:
-    """Return the channels that drive a simulation in place of a plant, in the order of the kind."""
-    return tuple(signal for signal in kind.driving if signal in driving and kind.plays_back)
-
-
-def _with_given_start(case: Case, parameter: FreeParameter) -> FreeParameter:
-    """Return what is found about a record, with the start that was given, if one was.
-
-    Raises CaseError where that lies out of its bounds.
-    """
-    given = case.given_values.get(parameter.name)
-    if given is None:
-        return parameter
-    if not parameter.low <= given.value <= parameter.high:
-        limits = f"{parameter.low:g} ... {parameter.high:g}"
-        text = f"{parameter.name}: {given.value:g} lies outside its bounds {limits} in {case.path}"
-        raise CaseError([f"{given.source}: {text}"])
-    return replace(parameter, start=given.value)
+        setup = with_sines(case, file, setup, values)
+    return _with_given_starts(case, setup)
 
 
 def _network_values(view: Case) -> dict[str, float]:
@@ -129,14 +95,48 @@ def _network_values(view: Case) -> dict[str, float]:
     return {name: value for name, value in view.values().items() if name.startswith(NETWORK)}
 
 
-def _beyond(nuisances: Sequence[Nuisance], free: Sequence[FreeParameter], delay: float) -> float:
-    """Time (s) after the end of the record that a fit simulates which may read it earlier."""
-    earlier = sum(
-        parameter.start - parameter.low
-        for parameter, nuisance in zip(free, nuisances, strict=True)
-        if nuisance.kind in ("delay", "shift")
-    )
-    return max(0.0, earlier - delay)
+def _records(
+    case: Case, recording: Recording, driving: Sequence[str], of_event: bool
+) -> tuple[Record, Record, tuple[Switching, ...]]:
+    """Read a record, filtered: whole, without what is masked, the switchings of an event."""
+    record, file, switchings = record_of(case, recording), recording.record, tuple[Switching, ...]()
+    if of_event:
+        from exfit.fitting.event import switchings_of, with_even_clock
+
+        whole = with_filter(with_even_clock(record), file.filter)
+        switchings = switchings_of(whole)
+    else:
+        whole = with_filter(record, file.filter)
+    mask = (*file.mask, *filtered_end(file, whole))
+    if file.switchings != "compare":
+        mask = (*mask, *(switching.masked for switching in switchings))
+    return whole, without_masked(whole, mask, driving), switchings
+
+
+def _as_recorded(
+    case: Case, recording: Recording, record: Record, of_event: bool
+) -> tuple[BumpTest, Mapping[str, RecordedInput], Mapping[str, Record]]:
+    """Return a test with all that its record shows of it, its recorded references, their files."""
+    test, file = recording.test, recording.record
+    references, files = dict[str, RecordedInput](), dict[str, Record]()
+    if test.files or any(test.reference(signal) == "recorded" for signal in REFERENCES):
+        from exfit.fitting.recorded_steps import references_of
+
+        test, references, files = references_of(case, test, span_of(test, record), record, file)
+    events = [event for signal in REFERENCES for event in test.events(signal)]
+    sought = [test.vt0, test.breaker, file.delay, *(event.at for event in events)]
+    sought += [event.step for event in events]
+    delay = start_value(file.delay)
+    if not all(isinstance(each, float | None) for each in sought) or (delay or 0.0) < 0.0:
+        from exfit.fitting.recorded_steps import with_detected_steps
+
+        place = f"{case.path}: {prefix_from(recording.name)}test"
+        test = with_detected_steps(place, test, file, record)
+    if of_event:
+        from exfit.fitting.event import with_rest
+
+        test = with_rest(test, record)
+    return test, references, files
 
 
 def _driving(
@@ -151,41 +151,111 @@ def _driving(
 
     One whose scale is found is divided by its start, by which it was read: the system multiplies.
     """
-
-    def start_of_scale(signal: str) -> float:
-        scale = getattr(file.channels[signal], "scale", 1.0)
-        start = start_value(scale) if isinstance(scale, Unknown) else None
-        return 1.0 if start is None else start
-
-    event = event_inputs(test, record, switchings) if case.kind.finds_rest else {}
-    if event:
+    inputs: dict[str, RecordedInput | SplinedInput] = {}
+    if case.kind.finds_rest:
         driving = [signal for signal in driving if signal in REFERENCES]
     elif not case.kind.plays_back:
         driving = [signal for signal in driving if signal not in REFERENCES]
-    return {
-        signal: RecordedInput(record.time, deviation(test, record, signal) / start_of_scale(signal))
-        for signal in driving
-    } | event
+    for signal in driving:
+        scale = getattr(file.channels[signal], "scale", 1.0)
+        start = start_value(scale) if isinstance(scale, Unknown) else None
+        moved = deviation(test, record, signal) / (1.0 if start is None else start)
+        inputs[signal] = RecordedInput(record.time, moved)
+    if case.kind.finds_rest:
+        from exfit.fitting.event import event_inputs
+
+        inputs |= event_inputs(test, record, switchings)
+    return inputs
 
 
-def _channels(
-    case: Case, file: RecordFile, record: Record, compared: Sequence[str]
-) -> tuple[Channel, ...]:
-    """Return the channels of a record that are compared, in the order of the case."""
-    return tuple(
-        channel_of(case, file, record, signal) for signal in file.channels if signal in compared
-    )
+def _moved(
+    case: Case,
+    recording: Recording,
+    test: BumpTest,
+    record: Record,
+    driving: Sequence[str],
+    switchings: Sequence[Switching],
+    references: Mapping[str, RecordedInput],
+    values: Values,
+) -> tuple[Inputs, list[Found]]:
+    """Return what moves the unit in a test, and what a fit finds about its record."""
+    file, prefix = recording.record, prefix_from(recording.name)
+    begin, end = span_of(test, record)
+    steps, found = input_steps(case, test, values), list[Found]()
+    played = _driving(case, test, record, file, driving, switchings)
+    if file.switchings == "find" and switchings:
+        from exfit.fitting.event import switchings_as_steps
+
+        played, switched, found = switchings_as_steps(played, switchings, prefix, len(steps))
+        steps += switched
+    offset = start_value(test.frequency_offset)
+    if offset is not None:
+        length = end - begin
+        steps.append(InputStep(begin, offset * TURN * length, "angle", ramp=length))
+    scaled = case.kind.scaled
+    found = [*nuisances_of(prefix, test, file, steps, not references, scaled), *found]
+    if any(nuisance.kind == "shift" for nuisance, _ in found):
+        steps = [step._replace(smooth=False) for step in steps]
+    delays = (free for nuisance, free in found if nuisance.kind in ("delay", "shift"))
+    earlier = sum(free.start - free.low for free in delays)  # that a fit may read it
+    end += max(0.0, earlier - (start_value(file.delay) or 0.0))
+    return Inputs(begin, end, tuple(steps), {**played, **references}), found
 
 
-def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:
-    """Return the tests of a case with the records that it is fitted to; CaseError without any.
+def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:
+    """Return what is found about a record with the starts that were given.
 
-    ``start`` are the case's values, where they are at hand.
+    Raises CaseError for one that lies out of its bounds.
     """
-    if not case.recordings:
-        raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
-    values = case.values() if start is None else start
-    return tuple(build_experiment(case, recording, values) for recording in case.recordings)
+    free = []
+    for own in setup.free:
+        given = case.given_values.get(own.name)
+        if given is not None and not own.low <= given.value <= own.high:
+            limits = f"{own.low:g} ... {own.high:g}"
+            text = f"{own.name}: {given.value:g} lies outside its bounds {limits} in {case.path}"
+            raise CaseError([f"{given.source}: {text}"])
+        free.append(own if given is None else replace(own, start=given.value))
+    return replace(setup, free=tuple(free))
+
+
+def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
+    """List the changes that a test makes, in the order of time.
+
+    ``values`` are those of the network at the start. Raises CaseError where the source would lose
+    its voltage.
+    """
+    steps = list[InputStep]()
+    for signal in REFERENCES:
+        for change in test.events(signal):
+            at, size = start_value(change.at) or 0.0, start_value(change.step) or 0.0
+            smooth = isinstance(change.at, Unknown)
+            steps.append(InputStep(at, size, signal, smooth, change.ramp or 0.0))
+    for turn in test.angle_steps:
+        steps.append(InputStep(turn.at, turn.radians, "angle", ramp=turn.ramp or 0.0))
+    if test.breaker is not None:
+        opens = test.breaker.opens
+        steps.append(InputStep(start_value(opens) or 0.0, 1.0, BREAKER, isinstance(opens, Unknown)))
+    steps += _network_steps(case, test, values)
+    return sorted(steps, key=lambda step: step.at)
+
+
+def _network_steps(case: Case, test: BumpTest, values: Values) -> Iterator[InputStep]:
+    """Yield the changes of R, X and E; a switch sets a value from then on."""
+    now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
+    events: list[StepSection | Switch] = [*test.E, *test.network]
+    for event in sorted(events, key=lambda event: event.at):
+        for name, level in now.items():
+            if isinstance(event, StepSection):
+                step = event.step if name == "E" else None
+            else:
+                then = getattr(event, name)
+                step = None if then is None or level is None else then - level
+            if step is not None:
+                yield InputStep(event.at, step, name)
+                now[name] = None if level is None else level + step
+        if now["E"] is not None and now["E"] <= 0.0:
+            text = f"at {event.at:g} s the source falls to {now['E']:g} pu; it must stay above 0"
+            raise CaseError([f"{case.path}: test: {text}"])
 
 
 def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
@@ -194,25 +264,28 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
     Raises CaseError where the case does not say how long and from which voltage.
     """
     test = case.test or BumpTest()
-    vt0 = start_value(test.vt0)
+    vt0, duration = start_value(test.vt0), test.duration
     missing = [name for name in ("vt0", "duration") if getattr(test, name) is None]
-    if vt0 is None or test.duration is None:
+    if vt0 is None or duration is None:
         raise CaseError(
             f"{case.path}: test.{name}: missing; there is no record to take it from"
             for name in missing
         )
-    count = max(1.0, test.duration / case.simulation.output_step)
+    count = max(1.0, duration / case.simulation.output_step)
     if count > MOST_STEPS:
         raise CaseError(
             [
                 f"{case.path}: simulation.output_step: {case.simulation.output_step:g} s divides "
-                f"the duration of {test.duration:g} s into more than {MOST_STEPS:.0e} samples"
+                f"the duration of {duration:g} s into more than {MOST_STEPS:.0e} samples"
             ]
         )
-    times = np.linspace(0.0, test.duration, round(count) + 1)
-    references = references_of(case, test, (0.0, test.duration))
-    steps = tuple(input_steps(case, references.test, values))
-    inputs = Inputs(0.0, test.duration, steps, references.recorded)
+    times = np.linspace(0.0, duration, round(count) + 1)
+    recorded: Mapping[str, RecordedInput] = {}
+    if test.files:
+        from exfit.fitting.recorded_steps import references_of
+
+        test, recorded, _ = references_of(case, test, (0.0, duration))
+    inputs = Inputs(0.0, duration, tuple(input_steps(case, test, values)), recorded)
     return Simulator(system_of(case), inputs, times, case.simulation.step), {VT0: vt0}
 
 

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.fitting.descents import minimum_near
-from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, Residuals, SimulationCounter
-from exfit.fitting.setup import ExperimentSetup
 
 Array = NDArray[np.float64]
 

@@ -15,13 +15,16 @@ from exfit.case.schema import (
     PhasesSection,
     RecordFile,
 )
+from exfit.dsp.filtering import Filtering, MovingAverage
 from exfit.errors import RecordError
-from exfit.fitting.experiment import Channel
+from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.recordings import column_of
 from exfit.records.record import Record
+from exfit.util.sorting import median
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Filtering, LowPass, Median
+
 
 Mask = NDArray[np.bool_]
 Section = ChannelSection | PhasesSection
@@ -83,6 +86,21 @@ def with_filter(record: Record, filter: Filter | None) -> Record:
         signals[signal] = np.full(len(samples), np.nan)
         signals[signal][there] = own.apply(samples)
     return replace(record, signals=signals)
+
+
+def filtered_end(file: RecordFile, record: Record) -> tuple[tuple[float, float], ...]:
+    """Return the end of a record (s) over which the filter of all its channels reaches, if any.
+
+    There a filter lacks what follows, and a unit that it drives by then moves otherwise.
+    """
+    if file.filter is None:
+        return ()
+    end = float(record.time[-1])
+    if isinstance(file.filter, MedianSection):
+        reach = file.filter.median // 2 * float(median(np.diff(record.time)))
+    else:
+        reach = 1.0 / file.filter.lowpass
+    return ((end - reach, end),)
 
 
 def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Channel:
@@ -183,3 +201,24 @@ def noise_shape(channel: Channel) -> NoiseShape:
     correlated = INDEPENDENT * len(filtered) / effective_samples(filtered)
     apart = max(round(correlated), filtering.smooth_over)
     return NoiseShape(float(np.std(filtered)), apart)
+
+
+Array = NDArray[np.float64]
+
+
+def finds_instant(experiment: Experiment) -> bool:
+    """Tell whether a fit finds an instant of a test, which makes up for a delay."""
+    return any(nuisance.kind in ("at", "shift", "delay") for nuisance in experiment.nuisances)
+
+
+def with_averages(experiment: Experiment, window: float, late: float = 0.0) -> Experiment:
+    """Return an experiment whose record holds averages over a window (s), and is ``late`` (s)."""
+    simulator = experiment.simulator
+    channels = tuple(_averaging(each, simulator.times, window) for each in experiment.channels)
+    delayed = simulator.with_inputs(simulator.inputs.steps, simulator.delay + late)
+    return replace(experiment, channels=channels, simulator=delayed)
+
+
+def _averaging(channel: Channel, time: Array, window: float) -> Channel:
+    filter = None if channel.filtering is None else channel.filtering.filter
+    return replace(channel, filtering=Filtering(time, channel.kept, filter, MovingAverage(window)))

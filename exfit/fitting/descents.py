@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from exfit.errors import SimulationError
 from exfit.estimate import STATUS, Descent, OneByOne, Result, SolverIteration, Stop
-from exfit.estimate.run import NotFinite
+from exfit.estimate.solver import NotFinite
 from exfit.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]

@@ -77,7 +77,7 @@ def further_starts(
 
     ``counter`` counts the simulations of their descents.
     """
-    from exfit.fitting.forms.legs import legs_of  # which a local search does not need
+    from exfit.fitting.further_starts import legs_of  # which a local search does not need
 
     residuals = problem.residuals.counted_by(counter)
     legs = legs_of(residuals, last_leg(problem, counter))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.registry import parts
 from exfit.simulation.simulator import Simulator
 

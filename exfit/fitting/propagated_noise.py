@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
 from exfit.errors import SimulationError
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.simulation.inputs import RecordedInput, SplinedInput
 from exfit.simulation.simulator import Simulator
 

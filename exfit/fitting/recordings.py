@@ -1,4 +1,4 @@
-"""The records of a case: read, and checked against its tests."""
+"""The records of a case: read, checked against its tests, and their levels at rest."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,6 @@ from exfit.case.checks.record import BEFORE_RECORD
 from exfit.case.schema import (
     BumpTest,
     ChannelSection,
-    CurrentPhasor,
     PhasesSection,
     PhasorsSection,
     RecordFile,
@@ -23,10 +22,11 @@ from exfit.case.schema import (
     Time,
     TimeColumn,
     Unknown,
-    VoltagePhasor,
     start_value,
 )
 from exfit.errors import CaseError, RecordError
+from exfit.plants import DRIVING_SCALE, VT0
+from exfit.plants.parts import initial
 from exfit.records.clock import Clock
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
@@ -36,14 +36,16 @@ from exfit.util.sorting import median
 from exfit.util.text import show
 
 if TYPE_CHECKING:
-    from exfit.records.phasors import Phasor, Phasors
+    from exfit.records.phasors import Phasors
     from exfit.records.status import Status
 
+
 Array = NDArray[np.float64]
+Span = tuple[float, float]
 
 OTHER_CLOCK = 50.0  # between a record and a step: ms, or cycles of the mains, are taken for s
+POSSIBLE_VOLTAGES = (0.1, 2.0)  # pu: voltages beyond are those of another unit or base
 SLOW_SAMPLES = 0.5  # s apart: no recorder of a step is slower
-TINY = 1e-9  # of an instant: a record ends later
 
 
 class Column(NamedTuple):
@@ -63,33 +65,18 @@ def record_of(case: Case, recording: Recording) -> Record:
     """
     given, section = case.given_records.get(recording.name), recording.record
     if given is None:
-        return measured(case, recording.test, section)
-    signals = {
-        signal: _with_start_of_scale(given.signals[signal], channel)
-        for signal, channel in section.channels.items()
-    }
-    record = replace(given, signals=MappingProxyType(signals))
-    _refuse_steps_outside(case, recording.test, record, given.source)
-    return record
-
-
-def _with_start_of_scale(samples: Array, channel: ChannelSection | PhasesSection) -> Array:
-    """Return samples with the start of a scale and an offset that the fit finds."""
-    if not isinstance(channel, ChannelSection):
-        return samples
-    scale = start_value(channel.scale) if isinstance(channel.scale, Unknown) else None
-    offset = start_value(channel.offset) if isinstance(channel.offset, Unknown) else None
-    return samples * (1.0 if scale is None else scale) + (offset or 0.0)
-
-
-def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
-    """Return the record of a test of a case, read from its file.
-
-    Raises RecordError where it cannot be read, or where the steps of the test lie outside it.
-    """
-    f0 = case.plant.given.get("f0", 1.0)
-    record = read_section(file, case.folder, case.kind.per_unit, f0)
-    _refuse_steps_outside(case, test, record, record.source)
+        f0 = case.plant.given.get("f0", 1.0)
+        record = read_section(section, case.folder, case.kind.per_unit, f0)
+    else:
+        signals = {signal: given.signals[signal] for signal in section.channels}
+        for signal, channel in section.channels.items():
+            if isinstance(channel, ChannelSection):  # the start of what the fit finds
+                column = column_of(channel)
+                scale = column.scale if isinstance(channel.scale, Unknown) else 1.0
+                offset = column.offset if isinstance(channel.offset, Unknown) else 0.0
+                signals[signal] = signals[signal] * scale + offset
+        record = replace(given, signals=MappingProxyType(signals))
+    _refuse_other_test(case, recording.test, record)
     return record
 
 
@@ -99,28 +86,35 @@ def read_section(file: RecordFile, folder: Path, per_unit: bool, f0: float = 1.0
     ``per_unit``: numbers that the section takes as they are must not be in another unit by the
     file. ``f0`` is the rated frequency, Hz. Raises RecordError where it cannot be read.
     """
+    alone = (name for name, each in file.channels.items() if per_unit and standing_alone(each))
     return read_record(
         folder / file.file,
         clock_of(file.time),
-        {signal: source_of(channel, signal, f0) for signal, channel in file.channels.items()},
+        {signal: _source_of(channel, signal, f0) for signal, channel in file.channels.items()},
         file.window,
         file.gaps == "skip",
         file.sheet,
         file.resample,
-        frozenset(
-            signal
-            for signal, channel in file.channels.items()
-            if per_unit and standing_alone(channel)
-        ),
+        frozenset(alone),
         file.memory,
-        phasors_of(file.phasors),
-        status_of(file.status),
+        None if file.phasors is None else phasors_of(file.phasors),
+        None if file.status is None else _status_of(file.status),
         file.repeats,
     )
 
 
-def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path) -> None:
-    """Raise RecordError where a record does not hold the test that the case describes."""
+def span_of(test: BumpTest, record: Record) -> Span:
+    """Start of the simulation along a record, and end of the record, s."""
+    begin = float(record.time[0]) if test.begin is None else test.begin
+    return begin, float(record.time[-1])
+
+
+def _refuse_other_test(case: Case, test: BumpTest, record: Record) -> None:
+    """Raise an error where a record does not hold the test that the case describes.
+
+    That is a RecordError, or a CaseError for a table that does not cover it.
+    """
+    path, steady = record.source, test.steady
     start, end = record.time[0], record.time[-1]
     if test.begin is not None:
         if test.begin > start:
@@ -131,14 +125,16 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
         start = test.begin
     for at in test.instants:
         if not start <= at < end:
-            text = (
-                f"holds {show(start)} ... {show(end)} s, but {case.path} has a step at {show(at)} s"
+            hint = (
+                "; is the time column in another unit?" if at > OTHER_CLOCK * max(end, 0.0) else ""
             )
-            hint = f"; {BEFORE_RECORD}" if at < start else _clock_hint(at / max(end, at * TINY))
-            raise RecordError(f"{path}: {text}{hint}")
-    _refuse_other_clock(case, test, record, path)
+            hint = f"; {BEFORE_RECORD}" if at < start else hint
+            raise RecordError(
+                f"{path}: holds {show(start)} ... {show(end)} s, but {case.path} has a step at "
+                f"{show(at)} s{hint}"
+            )
+    _refuse_other_clock(case, test, record)
     _refuse_short_tables(case, test, (float(start), float(end)), path)
-    steady = test.steady
     if steady is not None and steady > end:
         raise RecordError(
             f"{path}: ends at {show(end)} s, before test.steady_until = {show(steady)} s "
@@ -152,27 +148,20 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
         )
 
 
-def _clock_hint(ratio: float) -> str:
-    """Return a question where a step is that many times later than a record ends."""
-    return "; is the time column in another unit?" if ratio > OTHER_CLOCK else ""
-
-
-def _refuse_other_clock(case: Case, test: BumpTest, record: Record, path: Path) -> None:
+def _refuse_other_clock(case: Case, test: BumpTest, record: Record) -> None:
     """Raise RecordError where the steps lie between the first samples, which are seconds apart."""
-    step = float(median(np.diff(record.time)))
-    if test.begin is not None or not test.instants or step < SLOW_SAMPLES:
-        return
-    last = test.instants[-1] - float(record.time[0])
-    if last < step and len(record.time) * step > OTHER_CLOCK * last:
-        raise RecordError(
-            f"{path}: samples are {show(step)} s apart, but {case.path} has its last step "
-            f"{show(last)} s after the first of them: is the time column in another unit?"
-        )
+    spacing = float(median(np.diff(record.time)))
+    if test.begin is None and test.instants and spacing >= SLOW_SAMPLES:
+        last = test.instants[-1] - float(record.time[0])
+        if last < spacing and len(record.time) * spacing > OTHER_CLOCK * last:
+            raise RecordError(
+                f"{record.source}: samples are {show(spacing)} s apart, but the last step of "
+                f"{case.path} is {show(last)} s after the first of them: is the time column in "
+                "another unit?"
+            )
 
 
-def _refuse_short_tables(
-    case: Case, test: BumpTest, covered: tuple[float, float], path: Path
-) -> None:
+def _refuse_short_tables(case: Case, test: BumpTest, covered: Span, path: Path) -> None:
     """Raise CaseError where a table does not cover a test from its start to its end (s)."""
     for signal, table in test.tables.items():
         first, last = table[0][0], table[-1][0]
@@ -182,36 +171,29 @@ def _refuse_short_tables(
             raise CaseError([f"{case.path}: test.{signal}.table: {text}"])
 
 
+# ---- sections as the reader takes them
+
+
 def clock_of(time: Time) -> Clock:
     """Return the place of the time in a file."""
-    if isinstance(time, str):
-        return Clock((time,))
     if isinstance(time, TimeColumn):
         return Clock((time.column,), time.unit)
-    return Clock(time)
+    return Clock((time,) if isinstance(time, str) else time)
 
 
-def phasors_of(section: PhasorsSection | None) -> "Phasors | None":
-    """Return the phasors of a record, None without any."""
-    if section is None:
-        return None
-    from exfit.records.phasors import Phasors
+def phasors_of(section: PhasorsSection) -> "Phasors":
+    """Return the phasors of a record."""
+    from exfit.records.phasors import Phasor, Phasors
 
-    current = None if section.current is None else _phasor(section.current)
-    return Phasors(_phasor(section.voltage), current, section.kV, section.MVA)
-
-
-def _phasor(section: VoltagePhasor | CurrentPhasor) -> "Phasor":
-    from exfit.records.phasors import Phasor
-
-    connection = section.connection if isinstance(section, VoltagePhasor) else None
-    return Phasor(section.magnitude, section.angle, section.unit, section.angle_unit, connection)
+    own, other = section.voltage, section.current
+    voltage = Phasor(own.magnitude, own.angle, own.unit, own.angle_unit, own.connection)
+    current = None
+    if other is not None:
+        current = Phasor(other.magnitude, other.angle, other.unit, other.angle_unit)
+    return Phasors(voltage, current, section.kV, section.MVA)
 
 
-def status_of(section: StatusSection | None) -> "Status | None":
-    """Return the flags of a record, None without any."""
-    if section is None:
-        return None
+def _status_of(section: StatusSection) -> "Status":
     from exfit.records.status import Status
 
     return Status(section.column, tuple(map(str, section.accept)))
@@ -232,20 +214,66 @@ def standing_alone(channel: ChannelSection | PhasesSection | ReferenceFile) -> b
     return channel.unit is None and channel.base is None and channel.scale == 1.0
 
 
-def source_of(
+def _source_of(
     channel: ChannelSection | PhasesSection, signal: str, f0: float
 ) -> Column | ThreePhases:
     """Return the place of a signal: a column, or three; ``f0`` is the rated frequency, Hz."""
-    if isinstance(channel, ChannelSection):
-        column = column_of(channel)
-        if signal in OF_EVENT and channel.unit is not None:
-            return column._replace(base=base_of_own(channel.unit, SIGNALS[signal].unit, f0))
-        return column
-    return ThreePhases(
-        channel.phases,
-        channel.kind,
-        channel.unit,
-        channel.base,
-        channel.connection,
-        channel.cycles,
-    )
+    if isinstance(channel, PhasesSection):
+        connection = (channel.connection, channel.cycles)
+        return ThreePhases(channel.phases, channel.kind, channel.unit, channel.base, *connection)
+    column = column_of(channel)
+    if signal in OF_EVENT and channel.unit is not None:
+        return column._replace(base=base_of_own(channel.unit, SIGNALS[signal].unit, f0))
+    return column
+
+
+# ---- levels of a record at its start, where its signals are at rest
+
+
+def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
+    """Parameters that a record gives: the levels of its signals at the start."""
+    kind, vt0 = case.kind, initial_level(test, record, "vt")
+    low, high = POSSIBLE_VOLTAGES
+    if kind.per_unit and (kind.has_machine or not kind.levels) and not low <= vt0 <= high:
+        raise RecordError(
+            f"{record.source}: vt rests at {vt0:.4g} pu, outside {low:g} ... {high:g}: its unit, "
+            "base or scale is another"
+        )
+    levels = {initial("speed"): 1.0} if "speed" in kind.levels else {}
+    for signal in kind.levels:
+        if signal in record.signals:
+            levels[initial(signal)] = mean_at_rest(test, record, signal)
+    levels[VT0] = vt0
+    if kind.scaled:
+        levels[DRIVING_SCALE] = 1.0
+    given = {initial(name): v for name, v in case.plant.given.items() if name in kind.driving}
+    return {**levels, **given}
+
+
+def deviation(test: BumpTest, record: Record, signal: str) -> Array:
+    """Deviation of a recorded signal (M,) from its start."""
+    return record.signals[signal] - initial_level(test, record, signal)
+
+
+def initial_level(test: BumpTest, record: Record, signal: str) -> float:
+    """Return the level of a signal before the first step.
+
+    It is the record's mean, of the voltage as the test gives it if it does.
+    """
+    vt0 = start_value(test.vt0) if signal == "vt" else None
+    return mean_at_rest(test, record, signal) if vt0 is None else vt0
+
+
+def mean_at_rest(test: BumpTest, record: Record, signal: str) -> float:
+    """Return the mean of a recorded signal while the unit is still at rest.
+
+    Raises RecordError where it has no sample there.
+    """
+    until = np.inf if test.steady is None else test.steady
+    rest = record.signals[signal][record.time < until]
+    rest = rest[np.isfinite(rest)]
+    if not len(rest):
+        raise RecordError(
+            f"{record.source}: {signal}: no sample before {show(until)} s: its start is unknown"
+        )
+    return float(np.mean(rest))

@@ -15,6 +15,7 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import METHODS_OF_AUTO, NO_JUDGE, Announce, Judge, no_doubt
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
@@ -33,7 +34,6 @@ from exfit.fitting.residuals import (
     Residuals,
     SimulationCounter,
 )
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.util.strategies import (

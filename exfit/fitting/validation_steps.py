@@ -22,8 +22,8 @@ from exfit.case.schema import (
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.recordings import clock_of, read_section
-from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import REFERENCES
 from exfit.records.formats import open_table
 from exfit.records.inspection import Inspection, inspect

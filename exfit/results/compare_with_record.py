@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, RemovedLine, features
 from exfit.dsp.recorded_features import FoundByRecord, RecordedResponse, recorded_features
-from exfit.fitting.experiment import Channel
-from exfit.fitting.setup import ExperimentSetup, compared
+from exfit.fitting.experiment import Channel, ExperimentSetup, compared
 from exfit.results.comparisons import (
     Comparison,
     DrivingSignal,
@@ -60,7 +59,7 @@ def compare_with_record(
         )
         for k, channel in enumerate(setup.channels)
     }
-    errors = setup.experiment.compared(samples, at)
+    errors = setup.experiment.compared(samples[None], [at])[0]
     channels = {signal: match_of(overlay) for signal, overlay in overlays.items()}
     if moves is None:
         moves = [{parameter.name: 1.0} for parameter in setup.free]

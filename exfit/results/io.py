@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exfit.errors import ExfitError
-from exfit.fitting.nuisances.parameters import prefix_from
+from exfit.fitting.nuisances import prefix_from
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
 from exfit.results.tables import (

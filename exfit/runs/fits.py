@@ -15,8 +15,7 @@ from exfit.fitting.build import build_experiment
 from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import outcome_of
-from exfit.runs.names import distinct_names, numbered
-from exfit.runs.runner import run_in_turn
+from exfit.runs.runner import distinct_names, numbered, run_in_turn
 from exfit.util.typed import plain
 
 Progress = Iteration | estimate.Progress

@@ -1,6 +1,8 @@
 """The runner of a plan: one run after the other in this process, whatever becomes of each."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from exfit.errors import ExfitError
@@ -78,3 +80,29 @@ def run_in_turn(
     ended = {*failed, *(done.name for done in runs)}
     left = tuple(planned.name for planned in plan if planned.name not in ended)
     return Runs(tuple(runs), failed, left, interrupted)
+
+
+def distinct_names(paths: Sequence[Path]) -> list[str]:
+    """Return the stem of each path, behind the name of its folder where several have one stem.
+
+    What is the same even so is numbered; capitals make no difference, as on some disks.
+    """
+    stems = Counter(path.stem.casefold() for path in paths)
+    return numbered(
+        f"{path.absolute().parent.name}-{path.stem}"
+        if stems[path.stem.casefold()] > 1
+        else path.stem
+        for path in paths
+    )
+
+
+def numbered(names: Iterable[str]) -> list[str]:
+    """Return names with a number behind each that repeats an earlier one."""
+    taken: dict[str, str] = {}
+    for name in names:
+        candidate, number = name, 1
+        while candidate.casefold() in taken:
+            number += 1
+            candidate = f"{name}-{number}"
+        taken[candidate.casefold()] = candidate
+    return [*taken.values()]

@@ -1,6 +1,6 @@
 """The strategies of a descent, and how far a search goes, in words.
 
-`exfit.estimate.run` holds the functions of the strategies.
+`exfit.estimate.solver` holds the functions of the strategies.
 """
 
 from collections.abc import Mapping

@@ -10,11 +10,10 @@ from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable
 from exfit.dsp.jumps import scatter
-from exfit.fitting.experiment import Channel
+from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.fitting.global_search import AT_TOLERANCE
-from exfit.fitting.recorded.references import is_table
+from exfit.fitting.recorded_steps import is_table
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
 from exfit.plants import REFERENCES

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.dsp.noise import drift_at_rest
-from exfit.fitting.experiment import Channel
-from exfit.fitting.recorded.switchings import MASKED
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.experiment import MASKED, Channel, ExperimentSetup
 from exfit.fitting.system import typical_values_used
 from exfit.plants import BREAKER, GOVERNOR, NETWORK, SPEED, acts_without_load
 from exfit.records.record import Record

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
+from exfit.fitting.nuisances import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slopes_of

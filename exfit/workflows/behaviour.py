@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from exfit.errors import SimulationError
-from exfit.fitting.experiment import Experiment
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.experiment import Experiment, ExperimentSetup
 from exfit.results.description import Behaviour, FlatRun, HitLimits, SmallSignalView
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.limits import limits_hit

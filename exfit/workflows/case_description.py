@@ -21,9 +21,9 @@ from exfit.case.schema import (
     ReferenceTable,
     Unknown,
 )
-from exfit.fitting.nuisances.parameters import OPENING, prefix_of
+from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.nuisances import OPENING, prefix_from
 from exfit.fitting.program import Program
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import driving_after_opening
 from exfit.inference.confidence import Interval
 from exfit.plants import NETWORK, REFERENCES
@@ -253,7 +253,7 @@ def _done(
 
 def _events(case: Case, recording: Recording, identified: Identified) -> Iterator[str]:
     """Describe the steps and switchings of a test."""
-    test, prefix = recording.test, prefix_of(recording)
+    test, prefix = recording.test, prefix_from(recording.name)
     if test.vt0 is not None:
         yield f"vt0 {_given(test.vt0, 'g', 'pu', identified.get(f'{prefix}vt0'))}"
     for signal in REFERENCES:

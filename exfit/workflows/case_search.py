@@ -21,12 +21,12 @@ from exfit.fitting.channel_weights import (
     weighted_alike,
 )
 from exfit.fitting.descents import Announce, Judge
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import continued_from, names_of_records, search
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.registry import parts
 from exfit.results.intervals.determination import (
@@ -125,7 +125,7 @@ def lines(state: SearchState) -> SearchState:
     Before that search nothing tells them from a response. Raises KeyboardInterrupt where an
     interruption ends it.
     """
-    from exfit.fitting.nuisances.found_lines import with_found_lines
+    from exfit.fitting.sines import with_found_lines
 
     if not any(setup.automatic_sines for setup in state.setups):
         return state

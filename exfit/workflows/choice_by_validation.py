@@ -8,9 +8,9 @@ from exfit.case.case import Case
 from exfit.errors import SimulationError
 from exfit.estimate import Result
 from exfit.fitting.descents import Judge
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, noise_of
-from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.noise import LEAST_P, SURPRISING, whiteness
 from exfit.inference.wording import digits
 from exfit.results.compare_with_record import compare_with_record

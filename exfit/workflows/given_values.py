@@ -11,9 +11,7 @@ from exfit.case.case import Case
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.fitting.nuisances.parameters import names_of
-from exfit.fitting.recorded.references import with_recorded_steps
-from exfit.fitting.recorded.switchings import names_of_switchings
+from exfit.fitting.nuisances import names_of
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
 from exfit.util.sources import SOURCES
@@ -202,6 +200,9 @@ def _wrong_sources(given: Any) -> Iterator[str]:
 
 def _of_records(case: Case) -> list[str]:
     """Return the names of all that a fit of a case finds about its records."""
+    from exfit.fitting.event import names_of_switchings
+    from exfit.fitting.recorded_steps import with_recorded_steps
+
     recordings = [with_recorded_steps(case, recording) for recording in case.recordings]
     return [
         name

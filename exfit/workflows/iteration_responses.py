@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.fitting.experiment import ExperimentSetup, compared
 from exfit.fitting.residuals import UNREACHABLE, Residuals
-from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.comparisons import Comparison, IterationResponses, judged_of
 from exfit.results.model import Iteration
 

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
-from exfit.fitting.experiment import Experiment
+from exfit.fitting.experiment import Experiment, ExperimentSetup
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import ExperimentSetup
 from exfit.models.blocks import SHORTEST
 from exfit.signals import OF_FLAT_RUN
 from exfit.verdict.causes.before_fit import case_warnings, event_warnings, record_warnings

@@ -12,9 +12,9 @@ from exfit.case.case import Case
 from exfit.case.schema import AsFoundSection
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.models import find
 from exfit.results.compare_with_record import compare_with_record

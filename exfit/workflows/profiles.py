@@ -13,12 +13,12 @@ from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.channel_weights import as_fitted
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference.confidence import LEVEL, Interval
 from exfit.results.compare_with_record import compare_with_record

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
+from exfit.fitting.experiment import with_enough_substeps
 from exfit.fitting.program import Program
-from exfit.fitting.setup import with_enough_substeps
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.simulation.simulator import Response

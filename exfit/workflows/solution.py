@@ -12,13 +12,13 @@ from exfit.case.saturation import MEANINGS
 from exfit.case.schema import SINGLE
 from exfit.fitting.channel_weights import balanced, weight_notes
 from exfit.fitting.descents import descent_near
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import FreeParameter, scaled_values
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.program import Program
-from exfit.fitting.recorded.shown_instants import instants_of, with_shown_instants
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.shown_instants import instants_of, with_shown_instants
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Uncertainty
 from exfit.results.acceptance import judged
@@ -269,7 +269,7 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
     periodic disturbance that stands out of what is left then. The test has sub-steps enough, and
     bounds within which the record allows the instants. Raises KeyboardInterrupt at an interruption.
     """
-    from exfit.fitting.nuisances.found_lines import with_found_lines
+    from exfit.fitting.sines import with_found_lines
 
     fine, held = setup.with_enough_substeps(values), frozenset[str]()
     if not case.has_no_equations:  # whose every response is a run

@@ -13,11 +13,11 @@ from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import scaled_values
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.program import Program, by_program
-from exfit.fitting.recorded.shown_instants import instants_of
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.shown_instants import instants_of
 from exfit.fitting.system import values_of
 from exfit.fitting.validation_steps import GivenSteps, SetupOfRecord, with_steps_of_record
 from exfit.records.channel_inspection import SPIKE_LIMIT

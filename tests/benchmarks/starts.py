@@ -19,7 +19,7 @@ from rich.table import Table
 
 from exfit.case.load import load_case
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.forms.legs import legs_of
+from exfit.fitting.further_starts import legs_of
 from exfit.fitting.global_search import MERGED, last_leg
 from exfit.fitting.search import fitted
 

@@ -18,8 +18,7 @@ from exfit.case.load import load_case, parse_case
 from exfit.case.schema import CaseDocument
 from exfit.case.yaml import scalar
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.levels import initial_voltage
-from exfit.fitting.recordings import measured
+from exfit.fitting.recordings import initial_level, record_of
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import MACHINE, SATURATION
@@ -254,7 +253,7 @@ record:
 """
         )
     )
-    one, other = (measured(case, case.test, case.record) for case in (plain, field))
+    one, other = (record_of(case, case.recordings[0]) for case in (plain, field))
     assert np.array_equal(one.time, other.time)
     for signal in ("vt", "ifd"):
         assert other.signals[signal] == pytest.approx(one.signals[signal], rel=1e-6)
@@ -932,7 +931,7 @@ def write_record(folder, times, rise=0.05):
 def test_a_record_is_read_beside_the_case(case_file, tmp_path):
     write_record(tmp_path / "data", np.arange(0.0, 5.0, 0.01))
     case = load_case(case_file(EXAMPLE))
-    record = measured(case, case.test, case.record)
+    record = record_of(case, case.recordings[0])
     assert record.source == tmp_path / "data" / "up.csv"
     assert set(record.signals) == {"vt", "efd"}
     assert np.all(record.signals["efd"] == 0.0)
@@ -941,9 +940,9 @@ def test_a_record_is_read_beside_the_case(case_file, tmp_path):
 def test_the_initial_voltage_is_given_or_the_mean_before_the_first_step(case_file, tmp_path):
     write_record(tmp_path / "data", np.arange(0.0, 5.0, 0.01))
     case = load_case(case_file(changed("vt0: 1.0", "vt0: 1.02")))
-    assert initial_voltage(case.test, measured(case, case.test, case.record)) == 1.02
+    assert initial_level(case.test, record_of(case, case.recordings[0]), "vt") == 1.02
     case = load_case(case_file(changed("  vt0: 1.0\n", "")))
-    assert initial_voltage(case.test, measured(case, case.test, case.record)) == 1.0
+    assert initial_level(case.test, record_of(case, case.recordings[0]), "vt") == 1.0
 
 
 @pytest.mark.parametrize(
@@ -962,7 +961,7 @@ def test_a_record_that_does_not_hold_its_test_is_refused(case_file, tmp_path, ti
     write_record(tmp_path / "data", times)
     case = load_case(case_file(text))
     with pytest.raises(RecordError) as caught:
-        measured(case, case.test, case.record)
+        record_of(case, case.recordings[0])
     for part in named:
         assert part in str(caught.value)
 
@@ -993,15 +992,15 @@ def test_numbers_in_kv_are_not_taken_for_per_unit(case_file, tmp_path, started, 
     case = load_case(case_file(IN_KV.format(model=started[0], plant=started[1], vt=vt)))
     if refused:
         with pytest.raises(RecordError, match=r"up\.csv: column 'Ut \[kV\]': in kV .* unit: kV"):
-            measured(case, case.test, case.record)
+            record_of(case, case.recordings[0])
     else:
-        assert len(measured(case, case.test, case.record).time) == 3
+        assert len(record_of(case, case.recordings[0]).time) == 3
 
 
 def test_a_missing_record_is_reported_when_it_is_read(case_file):
     case = load_case(case_file(EXAMPLE))
     with pytest.raises(RecordError, match=r"up\.csv: cannot be read"):
-        measured(case, case.test, case.record)
+        record_of(case, case.recordings[0])
 
 
 LINES = EXAMPLE.splitlines(keepends=True)

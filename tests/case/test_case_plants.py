@@ -9,7 +9,7 @@ from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.input_steps import input_steps
+from exfit.fitting.build import input_steps
 from exfit.fitting.system import inputs_of, system_of
 from exfit.show.run_folder import PARAMETERS, write_fit
 from exfit.verdict.run_quality import typical_notes

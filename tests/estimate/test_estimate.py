@@ -16,8 +16,8 @@ from tiers import few_of
 from exfit import estimate
 from exfit.estimate import least_squares
 from exfit.estimate.linear import bounded_minimum
-from exfit.estimate.run import STRATEGIES
 from exfit.estimate.searches import ArmijoDamping, FullStep, LineSearch, RatioDamping, TrustRegion
+from exfit.estimate.solver import STRATEGIES
 from exfit.util.strategies import PHASES
 from exfit.util.strategies import STRATEGIES as EXPLANATIONS
 

@@ -13,7 +13,7 @@ from tiers import few_of
 
 from exfit.estimate import STATUS, Stop, least_squares
 from exfit.estimate.problem import half_square
-from exfit.estimate.run import STRATEGIES
+from exfit.estimate.solver import STRATEGIES
 
 EVERY_METHOD = list(STRATEGIES)
 SAFE_METHODS = [method for method in STRATEGIES if method != "gn"]  # full steps may diverge

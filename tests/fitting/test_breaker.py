@@ -24,7 +24,7 @@ from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.errors import RecordError
 from exfit.fitting.build import build_experiments
-from exfit.fitting.nuisances.parameters import names_of
+from exfit.fitting.nuisances import names_of
 from exfit.records.record import Record
 
 
@@ -89,7 +89,7 @@ def test_the_level_before_the_opening_is_found_with_the_rest():
     case = case_of(REACTIVE, D_AXIS)
     (setup,) = build_experiments(case)
     assert [parameter.name for parameter in setup.free] == ["vt0"]
-    assert names_of(case.recordings[0]) == ("vt0",)
+    assert tuple(names_of(case.recordings[0])) == ("vt0",)
 
 
 def test_the_instant_is_found_between_the_samples_of_the_jump():

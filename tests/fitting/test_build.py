@@ -13,7 +13,7 @@ from tiers import few_of
 from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.build import build_experiments
-from exfit.fitting.recordings import measured
+from exfit.fitting.recordings import record_of
 from exfit.fitting.system import values_of
 from exfit.plants import SATURATION, VT0
 from exfit.results.compare_with_record import compare_with_record
@@ -61,7 +61,7 @@ def test_only_the_samples_within_the_window_are_measured_and_fitted(load):
     """Outside it the record is spoilt; both ends belong to it."""
     inside = (TIME > 0.24) & (TIME < 2.51)
     case = load(changed(CASE, "record", window=[0.25, 2.5]), vt=np.where(inside, TRUTH, 9.0))
-    record = measured(case, case.test, case.record)
+    record = record_of(case, case.recordings[0])
     assert record.time == pytest.approx(TIME[inside], abs=1e-9)
     assert (record.time[0], record.time[-1]) == (0.25, 2.5)
     found = fit(case)

@@ -8,8 +8,8 @@ from exfit.case.case import Case
 from exfit.dsp.jumps import jumps_while_moving
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.recorded.event import with_even_clock
-from exfit.fitting.recorded.switchings import MASKED, names_of_switchings
+from exfit.fitting.event import names_of_switchings, with_even_clock
+from exfit.fitting.experiment import MASKED
 from exfit.records.record import Record
 
 TIME = np.arange(600) / 60.0

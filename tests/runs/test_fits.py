@@ -12,7 +12,7 @@ import exfit
 from exfit.errors import CaseError
 from exfit.results.side_by_side import parameters_beside, results_table
 from exfit.runs.fits import fit_all, planned, run_all
-from exfit.runs.names import distinct_names
+from exfit.runs.runner import distinct_names
 
 STRATEGIES = ("dgn", "lm")
 STEP = FIRST_ORDER["test"]

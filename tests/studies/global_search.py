@@ -22,7 +22,7 @@ from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.estimate import Descent
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.forms.legs import legs_of
+from exfit.fitting.further_starts import legs_of
 from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.fitting.search import LIKELIHOOD_RATIO, fitted, search

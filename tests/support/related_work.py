@@ -17,9 +17,8 @@ from places import CONFIGS
 
 from exfit.case.load import load_case
 from exfit.estimate import Descent, Functions, spread
-from exfit.estimate.run import NotFinite
-from exfit.fitting.forms.coarse import coarse_form
-from exfit.fitting.forms.linear import linear_form
+from exfit.estimate.solver import NotFinite
+from exfit.fitting.further_starts import coarse_form, linear_form
 from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.fitting.search import LIKELIHOOD_RATIO, fitted

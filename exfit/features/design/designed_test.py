@@ -30,11 +30,10 @@ from exfit.features.design.candidates import (
 )
 from exfit.features.design.experiment_design import noise_levels, refuse_noise
 from exfit.fitting.build import build_experiments, planned
-from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.nuisances.kinds import OF_SYSTEM
+from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
+from exfit.fitting.nuisances import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import with_enough_substeps
 from exfit.simulation.simulator import Run
 from exfit.util.text import near
 from exfit.util.typed import plain

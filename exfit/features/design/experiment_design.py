@@ -20,11 +20,10 @@ from exfit.case.case import Case
 from exfit.dsp.noise import noise as noise_of
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, planned
-from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import free_parameters, problem_of
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncertainty_of
 from exfit.inference.confidence import Confidence
 from exfit.plants import REFERENCES

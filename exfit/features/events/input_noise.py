@@ -26,11 +26,10 @@ from exfit.dsp.noise import noise
 from exfit.dsp.sampling import sampling_of
 from exfit.estimate import LocalMinimum, Progress, Stop
 from exfit.fitting.descents import descent_near, minimum_near, stopped
-from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
-from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.whitening import PropagatedNoise, whitening
 from exfit.inference.wording import digits, listed
 from exfit.plants.parts import initial

@@ -18,7 +18,7 @@ from exfit.dsp.quality import noise_of, spikes
 from exfit.dsp.sampling import sampling_of
 from exfit.errors import SimulationError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.recorded.event import with_rest
+from exfit.fitting.event import with_rest
 from exfit.fitting.recordings import record_of
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record

@@ -21,7 +21,7 @@ from typing import Any
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
-from exfit.runs.names import distinct_names
+from exfit.runs.runner import distinct_names
 from exfit.runs.store import read_kept, text_of
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import prepare, write, write_quickly, write_together

@@ -12,7 +12,7 @@ from exfit.cli.options import refuse_existing
 from exfit.cli.streams import echo
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.simulation.inputs import SplinedInput
 
 DIGITS = 9  # significant, of every number

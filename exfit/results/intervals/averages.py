@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import SimulationError
+from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.forms.averaged import finds_instant, with_averages
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis

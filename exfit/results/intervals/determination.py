@@ -17,13 +17,12 @@ from exfit import estimate
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.estimate.lockstep import finish_all
-from exfit.fitting.experiment import Experiment
+from exfit.fitting.experiment import Experiment, ExperimentSetup
 from exfit.fitting.global_search import AT_TOLERANCE, SearchResult
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.fitting.search import names_of_records
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import (
     UncertaintyAnalysis,
     nonlinear_parameters,

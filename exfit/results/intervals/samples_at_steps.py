@@ -19,7 +19,7 @@ from exfit.dsp.filtering import Filtering
 from exfit.errors import SimulationError
 from exfit.fitting.descents import minimum_near
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.nuisances.parameters import prefix_from
+from exfit.fitting.nuisances import prefix_from
 from exfit.fitting.problem import FitProblem, problem_of
 from exfit.signals import SIGNALS
 

@@ -12,8 +12,8 @@ from exfit.case.case import Case
 from exfit.case.schema import RecordFile, Recording, start_value
 from exfit.dsp.quality import noise_of
 from exfit.dsp.sampling import present_samples
-from exfit.fitting.nuisances.parameters import prefix_of
-from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.nuisances import prefix_from
 from exfit.plants import MACHINE
 from exfit.registry import parts
 from exfit.results.compare_with_record import compare_with_record
@@ -47,7 +47,7 @@ def _large_steps(recording: Recording) -> Iterator[str]:
     for k, event in enumerate(recording.test.events("vref")):
         size = start_value(event.step)
         if size is not None and abs(size) > LARGEST_STEP:
-            yield f"{prefix_of(recording)}test.vref[{k}].step: {size_in_words(size)}"
+            yield f"{prefix_from(recording.name)}test.vref[{k}].step: {size_in_words(size)}"
 
 
 def _overlap(fitted: Recording, validation: Recording) -> Iterator[str]:

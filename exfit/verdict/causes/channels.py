@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.filtering import Filtering
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.residuals import Residuals
 from exfit.plants import VT0
 from exfit.results.comparisons import Overlay

@@ -11,8 +11,8 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
 from exfit.estimate import Progress
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.residuals import Residuals, noise_of
-from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
 from exfit.results.influences import RecorderAverages, TypicalValue

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.step_detection import first_step
+from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.experiment import Channel
-from exfit.fitting.forms.averaged import finds_instant, with_averages
-from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.fitting.nuisances import Nuisance
 from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.ripple import MAINS, Ripple
 from exfit.results.verdict import Cause

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.fitting.nuisances import Nuisance
 from exfit.results.verdict import Cause
 from exfit.simulation.inputs import InputStep
 from exfit.simulation.simulator import Simulator

@@ -11,7 +11,7 @@ from exfit import estimate
 from exfit.errors import SimulationError
 from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slices

@@ -11,8 +11,8 @@ from tiers import few_of
 import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.features.external import fmu_program
-from exfit.features.external.fmu_file import FmuDescription, FmuVariable
+from exfit.features.external import case_program
+from exfit.features.external.fmu import FmuDescription, FmuVariable
 from exfit.workflows import check
 
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
@@ -201,9 +201,9 @@ DESCRIPTION = FmuDescription(
 
 def test_all_that_an_fmu_has_no_variable_for_is_reported_together(record, tmp_path):
     unit = of_fmu(record, "unit.fmu", names={"K": "avr.k_", "TE": "avr.TE"}, outputs={"vt": "V"})
-    program = fmu_program.FmuProgram(unit.external, "", tmp_path, DESCRIPTION)
+    program = case_program.FmuProgram(unit.external, "", tmp_path, DESCRIPTION)
     with pytest.raises(CaseError) as faults:
-        fmu_program.refuse_unknown_variables(unit, program, [(_test_of(unit), ("vt",))])
+        case_program.refuse_unknown_variables(unit, program, [(_test_of(unit), ("vt",))])
     text = str(faults.value)
     assert "plant.names.K: unit.fmu has no variable avr.k_; did you mean avr.K?" in text
     assert "plant.names.TE: avr.TE is not a parameter that can be set but fixed calc" in text

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import exfit
-from exfit.features.external.process import ExternalProcess, ProgramError
+from exfit.features.external.program import ExternalProcess, ProgramError
 
 on_linux = pytest.mark.skipif(sys.platform != "linux", reason="the states are those of /proc")
 ECHO = "import sys, json\nfor line in sys.stdin:\n    print({answer}, flush=True)\n"
@@ -89,7 +89,7 @@ HANGING = "import os; open('pid', 'w').write(str(os.getpid())); import time; tim
 KILLED = f"""
 import sys
 from pathlib import Path
-from exfit.features.external.process import ExternalProcess
+from exfit.features.external.program import ExternalProcess
 ExternalProcess([sys.executable, "-c", {HANGING!r}], Path(".")).answer({{"id": 1}}, 600.0)
 """
 

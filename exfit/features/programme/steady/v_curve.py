@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.estimate.run import NotFinite
+from exfit.estimate.solver import NotFinite
 from exfit.features.programme.steady.fields_on_load import (
     FieldsOnLoad,
     PointsOnLoad,

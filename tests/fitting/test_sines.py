@@ -7,7 +7,7 @@ from records import NOISE, TEST, TIME, UNIT, found_in, one
 import exfit
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiments
-from exfit.fitting.nuisances.parameters import names_of
+from exfit.fitting.nuisances import names_of
 from exfit.fitting.problem import problem_of, residuals_of
 
 FREE = ("KA", "KF", "TE", "TF", "TA")

@@ -6,8 +6,7 @@ from places import ROOT
 from records import case_of, config
 
 from exfit.case.load import load_case
-from exfit.fitting.forms.coarse import COARSENESS, coarse_form
-from exfit.fitting.forms.linear import linear_form
+from exfit.fitting.further_starts import COARSENESS, coarse_form, linear_form
 from exfit.fitting.search import fitted
 
 KNOWN = {

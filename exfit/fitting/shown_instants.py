@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.step_detection import CHI_SQUARE, MEDIAN_SAMPLES, interval_below, running_median
+from exfit.fitting.experiment import ExperimentSetup, compared
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import noise_of
-from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.plants import BREAKER
 from exfit.util.sorting import median
 

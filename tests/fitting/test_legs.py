@@ -5,7 +5,7 @@ from places import ROOT
 
 from exfit.case.load import load_case
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.forms.legs import legs_of
+from exfit.fitting.further_starts import legs_of
 from exfit.fitting.global_search import last_leg
 from exfit.fitting.search import fitted
 

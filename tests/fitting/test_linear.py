@@ -10,9 +10,8 @@ from records import TEST, TIME, UNIT, case_of, one, synthetic, write
 
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
-from exfit.fitting.forms.compression import compressed
-from exfit.fitting.forms.linear import linear_form
-from exfit.fitting.problem import residuals_of
+from exfit.fitting.further_starts import linear_form
+from exfit.fitting.problem import compressed, residuals_of
 
 STEPS = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}, {"at": 3.0, "step": -0.08}]}
 CHANNELS = {"vt": "vt", "efd": {"column": "efd", "weight": 0.02}}

@@ -1,1 +1,0 @@
-"""Other forms of the residuals of a fit, on which searches descend."""

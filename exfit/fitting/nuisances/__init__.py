@@ -1,1 +1,0 @@
-"""What a fit finds about records beside the parameters of the unit."""
