@@ -25,9 +25,13 @@ from exfit.inference.confidence import (
     partners_on_bounds,
     rises,
 )
-from exfit.inference.identifiability import Identifiability, identifiability
+from exfit.inference.identifiability import (
+    Identifiability,
+    ParameterEffect,
+    effects,
+    identifiability,
+)
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
-from exfit.inference.sensitivity import ParameterEffect, effects
 from exfit.inference.wording import listed
 from exfit.util.typed import IN_FILE, KEY
 

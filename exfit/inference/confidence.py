@@ -8,11 +8,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from exfit.inference.factors import Factors, factored
-from exfit.inference.linear import Array, Linearisation
+from exfit.inference.linear import Array, Factors, Linearisation, factored
 from exfit.inference.noise import Noise, noise_of
 from exfit.inference.quantiles import student_quantile, wave_quantile
-from exfit.inference.wording import digits, error, listed
+from exfit.inference.wording import digits, listed
 from exfit.util.typed import IN_FILE
 
 LEVEL = 0.95
@@ -92,9 +91,8 @@ class Confidence:
     @property
     def variance(self) -> float:
         """The variance of a weighted error, widened where errors are not white: of all channels."""
-        squares = [channel_noise.spread**2 for channel_noise in self.noise]
-        samples = [channel_noise.samples for channel_noise in self.noise]
-        return float(np.average(squares, weights=samples))
+        squares = [each.spread**2 for each in self.noise]
+        return float(np.average(squares, weights=[each.samples for each in self.noise]))
 
 
 def confidence(
@@ -118,7 +116,10 @@ def confidence(
     noise = noise_of(factors)
     relative = factors.covariance(noise)
     errors = np.sqrt(np.diag(relative))
-    dof = degrees_of_freedom(factors, noise)
+    # the effective samples less the parameters that they determine
+    dof = max(sum(each.effective for each in noise) - factors.leverage, 1.0)
+    if all(each.accepted and each.inflation == 1.0 for each in noise):
+        dof = inf
     quantiles = quantiles_of(factors, noise, dof)
     with np.errstate(invalid="ignore"):
         correlation = relative / np.outer(errors, errors)  # nan for errors of 0
@@ -126,20 +127,12 @@ def confidence(
         level=LEVEL,
         dof=dof,
         parameters={
-            name: uncertainty(
-                factors,
-                k,
-                float(errors[k]),
-                float(quantiles[k]),
-                reason(factors, k, float(errors[k]), data, hint),
-            )
+            name: _uncertainty(factors, k, float(errors[k]), float(quantiles[k]), data, hint)
             for k, name in enumerate(lin.names)
         },
         correlation=Correlation(lin.names, correlation),
         noise=noise,
-        sentences=tuple(
-            text for channel_noise in noise for text in channel_noise.sentences(len(noise) == 1)
-        ),
+        sentences=tuple(text for each in noise for text in each.sentences(len(noise) == 1)),
         covariance=relative * np.outer(lin.size, lin.size),
     )
 
@@ -214,20 +207,14 @@ def partners_on_bounds(
     }
 
 
-def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
-    """Return the effective samples less the parameters that they determine, at least 1."""
-    if all(channel_noise.accepted and channel_noise.inflation == 1.0 for channel_noise in noise):
-        return inf
-    return max(sum(channel_noise.effective for channel_noise in noise) - factors.leverage, 1.0)
+def _uncertainty(
+    factors: Factors, k: int, share: float, t: float, data: str, hint: str
+) -> Uncertainty:
+    """Return the uncertainty of parameter k, by its standard error: a share of 100 %.
 
-
-def uncertainty(factors: Factors, k: int, share: float, t: float, why: str | None) -> Uncertainty:
-    """Uncertainty of parameter k.
-
-    ``share``: its standard error, of 100 %; ``t``: half of its interval in standard errors;
-    ``why`` it has no interval.
+    ``t`` is half of its interval in standard errors.
     """
-    lin = factors.lin
+    lin, why = factors.lin, _reason(factors, k, share, data, hint)
     if not isfinite(share):
         return Uncertainty(None, None, None, why)
     value, std = float(lin.values[k]), share * float(lin.size[k])
@@ -241,7 +228,7 @@ def uncertainty(factors: Factors, k: int, share: float, t: float, why: str | Non
     return Uncertainty(std, relative, interval, None, "linear")
 
 
-def reason(factors: Factors, k: int, share: float, data: str, hint: str) -> str | None:
+def _reason(factors: Factors, k: int, share: float, data: str, hint: str) -> str | None:
     """Word the reason for which a parameter has no interval."""
     lin = factors.lin
     if lin.held[k] is not None:
@@ -255,6 +242,6 @@ def reason(factors: Factors, k: int, share: float, data: str, hint: str) -> str 
     relative = share * float(lin.size[k] / lin.own_size[k])
     if relative > UNDETERMINED:
         by_value = lin.own_size[k] == abs(lin.values[k])
-        words = f"{digits(100.0 * relative)} %" if by_value else error(lin, k, share)
+        words = f"{digits(100.0 * relative)} %" if by_value else lin.error_in_words(k, share)
         return f"is not determined by {data}: standard error {words}{hint}"
     return None

@@ -7,9 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from exfit.inference.autoregression import Autoregression, Described, described
-from exfit.inference.factors import Factors
-from exfit.inference.linear import Array, ResidualBlock
+from exfit.inference.linear import Array, Factors, ResidualBlock
 from exfit.inference.quantiles import chi_square_tail
 from exfit.inference.wording import digits
 
@@ -21,6 +19,46 @@ SAMPLES_PER_LAG = 5
 SEEN = 0.01
 ROUNDING = 1e-6  # of the variance of a channel
 LEAST_P = 1e-10  # a probability below it is not worth its digits
+# of an autoregression
+HIGHEST_ORDER = 4
+SAMPLES_PER_COEFFICIENT = 20
+LEAST_SEEN = 1e-6  # of the largest singular value: rounding, no direction of the slopes
+LARGEST_PARTIAL = 0.9999  # a partial autocorrelation of 1 is no stationary series
+
+
+class Autoregression(NamedTuple):
+    """A stationary series e[k] = sum of a[j] e[k-1-j] + v[k], v white.
+
+    ``partial``: its partial autocorrelations, each between -1 and 1; as many as its order.
+    """
+
+    partial: tuple[float, ...]
+
+    @property
+    def coefficients(self) -> Array:
+        """The coefficients a."""
+        return _coefficients(np.array(self.partial))
+
+    @property
+    def share(self) -> float:
+        """The variance of v over that of e."""
+        return float(np.prod(1.0 - np.square(self.partial)))
+
+    @property
+    def inflation(self) -> float:
+        """The variance of a long mean over that of white errors: the sum of autocorrelations."""
+        return self.share / float(1.0 - np.sum(self.coefficients)) ** 2
+
+    def correlated(self, rows: Array) -> Array:
+        """Return rows (r, M) times a root of the correlations of M errors (M, M): (r, 2 M).
+
+        The root is the response of the errors to what v was within them and as long before.
+        """
+        from scipy.signal import lfilter
+
+        backwards = np.concatenate([rows[:, ::-1], np.zeros_like(rows)], axis=1)
+        denominator = np.concatenate([[1.0], -self.coefficients])
+        return np.asarray(np.sqrt(self.share) * lfilter([1.0], denominator, backwards, axis=1))
 
 
 @dataclass(frozen=True)
@@ -182,52 +220,38 @@ def _noise(factors: Factors, channel: ResidualBlock, influence: Array, share: fl
     square = float(influence @ influence)
     estimated = sqrt(square / dof) / curvature if dof else nan
     p_value = whiteness(influence)
-    correlation = None
-    effective = float(samples)
+    effective, scatter, series = float(samples), estimated, None
     if not is_white(p_value):
-        effective = effective_samples(influence)
-        correlation = _correlation(factors, channel, influence)
-    scatter = estimated
-    if correlation is not None:
-        effective = min(effective, samples / correlation.series.inflation)
-        scatter = max(estimated, sqrt(correlation.variance) / curvature)
-    accepted = agrees(estimated, channel.noise, dof * effective / samples)
+        effective, slopes = effective_samples(influence), factors.left[channel.rows]
+        # described by the lowest order that leaves white noise: it needs a row of the Jacobian for
+        # each error, and errors that no coarse recorder rounds
+        whole = channel.rounding is None and len(slopes) == len(influence)
+        for each in described(influence, slopes) if whole else ():
+            if is_white(whiteness(each.innovations)):
+                series = each.series
+                effective = min(effective, samples / series.inflation)
+                scatter = max(estimated, sqrt(each.variance) / curvature)
+                break
+    given = channel.noise
+    accepted = agrees(estimated, given, dof * effective / samples)
     return Noise(
         label=channel.label,
         samples=samples,
-        std=_chosen(scatter, channel.noise, accepted),
+        std=scatter if given is None else given if accepted else max(given, scatter),
         estimated=estimated,
-        given=channel.noise,
+        given=given,
         accepted=accepted,
         p_value=p_value,
         effective=effective,
         inflation=samples / effective,
         rounding=0.0 if channel.rounding is None else channel.rounding.step / channel.weight,
-        partial_autocorrelations=() if correlation is None else correlation.series.partial,
+        partial_autocorrelations=() if series is None else series.partial,
     )
 
 
 def is_white(p_value: float | None) -> bool:
     """Test for whiteness at 1 %."""
     return p_value is None or p_value >= SURPRISING
-
-
-def _correlation(factors: Factors, channel: ResidualBlock, influence: Array) -> Described | None:
-    """Return the autoregression of the lowest order that leaves white noise; None without one.
-
-    It needs a row of the Jacobian for each error, and errors that no coarse recorder rounds.
-    """
-    slopes = factors.left[channel.rows]
-    if channel.rounding is not None or len(slopes) != len(influence):
-        return None
-    descriptions = described(influence, slopes)
-    return next((d for d in descriptions if is_white(whiteness(d.innovations))), None)
-
-
-def _chosen(estimated: float, given: float | None, accepted: bool | None) -> float:
-    if given is None:
-        return estimated
-    return given if accepted else max(given, estimated)
 
 
 def agrees(estimated: float, given: float | None, dof: float) -> bool | None:
@@ -281,3 +305,65 @@ def effective_samples(errors: Array) -> float:
     until = ended[0] if len(ended) else len(pairs)
     times = max(2.0 * float(np.sum(pairs[:until])) - 1.0, 1.0)
     return len(errors) / times
+
+
+class Described(NamedTuple):
+    """Errors (M,) as an autoregression, their variance, and what it leaves (M - order,)."""
+
+    series: Autoregression
+    variance: float
+    innovations: Array
+
+
+def described(errors: Array, slopes: Array) -> Iterator[Described]:
+    """Yield errors (M,) of a fit as autoregressions of rising order.
+
+    ``slopes`` (M, r): what the fit could take away from them. The estimate is that of restricted
+    maximum likelihood (Patterson & Thompson 1971), given the first errors; it allows for what the
+    fit took of slow errors, which makes those that are left look faster than they were.
+    """
+    from scipy.optimize import minimize
+
+    highest = min(HIGHEST_ORDER, len(errors) // SAMPLES_PER_COEFFICIENT)
+    basis, singular, _ = np.linalg.svd(slopes, full_matrices=False)
+    basis = basis[:, singular > LEAST_SEEN * np.max(singular, initial=0.0)]
+    both = np.column_stack([basis, errors / np.linalg.norm(errors)])
+    lagged = np.array([both[highest - lag : len(both) - lag] for lag in range(highest + 1)])
+    products = np.einsum("imk,jml->ijkl", lagged, lagged, optimize=True)
+    dof = lagged.shape[1] - basis.shape[1]
+
+    def likelihood(angles: Array) -> float:
+        """Return minus the logarithm of the restricted likelihood, but for a constant."""
+        whitener, own = _whitener(angles), products[: len(angles) + 1, : len(angles) + 1]
+        root = np.linalg.cholesky(np.einsum("i,j,ijkl->kl", whitener, whitener, own))
+        logarithms = np.log(np.diag(root))
+        return float(dof * logarithms[-1] + np.sum(logarithms[:-1]))
+
+    angles = np.empty(0)
+    for order in range(1, highest + 1):
+        try:
+            angles = minimize(likelihood, np.append(angles, 0.0), method="BFGS").x
+        except np.linalg.LinAlgError:  # the fit took all but rounding: nothing is left to describe
+            return
+        series = Autoregression(tuple((LARGEST_PARTIAL * np.tanh(angles)).tolist()))
+        white = np.tensordot(_whitener(angles), lagged[: order + 1], 1)
+        amounts = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=None)[0]
+        innovations = (white[:, -1] - white[:, :-1] @ amounts) * np.linalg.norm(errors)
+        variance = float(innovations @ innovations) / dof / series.share
+        yield Described(series, variance, innovations)
+
+
+def _whitener(angles: Array) -> Array:
+    """Matrix that makes correlated errors white, from the last one back."""
+    return np.concatenate([[1.0], -_coefficients(LARGEST_PARTIAL * np.tanh(angles))])
+
+
+def _coefficients(partial: Array) -> Array:
+    """Return the coefficients of the series with these partial autocorrelations.
+
+    Source: the recursion of Levinson and Durbin (Box, Jenkins & Reinsel 1994, appendix A3.2).
+    """
+    coefficients = np.empty(0)
+    for value in partial:
+        coefficients = np.append(coefficients - value * coefficients[::-1], value)
+    return coefficients

@@ -14,7 +14,7 @@ from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import yaml_number
 
 if TYPE_CHECKING:
-    from exfit.inference.sensitivity import ParameterEffect
+    from exfit.inference.identifiability import ParameterEffect
     from exfit.results.comparisons import PhaseEnd
     from exfit.results.model import FitResult
 

@@ -6,13 +6,15 @@ a terminal, the report writes the same ones as HTML.
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.inference.confidence import Interval, Uncertainty
 from exfit.util.text import rounded
+
+if TYPE_CHECKING:
+    from exfit.inference.confidence import Interval, Uncertainty
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -217,7 +219,7 @@ def number(value: float | None, digits: int = 5) -> str:
     return "-" if value is None else f"{value:.{digits}g}"
 
 
-def interval(limits: Interval | None, digits: Callable[[float], str] = rounded) -> str:
+def interval(limits: "Interval | None", digits: Callable[[float], str] = rounded) -> str:
     """Write an interval, its limits in some ``digits``; an open side by the other limit."""
     low, high = limits or (None, None)
     if low is not None and high is not None:
@@ -232,7 +234,7 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
 
 
-def error_of(uncertainty: Uncertainty, of_record: bool = False) -> str:
+def error_of(uncertainty: "Uncertainty", of_record: bool = False) -> str:
     """Write a standard error: in percent, but of a record in its own unit."""
     if uncertainty.relative_error is not None and not of_record:
         return percent(uncertainty.relative_error)

@@ -5,7 +5,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from exfit.inference.sensitivity import ParameterEffect
+from exfit.inference.identifiability import ParameterEffect
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.show.blocks import (

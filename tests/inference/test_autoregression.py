@@ -7,8 +7,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from tiers import few_of
 
-from exfit.inference.autoregression import Autoregression, described
-from exfit.inference.noise import autocorrelations
+from exfit.inference.noise import Autoregression, autocorrelations, described
 
 TIME = np.linspace(0.0, 1.0, 600)
 SLOW = np.column_stack([np.ones_like(TIME), TIME, TIME**2, np.exp(-5.0 * TIME)])

@@ -13,8 +13,7 @@ from scipy.stats import t as student
 
 from exfit.dsp.rounding import noise_before_rounding, rounding_waves
 from exfit.inference.confidence import confidence, partners_on_bounds, rises
-from exfit.inference.factors import factored
-from exfit.inference.linear import PriorRow, ResidualBlock, Rounding
+from exfit.inference.linear import PriorRow, ResidualBlock, Rounding, factored
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 from exfit.util import typed
 

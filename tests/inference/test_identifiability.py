@@ -8,12 +8,10 @@ import pytest
 from linearised import autoregressive, decay, linearised, std_errors
 from scipy.linalg import qr
 
-from exfit.inference.combinations import WEAK
 from exfit.inference.confidence import confidence
-from exfit.inference.factors import pivots
-from exfit.inference.identifiability import identifiability
-from exfit.inference.linear import PriorRow, ResidualBlock
-from exfit.inference.wording import digits, listed, move
+from exfit.inference.identifiability import WEAK, identifiability
+from exfit.inference.linear import PriorRow, ResidualBlock, pivots
+from exfit.inference.wording import digits, listed
 from exfit.util.typed import plain
 
 SAMPLES = 300
@@ -83,7 +81,7 @@ def test_a_weak_combination_moves_by_one_standard_error():
     assert one.changes[0].rms == pytest.approx(known.noise[0].std / np.sqrt(SAMPLES))
     effect = f"vt changes by {digits(one.changes[0].rms)} pu rms, 0.058 of its noise"
     steps = ", ".join(
-        f"{name} {move(lin, lin.names.index(name), share)}" for name, share in one.moves
+        f"{name} {lin.move_in_words(lin.names.index(name), share)}" for name, share in one.moves
     )
     assert one.sentence == f"{listed(names_of(one))} can move together ({steps}): {effect}"
 
@@ -285,12 +283,12 @@ def test_large_changes_are_factors_and_those_near_zero_absolute():
         logarithmic=np.array([True, False, False]),
         width=np.array([40.0, 40.0, 5.0]),
     )
-    assert move(lin, 0, 1.5) == "times 4.5"
-    assert move(lin, 0, -1.5) == "times 0.22"
-    assert move(lin, 0, 8.0) == "by orders of magnitude"
-    assert move(lin, 0, -0.5) == "-50 %"
-    assert move(lin, 1, 1.5) == "+150 %"
-    assert move(lin, 2, 0.5) == "+0.25 pu"
+    assert lin.move_in_words(0, 1.5) == "times 4.5"
+    assert lin.move_in_words(0, -1.5) == "times 0.22"
+    assert lin.move_in_words(0, 8.0) == "by orders of magnitude"
+    assert lin.move_in_words(0, -0.5) == "-50 %"
+    assert lin.move_in_words(1, 1.5) == "+150 %"
+    assert lin.move_in_words(2, 0.5) == "+0.25 pu"
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from exfit.features.design.experiment_design import identify
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
+from exfit.inference.identifiability import effects
 from exfit.inference.linear import ResidualBlock
-from exfit.inference.sensitivity import effects
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
 from exfit.show.fits import ranking

@@ -9,7 +9,7 @@ from exfit.dsp.decimation import envelope
 from exfit.features.report.layout import BINS, LEVEL, MILLI, TALL, TIME, line_style
 from exfit.fitting.uncertainty import Sensitivity
 from exfit.inference.confidence import Correlation
-from exfit.inference.sensitivity import ParameterEffect
+from exfit.inference.identifiability import ParameterEffect
 from exfit.results.influences import by_weight
 from exfit.results.model import FitResult
 from exfit.show.blocks import Chart, Panel, Series
