@@ -65,6 +65,7 @@ def test_every_start_reaches_the_noise_inside_its_bounds(fits, name, strategy):
     assert [key for key, one in found.parameters.items() if one.at_bound] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("strategy", few_of(["lm-then-dgn", "auto"], 1))
 def test_all_starts_end_at_the_same_values(fits, strategy):
     ends = [fits(name, strategy).values for name in AC1A]
@@ -89,7 +90,7 @@ def test_ac8b_reaches_the_noise_though_its_gains_are_redundant(fits, name):
     assert found.comparison.cost <= true_cost(name)
 
 
-@pytest.mark.parametrize("name", few_of([*AC1A, *AC8B], 3))
+@pytest.mark.parametrize("name", few_of([*AC1A, *AC8B], 1))
 def test_a_local_fit_holds_on_the_step_down_that_it_never_saw_or_says_that_it_does_not(fits, name):
     """The step up of unit 2 leaves KC open: the lowest minimum has KC = 0.57."""
     found = fits(name, None)
@@ -100,6 +101,7 @@ def test_a_local_fit_holds_on_the_step_down_that_it_never_saw_or_says_that_it_do
     assert holds is down.accepted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ac8b_unit1_ka_free", "ac8b_unit2_ka_free"])
 def test_exactly_redundant_gains_are_named(fits, name):
     unseen = fits(name, None).knowledge.identifiability.unseen
@@ -114,6 +116,7 @@ def test_the_check_system_gives_back_its_two_numbers(fits):
     assert found.values["a"] == pytest.approx(2.0, rel=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("jacobian", few_of(["central", "forward", "backward"], 1))
 def test_differences_lead_to_the_same_minimum_as_the_exact_derivative(fits, tmp_path, jacobian):
     text = (ROOT / "configs" / "ac1a_good.yaml").read_text()

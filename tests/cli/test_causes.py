@@ -30,6 +30,7 @@ def test_a_pipe_has_a_line_where_the_causes_begin_and_one_where_they_end(run, la
     assert (first, last) == (f"causes: 0 of {total} tried", f"causes: {total} of {total} tried")
 
 
+@pytest.mark.long
 def test_ctrl_c_among_the_causes_keeps_the_fit_and_says_what_was_not_tried(run, late, monkeypatch):
     whole = run("fit", late, "--no-plots", "--json")
 

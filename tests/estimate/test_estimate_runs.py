@@ -78,6 +78,7 @@ def test_fun_is_never_called_outside_the_bounds_and_every_call_counts(seed, meth
     assert run.found.nfev == len(run.points)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", few_of(EVERY_METHOD, 2))
 def test_rounding_carries_no_call_across_a_bound(method):
     # the unit is far wider than the box: one-sided parabolas reach across all of it

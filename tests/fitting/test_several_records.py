@@ -396,6 +396,7 @@ def away(found, clean):
     return result
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("loss", few_of(["huber", "soft-l1"], 1))
 def test_a_robust_loss_bears_spikes(tmp_path, clean, loss):
     content = {**config("ac1a_typical"), "validate": []}

@@ -235,6 +235,7 @@ def test_the_default_methods_go_the_same_way_on_each_linear_scale(strategy):
     assert np.allclose(ways[0], ways[2], rtol=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("strategy", ["dgn", "lm"])
 def test_without_any_bounds_a_gain_that_is_divided_by_changes_its_sign(strategy):
     content = yaml.safe_load(yaml.safe_dump(FIRST_ORDER))

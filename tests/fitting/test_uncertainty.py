@@ -140,6 +140,7 @@ def test_the_gains_of_ac8b_make_one_exact_combination(ac8b):
         assert moves[name] == pytest.approx(-moves["KA"], rel=1e-6)
 
 
+@pytest.mark.long
 def test_without_profiles_no_parameter_of_ac8b_with_one_on_its_bound_has_an_interval(ac8b):
     known = ac8b.knowledge.confidence.parameters
     gains, bound, others = {"KPR", "KIR", "KDR", "KA"}, {"KC"}, {"TDR", "TE", "KD"}

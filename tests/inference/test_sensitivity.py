@@ -38,6 +38,7 @@ def near_zero(tmp_path):
     return case_of(content, tmp_path)
 
 
+@pytest.mark.long
 def test_the_effect_is_by_how_much_the_simulated_voltage_moves(design, tmp_path):
     small = near_zero(tmp_path)
     planned = identify(small, {"vt": 2e-4})

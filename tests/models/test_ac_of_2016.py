@@ -256,6 +256,7 @@ TAKEN_OVER = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TAKEN_OVER)
 def test_a_gate_takes_the_exciter_over(name):
     """Whatever the error drives: an upper gate below what would be, a lower one above it."""

@@ -672,6 +672,7 @@ def test_it_says_what_it_sees_and_where_it_acts(limiter):
     assert set(limiter.places) <= set(PLACES)
 
 
+@pytest.mark.long
 def test_no_parameter_is_inert(limiter):
     values, away = (
         lively(limiter),

@@ -629,6 +629,7 @@ def by_another_method(path, signal, time):
     return (path.C @ driven.y)[0] + path.D[0, 0] * signal(time)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("limited", few_of(["bands", "output"], 1))
 def test_the_bands_of_another_typing_and_method_reach_their_limits_together(limited):
     """Speed and power swing; each band, or what they make together, meets both of its limits."""

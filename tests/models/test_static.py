@@ -183,6 +183,7 @@ def test_a_field_current_beyond_its_limit_takes_the_field_down(name, factor):
     assert efd[-1] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ST1A", "ST5B", "ST6B", "ST7B"])
 def test_a_limiter_at_its_gate_takes_over(name):
     values = wide(name, VMAX=9.0, VMIN=-9.0)

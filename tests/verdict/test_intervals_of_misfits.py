@@ -8,6 +8,7 @@ from fleets import row
 from pages import Page
 from records import case_of, config
 from rich.console import Console
+from tiers import few_of
 
 from exfit import workflows
 from exfit.features.fleet.folder import Fleet
@@ -35,7 +36,7 @@ def faulty_case(verdict, folder):
     return case_of(content, folder)
 
 
-@pytest.fixture(scope="module", params=[MISSES, NO_MATCH])
+@pytest.fixture(scope="module", params=few_of([MISSES, NO_MATCH], 1, whole=True))
 def case(request, tmp_path_factory):
     return faulty_case(request.param, tmp_path_factory.mktemp("misfit"))
 

@@ -102,6 +102,7 @@ def test_the_scores_of_noise_are_chi_square(evidence):
     assert np.mean(np.array(scores) > 6.635) == pytest.approx(0.01, abs=0.008)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("of_case", "words"),
     few_of(

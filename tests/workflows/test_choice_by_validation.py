@@ -72,6 +72,7 @@ def test_an_end_before_a_minimum_casts_doubt():
     assert "had not converged: the iteration limit" in doubt(TRUTH + NOISE[0], iterations=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("strategy", few_of(["lm-then-dgn", "auto"], 1))
 @pytest.mark.parametrize("name", few_of(["ac8b_unit2", "ac8b_unit2_ka_free"], 1))
 def test_of_minima_that_the_record_does_not_refute_it_is_the_one_on_which_the_step_down_holds(

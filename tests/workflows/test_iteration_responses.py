@@ -62,6 +62,7 @@ def test_every_response_costs_what_its_iteration_did(fitted):
     np.testing.assert_allclose(costs, [lines[k] for k in found.numbers], rtol=1e-3)
 
 
+@pytest.mark.long
 def test_every_record_has_its_own_responses(tmp_path):
     case = case_of(several(recording("up"), recording("down")), tmp_path)
     result = workflows.fit(case)

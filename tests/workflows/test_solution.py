@@ -10,6 +10,7 @@ from exfit.workflows import fit
 from exfit.workflows.solution import aligned, validation_of
 
 
+@pytest.mark.long
 def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     """Its recorder is 30 ms late and 1 % off; the unit stays as the fit left it."""
     shown = read_columns(SAMPLES / "ac1a_down.csv", ["t", "vt"])

@@ -44,6 +44,7 @@ def design(content):
     return exfit.design_test(case, limits=LIMITS, channels=["vt", "efd"])
 
 
+@pytest.mark.long
 def test_the_planned_response_keeps_every_limit(design, content):
     """Simulated anew, as a case with the steps of the sheet."""
     steps = [{"at": step.at, "step": step.step} for step in design.best.steps]

@@ -79,6 +79,7 @@ def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, m
         assert off < 0.04 * np.linalg.norm(change[after]), place
 
 
+@pytest.mark.long
 def test_the_intervals_hold_the_truth_and_the_output_says_why(fitted):
     for name, true in TRUTH.items():
         parameter = fitted.parameters[name]
@@ -122,6 +123,7 @@ def fit_of(folder):
     return fit_with
 
 
+@pytest.mark.long
 def test_without_noise_of_what_drives_a_fit_is_that_of_least_squares(fit_of):
     """But for the means at rest, known to 1/11 of the noise: the intervals hold that, too.
 

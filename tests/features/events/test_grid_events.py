@@ -75,6 +75,7 @@ def test_an_event_by_hand_finds_its_own_rest(events, fitted):
     assert "on other the error of q is" in other.reason
 
 
+@pytest.mark.long
 def test_steps_are_none_of_an_event_by_hand(events, fitted):
     path, result = fitted
     with pytest.raises(CaseError, match=r"step and at: not allowed with plant grid-playback"):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import few_of
 
 import exfit
 from exfit.case.case import Case
@@ -78,7 +79,7 @@ def test_a_program_leads_to_the_minimum_of_its_twin_in_few_runs(record, native):
 
 
 # what hangs takes its time limit at each third run: it has a test of its own
-@pytest.mark.parametrize("fault", ["error", "die", "nonsense", "short", "nan", "id"])
+@pytest.mark.parametrize("fault", few_of(["error", "die", "nonsense", "short", "nan", "id"], 2))
 def test_runs_that_fail_are_made_again(fault, record, native, tmp_path):
     result = exfit.fit(external(record, fault, tmp_path / "runs"))
     assert result.cost == pytest.approx(native.cost, rel=SAME_COST)
@@ -177,6 +178,7 @@ def without_twin(record, arguments=(), **changes):
     return Case.from_dict({**content, **changes}, record)
 
 
+@pytest.mark.long
 def test_without_a_twin_quotients_of_the_programs_runs_lead_to_the_same_minimum(record, native):
     case = without_twin(record)
     result = exfit.fit(case)
@@ -201,6 +203,7 @@ def test_without_a_twin_every_third_run_may_fail(record, native):
     assert exfit.fit(case).parameters == result.parameters
 
 
+@pytest.mark.long
 def test_without_a_twin_what_a_record_leaves_open_is_found_by_the_program(record):
     shifted = exfit.Record.from_arrays(record.time + 0.13, dict(record.signals))
     test = {"vt0": 1.0, "vref": [{"at": {"start": 1.05, "min": 1.0, "max": 1.4}, "step": 0.05}]}
@@ -309,6 +312,7 @@ def as_found_case(record, **as_found):
     return plain, section
 
 
+@pytest.mark.long
 def test_the_model_as_found_is_run_by_the_program(record):
     plain, stated = as_found_case(record, **AS_FOUND)
     by_program = exfit.simulate(plain, AS_FOUND["parameters"]).response.signals["vt"]
@@ -323,6 +327,7 @@ def test_the_model_as_found_is_run_by_the_program(record):
     assert np.array_equal(match.overlays["vt"].simulated, by_program)
 
 
+@pytest.mark.long
 def test_another_exciter_as_found_is_not_compared(record):
     _, stated = as_found_case(record, source="base.dyr", model="AC4A")
     with pytest.raises(CaseError, match=r"as_found.model: AC4A: the program simulates SEXS only"):

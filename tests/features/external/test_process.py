@@ -55,6 +55,7 @@ def test_what_is_no_answer_is_reported_and_the_process_started_anew(answer, reas
         assert program.starts == starts
 
 
+@pytest.mark.long
 @on_linux
 def test_a_process_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
     pids = tmp_path / "pids"

@@ -113,6 +113,7 @@ def test_code_runs_only_in_a_batch_that_trusts_it(cases, tmp_path):
     assert fleet.cases[0].status == "failed"  # it is no model
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("parts", few_of([2, 4], 1))
 def test_parts_come_to_the_same_as_one_run(cases, parts):
     run(folder="whole")

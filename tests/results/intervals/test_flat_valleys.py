@@ -25,6 +25,7 @@ def vague(tmp_path_factory):
     return workflows.fit(case_of(content, folder))
 
 
+@pytest.mark.long
 def test_nothing_is_said_to_move_to_where_its_profile_or_its_bound_does_not_let_it(vague):
     combinations = vague.knowledge.identifiability.unseen
     assert combinations

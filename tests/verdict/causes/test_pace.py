@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from cases import FIRST_ORDER, TIME, TRUTH
+from tiers import few_of
 
 from exfit import workflows
 from exfit.case.case import Case
@@ -73,7 +74,7 @@ def test_no_trial_goes_on_beyond_its_time(seconds):
         pace.goes_on()
 
 
-@pytest.mark.parametrize("seconds", [0, 5, 30, 100])
+@pytest.mark.parametrize("seconds", few_of([0, 5, 30, 100], 2))
 def test_where_the_time_is_over_the_rest_is_said_to_be_untried(evidence, seconds):
     whole = with_pace(evidence, Pace())
     pace = Pace(seconds, clock=itertools.count().__next__)
@@ -93,6 +94,7 @@ def test_with_time_enough_nothing_is_untried(evidence):
     assert (pace.untried, pace.sentence) == ((), "")
 
 
+@pytest.mark.long
 def test_an_interruption_at_any_announcement_leaves_the_verdict_and_the_causes_until_then(evidence):
     heard = Announcements()
     whole = with_pace(evidence, Pace(watch=heard))
@@ -108,6 +110,7 @@ def test_an_interruption_at_any_announcement_leaves_the_verdict_and_the_causes_u
         untried, found = len(pace.untried), len(verdict.causes)
 
 
+@pytest.mark.long
 def test_each_recogniser_may_be_interrupted(evidence, monkeypatch):
     from exfit.verdict import causes
 
