@@ -194,27 +194,20 @@ def rest_noise(setup: ExperimentSetup, values: Values) -> dict[str, RestNoise]:
         moved = replace(experiment, own=at, simulator=with_added(simulator, taken))
         return errors_of(experiment, ((moved.samples(values)[0] - usual) / PULSE)[None])[:, 0]
 
-    noises = {}
+    noises, time = {}, setup.record.time
     for signal in dict.fromkeys([*driving, *experiment.signals]):
         given = signal == "vt" and setup.test.vt0 is not None
         if given or not (signal in driving or initial(signal) in own):
             continue
         angle = driving.get(signal) if signal == "angle" else None
         turning = isinstance(angle, SplinedInput) and not angle.integrated
-        courses = courses_at_rest(setup.record.time, turning)
+        # what turns may do so evenly at rest (`fitting.recorded.event`)
+        level = np.ones(len(time))
+        courses = np.stack([level, time - time[0]] if turning else [level])
         weights = np.linalg.pinv(courses[:, rest].T)
         moved = np.stack([response(signal, course, k == 0) for k, course in enumerate(courses)])
         noises[signal] = RestNoise(rest, moved.T @ weights)
     return noises
-
-
-def courses_at_rest(time: Array, turning: bool) -> Array:
-    """Return the courses (K, M) that are taken from a signal as they are at rest, the level first.
-
-    What is ``turning``, as an angle, may do so evenly (`fitting.recorded.event`).
-    """
-    level = np.ones(len(time))
-    return np.stack([level, time - time[0]]) if turning else level[None]
 
 
 def errors_of(experiment: Experiment, changes: Array) -> Array:
@@ -304,19 +297,15 @@ def whitened(residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Arr
     They are as large as before, so that costs are of the same size.
     """
     values = residuals.values(theta)
-    noises = [propagated_noise(setup, values) for setup in setups]
-    scale = float(np.sqrt(np.mean(np.concatenate([noise.variance for noise in noises]))))
-    experiments = [
-        replace(setup.experiment, whitening=whitening(noise, in_time(setup.experiment), scale))
-        for setup, noise in zip(setups, noises, strict=True)
-    ]
+    carried = [propagated_noise(setup, values) for setup in setups]
+    scale = float(np.sqrt(np.mean(np.concatenate([each.variance for each in carried]))))
+    experiments = []
+    for setup, each in zip(setups, carried, strict=True):
+        times = [np.flatnonzero(channel.kept) for channel in setup.experiment.channels]
+        in_time = np.argsort(np.concatenate(times), kind="stable")
+        white = whitening(each, in_time, scale)
+        experiments.append(replace(setup.experiment, whitening=white))
     return replace(residuals, experiments=experiments)
-
-
-def in_time(experiment: Experiment) -> Rows:
-    """Return the places of the errors (M,) of all channels in the order of time."""
-    times = [np.flatnonzero(channel.kept) for channel in experiment.channels]
-    return np.asarray(np.argsort(np.concatenate(times), kind="stable"))
 
 
 def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
@@ -353,22 +342,18 @@ def added_gradient(residuals: Residuals, theta: Array) -> Array:
     for experiment in residuals.experiments:
         simulator = experiment.with_inputs(values)
         errors, jacobian = experiment.tangents(values, moves)
-        for noisy in _noisier(simulator, generator):
-            noisy_errors, slopes = replace(experiment, simulator=noisy).tangents(values, moves)
-            added += (slopes.T @ noisy_errors - jacobian.T @ errors) / (2 * PAIRS)
+        recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
+        for _ in range(PAIRS):
+            drawn = {
+                signal: deviation * generator.standard_normal(len(recorded[signal].samples))
+                for signal, deviation in deviations.items()
+            }
+            for sign in (1.0, -1.0):
+                more = {signal: sign * own for signal, own in drawn.items()}
+                noisy = replace(experiment, simulator=with_added(simulator, more))
+                noisy_errors, slopes = noisy.tangents(values, moves)
+                added += (slopes.T @ noisy_errors - jacobian.T @ errors) / (2 * PAIRS)
     return added
-
-
-def _noisier(simulator: Simulator, generator: "np.random.Generator") -> Iterator[Simulator]:
-    """Yield simulators whose recorded inputs have as much noise again, of either sign."""
-    recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
-    for _ in range(PAIRS):
-        noise = {
-            signal: deviation * generator.standard_normal(len(recorded[signal].samples))
-            for signal, deviation in deviations.items()
-        }
-        yield with_added(simulator, noise)
-        yield with_added(simulator, {signal: -own for signal, own in noise.items()})
 
 
 def with_minima_of(problem: FitProblem, found: SearchResult) -> SearchResult:
@@ -402,7 +387,7 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
     )
     for experiment in residuals.experiments:
         name = f" of {experiment.name}" if len(residuals.experiments) > 1 else ""
-        levels = listed([*_levels(experiment.with_inputs(values))])
+        levels = listed(_levels(experiment.with_inputs(values)))
         yield (
             f"the noise of what drives the simulation{name}, {levels}, is in the errors of all "
             "signals: they are weighted by its covariance, and the intervals hold it"
@@ -410,13 +395,15 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
     yield f"the bias by that noise is taken out: it was at most {share}{large}"
 
 
-def _levels(simulator: Simulator) -> Iterator[str]:
-    """Yield the noise of each recorded input, in words."""
+def _levels(simulator: Simulator) -> list[str]:
+    """Word the noise of each recorded input."""
+    words = []
     for signal, deviation in noise_of_inputs(simulator).items():
         recorded = simulator.inputs.recorded[signal]
         if signal != "angle":
-            yield f"{signal} {digits(deviation)} pu"
+            words.append(f"{signal} {digits(deviation)} pu")
         elif isinstance(recorded, SplinedInput) and recorded.integrated:
-            yield f"frequency {digits(deviation / TURN)} Hz"
+            words.append(f"frequency {digits(deviation / TURN)} Hz")
         else:
-            yield f"angle {digits(deviation)} rad"
+            words.append(f"angle {digits(deviation)} rad")
+    return words

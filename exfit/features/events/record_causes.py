@@ -22,7 +22,7 @@ from exfit.fitting.event import with_rest
 from exfit.fitting.recordings import record_of
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
-from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.comparisons import Comparison
 from exfit.results.verdict import Cause
 from exfit.signals import SIGNALS
 from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion
@@ -120,9 +120,22 @@ def clock_causes(record: Record) -> Iterator[Cause]:
 
 def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
     """Yield levels before the event at which no generator runs."""
-    level = {name: _level(record, samples, steady) for name, samples in record.signals.items()}
-    if "vt" in level and not RATED_VOLTAGES[0] <= level["vt"] <= RATED_VOLTAGES[1]:
-        yield _voltage_cause(level["vt"])
+    level = {}
+    for name, samples in record.signals.items():
+        before = samples[(record.time < steady) & np.isfinite(samples)]
+        level[name] = float(np.mean(before)) if len(before) else float("nan")
+    low, high = RATED_VOLTAGES
+    if "vt" in level and not low <= level["vt"] <= high:
+        text = f"vt rests at {level['vt']:.4g} pu, not between {low:g} and {high:g}"
+        remedy = "check its unit, and its base: the rated voltage, line to line"
+        for ratio, what in ((1.0 / ROOT, "1 / sqrt(3)"), (ROOT, "sqrt(3)")):
+            if abs(level["vt"] / ratio - 1.0) < NEAR_ROOT:
+                text = f"{text}; it is about {what}"
+                remedy = (
+                    "a voltage from phase to ground is taken for one from phase to phase, or the "
+                    "other way round: check the base, or record.phasors.voltage.connection"
+                )
+        yield Cause(text, remedy)
     p, q = level.get("p"), level.get("q", 0.0)
     if p is None:
         return
@@ -149,25 +162,6 @@ def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
             f"q rests at {q:.3g} pu, above {MOST_REACTIVE:g}, and p at {p:.3g} pu",
             "are p and q exchanged? Check their columns",
         )
-
-
-def _voltage_cause(level: float) -> Cause:
-    low, high = RATED_VOLTAGES
-    text = f"vt rests at {level:.4g} pu, not between {low:g} and {high:g}"
-    for ratio, what in ((1.0 / ROOT, "1 / sqrt(3)"), (ROOT, "sqrt(3)")):
-        if abs(level / ratio - 1.0) < NEAR_ROOT:
-            return Cause(
-                f"{text}; it is about {what}",
-                "a voltage from phase to ground is taken for one from phase to phase, or the other "
-                "way round: check the base, or record.phasors.voltage.connection",
-            )
-    return Cause(text, "check its unit, and its base: the rated voltage, line to line")
-
-
-def _level(record: Record, samples: Array, steady: float) -> float:
-    """Return the mean of a signal (M,) before the event."""
-    before = samples[(record.time < steady) & np.isfinite(samples)]
-    return float(np.mean(before)) if len(before) else float("nan")
 
 
 def _held(record: Record, steady: float) -> Iterator[Cause]:
@@ -198,23 +192,18 @@ def _longest_hold(time: Array, samples: Array) -> tuple[float, float] | None:
     usual = float(np.median(moving))
     starts = np.concatenate([[0], np.flatnonzero(changes) + 1])
     ends = np.concatenate([starts[1:] - 1, [len(samples) - 1]])
+    apart = np.diff(time[starts])
     coarse = len(moving) < 0.5 * len(changes)  # a hold is usual there
+    # a slow meter changes in even steps that are far apart
+    stairs = coarse and len(apart) > 2 and float(np.ptp(apart)) < 0.5 * float(np.median(apart))
     for k in np.argsort(time[starts] - time[ends], kind="stable"):
         first, last = int(starts[k]), int(ends[k])
         if time[last] - time[first] < HELD:
             return None
-        jumps = last + 1 < len(samples) and (
-            changes[last] > JUMP_AFTER_HOLD * usual or _is_staircase(time, starts, coarse)
-        )
-        if jumps:
+        follows = last + 1 < len(samples)
+        if follows and (stairs or changes[last] > JUMP_AFTER_HOLD * usual):
             return float(time[first]), float(time[last])
     return None
-
-
-def _is_staircase(time: Array, starts: NDArray[np.intp], coarse: bool) -> bool:
-    """Test whether a signal changes in even steps that are far apart, as a slow meter has it."""
-    apart = np.diff(time[starts])
-    return coarse and len(apart) > 2 and float(np.ptp(apart)) < 0.5 * float(np.median(apart))
 
 
 def _spiky(record: Record) -> Iterator[Cause]:
@@ -282,32 +271,32 @@ def _jumping_angle(record: Record) -> Iterator[Cause]:
 
 def swing_causes(comparison: Comparison, steady: float) -> Iterator[Cause]:
     """Yield powers that swing otherwise than any unit with such a machine would."""
-    overlays: Mapping[str, Overlay] = comparison.overlays
     for name in ("p", "q"):
-        overlay = overlays.get(name)
-        if overlay is not None:
-            yield from _swing_cause(name, comparison.time, overlay, steady)
+        if name in comparison.overlays:
+            yield from _swing_cause(name, comparison, steady)
+
+
+def both_swings(comparison: Comparison, name: str, steady: float) -> tuple[Array, Array, Array]:
+    """Return the instants (M,) of the event, the swings of a signal and those of its response."""
+    overlay = comparison.overlays[name]
+    known = np.isfinite(overlay.error)
+    t = comparison.time[known]
+    event = t >= steady
+    measured, simulated = (swings(t, y[known]) for y in (overlay.measured, overlay.simulated))
+    return t[event], measured[event], simulated[event]
 
 
 def mismatch(comparison: Comparison, steady: float) -> float:
     """Difference of the swings of p from the response's, of the sizes of both; 1 at most."""
-    overlay = comparison.overlays["p"]
-    known = np.isfinite(overlay.error)
-    t = comparison.time[known]
-    measured, simulated = (
-        swings(t, y[known])[t >= steady] for y in (overlay.measured, overlay.simulated)
-    )
+    _, measured, simulated = both_swings(comparison, "p", steady)
     size = float(np.sum(measured**2) + np.sum(simulated**2))
     return float(np.sum((measured - simulated) ** 2)) / size if size > 0.0 else 0.0
 
 
-def _swing_cause(name: str, time: Array, overlay: Overlay, steady: float) -> Iterator[Cause]:
-    known = np.isfinite(overlay.error)
-    t = time[known]
-    measured, simulated = (
-        swings(t, y[known])[t >= steady] for y in (overlay.measured, overlay.simulated)
-    )
-    noise = noise_of(overlay.measured[known])
+def _swing_cause(name: str, comparison: Comparison, steady: float) -> Iterator[Cause]:
+    overlay = comparison.overlays[name]
+    noise = noise_of(overlay.measured[np.isfinite(overlay.error)])
+    time, measured, simulated = both_swings(comparison, name, steady)
     sizes = [float(np.sqrt(np.mean(y * y))) for y in (measured, simulated)]
     least = max(LEAST_SWING, LEAST_OVER_NOISE * noise)
     if max(sizes) < least:
@@ -317,9 +306,18 @@ def _swing_cause(name: str, time: Array, overlay: Overlay, steady: float) -> Ite
     ratio = sizes[0] / max(sizes[1], 1e-12)
     low, high = LIKE_RESPONSE
     if not low <= ratio <= high:
-        yield Cause(f"{place}: {ratio:.2g} times as far, not {low:g} ... {high:g}", _remedy(ratio))
+        remedy = (
+            f"check the base of {SIGNALS['p'].name} and reactive power, the rated MVA of the "
+            "machine, the unit of the angle, and H and the reactances"
+        )
+        if not 0.1 <= ratio <= 10.0:
+            remedy = (
+                "check the unit of the angle, which is by 57.3 too large where degrees are taken "
+                "for radians, the unit of the frequency, and the bases of p, q and vt"
+            )
+        yield Cause(f"{place}: {ratio:.2g} times as far, not {low:g} ... {high:g}", remedy)
         return
-    late, better = _delay(t[t >= steady], measured, simulated)
+    late, better = _delay(time, measured, simulated)
     if alike < AGAINST and -alike > better - SIGN_BEFORE_DELAY:
         yield Cause(
             f"{place}, against each other (correlation {alike:.2f})",
@@ -337,18 +335,6 @@ def _swing_cause(name: str, time: Array, overlay: Overlay, steady: float) -> Ite
             "is the angle that of the voltage of this unit, and are H and the reactances its own? "
             "Check the columns and the data of the machine",
         )
-
-
-def _remedy(ratio: float) -> str:
-    if ratio < 0.1 or ratio > 10.0:
-        return (
-            "check the unit of the angle, which is by 57.3 too large where degrees are taken for "
-            "radians, the unit of the frequency, and the bases of p, q and vt"
-        )
-    return (
-        f"check the base of {SIGNALS['p'].name} and reactive power, the rated MVA of the machine, "
-        "the unit of the angle, and H and the reactances"
-    )
 
 
 def swings(time: Array, samples: Array) -> Array:

@@ -3,20 +3,17 @@
 Each is tried by one more fit of the record, of a unit that is otherwise in this.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 from exfit.case.case import Case
-from exfit.features.events.other_equipment import (
-    with_governor,
-    with_plant_keys,
-    with_stabiliser,
-    without_governor,
-    without_stabiliser,
-)
+from exfit.case.parts import added_part
+from exfit.case.schema import Governor, Stabiliser
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import system_of
+from exfit.models import GOVERNORS, STABILISERS
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
 from exfit.results.verdict import Cause
@@ -45,6 +42,26 @@ FORMS = {
     "power": "the mechanical power is constant, (Pm - D dw) / (1 + dw)",
     "torque": "the mechanical torque is constant, Pm - D dw",
 }
+
+
+def with_plant_keys(case: Case, **keys: Any) -> Case:
+    """Return a case with other keys of its plant, such as ``swing``; they are not checked."""
+    return replace(case, plant=case.plant.model_copy(update=keys))
+
+
+def with_control(
+    case: Case,
+    prefix: str,
+    section: Governor | Stabiliser | None = None,
+    model: Model | None = None,
+) -> Case:
+    """Return a case with a governor or stabiliser in place of its own; without any by default."""
+    kind = prefix.rstrip(".")
+    others = tuple(part for part in case.parts.all if part.kind != kind)
+    added = () if model is None else (added_part(kind, prefix, model),)
+    of_parts: dict[str, Any] = {kind: model, "all": (*others, *added)}
+    keys: dict[str, Any] = {kind: section, "parts": replace(case.parts, **of_parts)}
+    return replace(case, **keys)
 
 
 def of_case(evidence: Evidence, other: Case) -> Residuals:
@@ -80,11 +97,17 @@ def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect a missing governor, by the one of two simple ones that matches better."""
     if evidence.case.parts.governor is not None:
         return
-    trials = {
-        name: refitted(evidence, _governed(evidence, name, data, STARTS[name]))
-        for name, data in STAND_INS.items()
-    }
-    costs = {name: trial.cost for name, trial in trials.items() if trial is not None}
+    costs = {}
+    for name, data in STAND_INS.items():
+        section = Governor(model=name, parameters=data)
+        governed = with_control(evidence.case, GOVERNOR, section, GOVERNORS[name])
+        freed = [
+            FreeParameter(f"{GOVERNOR}{symbol}", at, at / WIDE, at * WIDE, logarithmic=True)
+            for symbol, at in STARTS[name].items()
+        ]
+        trial = refitted(evidence, with_freed(of_case(evidence, governed), freed))
+        if trial is not None:
+            costs[name] = trial.cost
     if not costs:
         return
     name = min(costs, key=lambda name: costs[name])
@@ -98,17 +121,6 @@ def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
         ),
         of_stand_in(evidence, costs[name]),
     )
-
-
-def _governed(
-    evidence: Evidence, name: str, data: Mapping[str, float], starts: Mapping[str, float]
-) -> Residuals:
-    """Return the residuals of the unit with a governor, some of whose data are free."""
-    freed = [
-        FreeParameter(f"{GOVERNOR}{symbol}", start, start / WIDE, start * WIDE, logarithmic=True)
-        for symbol, start in starts.items()
-    ]
-    return with_freed(of_case(evidence, with_governor(evidence.case, name, data)), freed)
 
 
 def of_stand_in(evidence: Evidence, cost: float) -> float:
@@ -132,7 +144,8 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
     gain, washout, lead = (f"{STABILISER}{name}" for name in ("K_T", "T", "T1_T3"))
     for heard, start, low, high in (("speed", 5.0, 0.0, 200.0), ("p", -0.1, -20.0, 0.0)):
         data = {"HLIM": NO_LIMIT, "T2_T4": 1.0, "T1_T3": 2.0}
-        other = with_stabiliser(case, "STAB1", (heard,), data)
+        section = Stabiliser(model="STAB1", inputs=(heard,), parameters=data)
+        other = with_control(case, STABILISER, section, STABILISERS["STAB1"])
         freed = [
             FreeParameter(gain, start, low, high, logarithmic=False),
             FreeParameter(washout, 3.0, 0.3, 30.0, logarithmic=True),
@@ -157,24 +170,19 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
 
 def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the governor or the stabiliser of the case of being out of service."""
-    parts = evidence.case.parts
-    if parts.governor is not None:
-        yield from _idle(evidence, parts.governor, GOVERNOR, without_governor)
-    if parts.stabiliser is not None:
-        yield from _idle(evidence, parts.stabiliser, STABILISER, without_stabiliser)
-
-
-def _idle(
-    evidence: Evidence, model: Model, prefix: str, without: Callable[[Case], Case]
-) -> Iterator[Suspicion]:
-    ties, kind = evidence.case.ties.by_name.values(), prefix.rstrip(".")
-    if any(name.startswith(prefix) for tie in ties for name in tie.names):
-        return
-    cause = Cause(
-        f"the {kind} {model.name}: the record would match without it",
-        f"was it in service? If it was not, leave out the section {kind}",
-    )
-    yield from tried(evidence, of_case(evidence, without(evidence.case)), 0, always(cause))
+    case = evidence.case
+    tied = [name for tie in case.ties.by_name.values() for name in tie.names]
+    controls = {GOVERNOR: case.parts.governor, STABILISER: case.parts.stabiliser}
+    for prefix, model in controls.items():
+        if model is None or any(name.startswith(prefix) for name in tied):
+            continue
+        kind = prefix.rstrip(".")
+        cause = Cause(
+            f"the {kind} {model.name}: the record would match without it",
+            f"was it in service? If it was not, leave out the section {kind}",
+        )
+        residuals = of_case(evidence, with_control(case, prefix))
+        yield from tried(evidence, residuals, 0, always(cause))
 
 
 def other_motion(evidence: Evidence) -> Iterator[Suspicion]:
