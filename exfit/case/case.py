@@ -6,9 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from exfit.case.assembly import CheckedContent, check_content, plain_content
-from exfit.case.bounds import is_held
-from exfit.case.parts import Part, Parts, in_plant
+from exfit.case.parts import Part, Parts, in_plant, is_held
 from exfit.case.schema import (
     SINGLE,
     AsFoundSection,
@@ -32,13 +30,12 @@ from exfit.case.schema import (
     Value,
 )
 from exfit.case.ties import Ties
-from exfit.case.yaml import Fault
 from exfit.errors import CaseError
 from exfit.models.sheet import Parameter
 from exfit.plants import KINDS, NETWORK, PlantKind
 from exfit.records.record import Record
 from exfit.util.sources import FITTED, NOT_STATED, TYPICAL, least_certain
-from exfit.util.text import Place, dotted, near
+from exfit.util.text import near
 
 
 class GivenValue(NamedTuple):
@@ -100,18 +97,17 @@ class Case:
         return f"<Case {self.path.stem}: {self.subject}, {self.plant.type}; free: {free}>"
 
     @classmethod
-    def of(cls, checked: CheckedContent, path: Path, from_file: bool = True) -> "Case":
-        """Return the case of checked content that is, or would be, in the file ``path``."""
-        document = checked.document
+    def of(
+        cls, document: CaseDocument, parts: Parts, ties: Ties, path: Path, from_file: bool = True
+    ) -> "Case":
+        """Return the case of checked sections that are, or would be, in the file ``path``."""
         sections = {name: getattr(document, name) for name in CaseDocument.model_fields}
         external = sections["plant"]
         if isinstance(external, ExternalPlant | FmuPlant):
             sections.update(plant=external.plant, external=external)
-            if "search" not in checked.document.estimate.model_fields_set:
+            if "search" not in document.estimate.model_fields_set:
                 sections["estimate"] = sections["estimate"].model_copy(update={"search": "local"})
-        return cls(
-            path=path, from_file=from_file, parts=checked.parts, ties=checked.ties, **sections
-        )
+        return cls(path=path, from_file=from_file, parts=parts, ties=ties, **sections)
 
     @classmethod
     def from_dict(
@@ -136,18 +132,10 @@ class Case:
             >>> record = exfit.Record.from_arrays(time, {"vt": vt})
             >>> case = exfit.Case.from_dict({"model": "SEXS", ...}, record)
         """
-        from exfit.case.given_records import with_record_sections
+        from exfit.case.load import case_of_dict
 
-        path, faults = Path(folder) / name, list[Fault]()
         records = {SINGLE: record} if isinstance(record, Record) else record or {}
-        plain = with_record_sections(plain_content(content, faults), records, faults)
-        checked = check_content(plain, path.parent, faults)
-        if checked is None:
-            raise CaseError(f"{path}: {dotted(fault.place)}: {fault.text}" for fault in faults)
-        case = cls.of(checked, path, from_file=False)
-        for recording, measurements in records.items():
-            case = case.with_record(measurements, recording)
-        return case
+        return case_of_dict(content, records, Path(folder) / name)
 
     def with_record(self, record: Record, name: str = SINGLE) -> "Case":
         """Return the case with other measurements for one of its records, in place of its file.
@@ -209,6 +197,17 @@ class Case:
         return self.path.parent
 
     @property
+    def program_files(self) -> list[Path]:
+        """The files of what simulates it in place of exfit, which are code: scripts, or an FMU."""
+        if self.external is None:
+            return []
+        if isinstance(self.external, FmuPlant):
+            return [self.folder / self.external.file]
+        from exfit.case.peek import scripts_of
+
+        return [self.folder / word for word in scripts_of(self.external.command, self.folder)]
+
+    @property
     def parameter_file(self) -> Path | None:
         """The file that gave values in place of those of the case, if one did."""
         sources = (given.source for given in self.given_values.values())
@@ -258,11 +257,12 @@ class Case:
         plant = recording.plant
         if plant is None or not self.kind.closed_loop:
             return self
-        own = {key: getattr(self.plant, key) for key in ("machine", "parameters", "free")}
-        sources = {**_at(self.plant, ("sources",)), **dict(plant).get("sources", {})}
+        whole, own = dict(self.plant), dict(plant)
+        machine = {key: whole[key] for key in ("machine", "parameters", "free")}
+        sources = {**whole["sources"], **own.get("sources", {})}
         return replace(
             self,
-            plant=plant.whole(**{**own, **dict(plant), "sources": sources}),
+            plant=plant.whole(**{**machine, **own, "sources": sources}),
             parts=in_plant(self.parts, KINDS[plant.type], plant.given),
             given_values={
                 name: given
@@ -282,9 +282,8 @@ class Case:
             starts = {symbol: free.start for symbol, free in self._free(part).items()}
             resolved = part.resolved(numbers_of(self._fixed(part)), starts)
             values |= {part.prefix + symbol: value for symbol, value in resolved.items()}
-        helpers = {name: free.start for name, free in self._helpers(self.parameters.free).items()}
-        helpers |= numbers_of(self._helpers(self.parameters.fixed))
-        values |= helpers
+        values |= {name: free.start for name, free in self._helpers(self.parameters.free).items()}
+        values |= numbers_of(self._helpers(self.parameters.fixed))
         given = {name: each.value for name, each in self.given_values.items() if name in values}
         return self.ties.apply({**values, **given})
 
@@ -331,7 +330,14 @@ class Case:
         """
         sources = dict.fromkeys(self.values(), NOT_STATED)
         for part in self.parts.all:
-            sources |= self._sources_of(part)
+            stated: Mapping[str, str] = self._section(part, "sources")
+            given, own = {*self._fixed(part), *self._free(part)}, part.symbols
+            sources |= {
+                part.prefix + symbol: stated.get(symbol, NOT_STATED) if symbol in given else TYPICAL
+                for symbol in own
+            }
+            helpers = stated if part.kind == "exciter" else ()
+            sources |= {name: stated[name] for name in helpers if name not in own}
         sources |= {name: word for name, word in self.given_sources.items() if name in sources}
         sources |= dict.fromkeys(fitted, FITTED)
         for name in self.ties.order:
@@ -346,7 +352,7 @@ class Case:
         """
         std_errors: dict[str, float] = {}
         for part in self.parts.all:
-            stated: Mapping[str, float] = _at(self, part.std_errors)
+            stated: Mapping[str, float] = self._section(part, "std_errors")
             own = {*part.symbols, *(stated if part.kind == "exciter" else ())}  # with helpers
             std_errors |= {part.prefix + name: std for name, std in stated.items() if name in own}
         kept = {name: std for name, std in std_errors.items() if name not in self.given_values}
@@ -365,23 +371,21 @@ class Case:
         """Return the unit of every parameter."""
         return {name: row.unit for name, row in self.rows().items()}
 
+    def _section(self, part: Part, key: str) -> Any:
+        """Return what a key of the section of a part has."""
+        section: Any = self
+        for step in part.section:
+            section = section[step] if isinstance(step, int) else getattr(section, step)
+        return getattr(section, key)
+
     def _fixed(self, part: Part) -> Mapping[str, float | str]:
-        given: Mapping[str, float | str] = _at(self, part.fixed)
+        given: Mapping[str, float | str] = self._section(part, part.values)
         return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
 
-    def _sources_of(self, part: Part) -> dict[str, str]:
-        """Name the sources of the values of a part, and those of the exciter's helpers."""
-        stated: Mapping[str, str] = _at(self, part.sources)
-        given, own = {*self._fixed(part), *self._free(part)}, part.symbols
-        sources = {
-            part.prefix + symbol: stated.get(symbol, NOT_STATED) if symbol in given else TYPICAL
-            for symbol in own
-        }
-        helpers = stated if part.kind == "exciter" else ()
-        return sources | {name: stated[name] for name in helpers if name not in own}
-
     def _free(self, part: Part) -> Mapping[str, FreeSection]:
-        given: Mapping[str, FreeSection] = {} if part.free is None else _at(self, part.free)
+        given: Mapping[str, FreeSection] = {}
+        if part.free is not None:
+            given = self._section(part, "free")
         return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
 
     def _helpers(self, given: Mapping[str, Value]) -> dict[str, Value]:
@@ -393,10 +397,3 @@ class Case:
 def numbers_of(given: Mapping[str, float | str]) -> dict[str, float]:
     """Return those values that are numbers of their own."""
     return {name: value for name, value in given.items() if not isinstance(value, str)}
-
-
-def _at(section: Any, place: Place) -> Any:
-    """Return the value at a place of the case."""
-    for key in place:
-        section = section[key] if isinstance(key, int) else getattr(section, key)
-    return section

@@ -1,15 +1,38 @@
-"""A case file read and checked: every fault at once, each with its line."""
+"""What a case file says, read and checked as a whole: every fault at once, each with its line."""
 
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
+from typing import Any, TypeVar
 
-from exfit.case.assembly import check_content
+from pydantic import ValidationError
+
 from exfit.case.case import Case
-from exfit.case.yaml import Fault, YamlNode, read_text, read_yaml
+from exfit.case.checks.content import contradictions
+from exfit.case.checks.node import ContentNode
+from exfit.case.parts import parts_of, ties_of
+from exfit.case.schema import SINGLE, CaseDocument, RecordFile
+from exfit.case.schema.values import Section
+from exfit.case.yaml import (
+    TO_BE_FILLED_IN,
+    Fault,
+    YamlNode,
+    open_places,
+    read_text,
+    read_yaml,
+)
 from exfit.errors import CaseError
-from exfit.util.text import Place, dotted
+from exfit.records.record import Record
+from exfit.registry import parts
+from exfit.util.text import Place, dotted, near
 
 CaseOrPath = Case | str | PathLike[str]
+Content = dict[str, Any]
+Form = TypeVar("Form", bound=Section)
+
+HASH_DIGITS = 12  # of a SHA-256, in a message
 
 
 def load_case(path: Path, model_sha256: str = "") -> Case:
@@ -26,10 +49,10 @@ def load_case(path: Path, model_sha256: str = "") -> Case:
 def parse_case(text: str, path: Path, model_sha256: str = "") -> Case:
     """Return the case of a YAML text, as if it stood in the file ``path``; raises CaseError."""
     top, faults = read_yaml(text, path)
-    checked = check_content(top.value, path.parent, faults, model_sha256)
-    if checked is None:
+    case = checked_case(top.value, path, faults, model_sha256)
+    if case is None:
         raise faults_with_lines(faults, top, path)
-    return Case.of(checked, path)
+    return case
 
 
 def faults_with_lines(faults: list[Fault], top: YamlNode, path: Path) -> CaseError:
@@ -43,3 +66,165 @@ def faults_with_lines(faults: list[Fault], top: YamlNode, path: Path) -> CaseErr
         f"{path}:{line}: {dotted(fault.place)}: {fault.text}"
         for (line, _, _), fault in first.items()
     )
+
+
+def checked_case(
+    content: Content,
+    path: Path,
+    faults: list[Fault],
+    model_sha256: str = "",
+    from_file: bool = True,
+) -> Case | None:
+    """Return the case of the content of a file; None, and faults added, where it has any.
+
+    ``faults`` holds those found before. A user's own model is run only if its file has the hash
+    given, where one is.
+    """
+    for key, section in parts("SECTIONS").items():
+        if key in content:
+            faults.append(Fault((key,), section.load().not_of_a_case))
+            return None
+    still_open = [Fault(place, TO_BE_FILLED_IN) for place in open_places(content)]
+    models = parts_of(content, path.parent, faults, model_sha256)
+    ties = ties_of(content, models, faults)
+    faults[:] = [*still_open, *_elsewhere(faults, still_open)]
+    document = validated(content, faults, CaseDocument)
+    faults += _elsewhere(contradictions(content, models, ties), faults)
+    if faults or document is None:
+        return None
+    return Case.of(document, models, ties, path, from_file)
+
+
+def _elsewhere(faults: Iterable[Fault], others: Iterable[Fault]) -> list[Fault]:
+    """Return the faults of those places that have no other."""
+    places = {fault.place for fault in others}
+    return [fault for fault in faults if fault.place not in places]
+
+
+def validated(
+    content: Content, faults: list[Fault], form: type[Form], place: Place = ()
+) -> Form | None:
+    """Read sections if all have the right form; add a fault for each place that has not."""
+    try:
+        return form.model_validate(content)
+    except ValidationError as error:
+        from exfit.case.json_schema import form_faults
+
+        details = [
+            {**detail, "loc": (*place, *detail["loc"])}
+            for detail in error.errors(include_url=False)
+        ]
+        faults += _elsewhere(form_faults(details), faults)
+        return None
+
+
+def case_of_dict(content: Mapping[str, Any], records: Mapping[str, Record], path: Path) -> Case:
+    """Return the case that a mapping describes, as `Case.from_dict` does, with its records."""
+    faults = list[Fault]()
+    plain = _with_record_sections(plain_content(content, faults), records, faults)
+    case = checked_case(plain, path, faults, from_file=False)
+    if case is None:
+        raise CaseError(f"{path}: {dotted(fault.place)}: {fault.text}" for fault in faults)
+    for name, record in records.items():
+        case = case.with_record(record, name)
+    return case
+
+
+def plain_content(value: Any, faults: list[Fault], place: Place = ()) -> Any:
+    """Return Python data as a case file holds it: mappings, lists, numbers and text.
+
+    Tuples become lists, NumPy's numbers floats and integers, paths text; a None is a fault.
+    """
+    if value is None:
+        faults.append(Fault(place, "has no value"))
+    if isinstance(value, Mapping):
+        return {
+            str(key): plain_content(entry, faults, (*place, str(key)))
+            for key, entry in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [plain_content(entry, faults, (*place, k)) for k, entry in enumerate(value)]
+    if isinstance(value, Path):
+        return value.as_posix()
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return value
+    return int(value) if isinstance(value, Integral) else float(value)
+
+
+def _with_record_sections(
+    content: Content, records: Mapping[str, Record], faults: list[Fault]
+) -> Content:
+    """Return content whose record sections name the arrays where they name no file.
+
+    A name that no record of the content has is a fault.
+    """
+    sections = {} if "records" in content else {SINGLE: content}
+    for key in ("records", "validate"):
+        if isinstance(content.get(key), list):
+            named = [entry for entry in content[key] if isinstance(entry, dict) and "name" in entry]
+            sections |= {str(entry["name"]): entry for entry in named}
+    for name, record in records.items():
+        if name not in sections:
+            text = f"{name} is given, but is not a record of the case; {near(name, sections)}"
+            faults.append(Fault(("records",), text))
+            continue
+        section = sections[name].get("record", {})
+        if isinstance(section, dict):  # what is none is a fault of its own
+            channels = section.get("channels", {signal: {} for signal in record.signals})
+            if isinstance(channels, dict):
+                channels = {
+                    signal: {"column": signal, **entry}
+                    if isinstance(entry, dict) and not {"column", "phases"} & entry.keys()
+                    else entry
+                    for signal, entry in channels.items()
+                }
+            file = record.source.as_posix()
+            sections[name]["record"] = {
+                "file": file,
+                "time": "time",
+                **section,
+                "channels": channels,
+            }
+    return content
+
+
+def record_section(content: Mapping[str, Any]) -> RecordFile:
+    """Return the section of a record of a machine, which stands in no case.
+
+    It is checked like that of a case. Raises CaseError with all faults of it.
+    """
+    from exfit.case.checks.record import channel_faults, record_faults
+
+    place = ("record",)  # in a case, for the keys allowed there
+    faults = list[Fault]()
+    plain = plain_content(content, faults, place)
+    section = validated(plain, faults, RecordFile, place)
+
+    def contradicting(node: ContentNode) -> Iterator[Fault]:
+        yield from record_faults(ContentNode(("test",), {"vt0": 1.0}), node)
+        for signal, channel in node.at("channels").sections:
+            yield from channel_faults(signal, channel, per_unit=True)
+
+    faults += _elsewhere(contradicting(ContentNode(place, plain)), faults)
+    if section is None or faults:
+        file = content.get("file", "record")
+        raise CaseError(f"{file}: {dotted(fault.place[1:])}: {fault.text}" for fault in faults)
+    return section
+
+
+def refuse_changed_program(case: Case, sha256: str) -> None:
+    """Raise CaseError where what simulates a case has another hash than a fit's, if it had one.
+
+    Values of a fit are taken only together with the code that was fitted.
+    """
+    for file in case.program_files[:1] if sha256 else ():
+        with file.open("rb") as opened:
+            own = hashlib.file_digest(opened, "sha256").hexdigest()
+        if own != sha256:
+            raise CaseError(
+                [
+                    f"{file}: not run: the file has changed since the fit: its SHA-256 begins with "
+                    f"{own[:HASH_DIGITS]}, that of the fitted program was {sha256[:HASH_DIGITS]}; "
+                    "fit again"
+                ]
+            )

@@ -1,16 +1,62 @@
-"""A case with another exciter in place of its own, from the typical data of that exciter."""
+"""What a new case frees of a model, and a case with another exciter in place of its own."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 
 from exfit.case.case import Case
-from exfit.case.draft.free_parameters import bounds_of, free_of
 from exfit.case.parts import exciter_part
 from exfit.case.schema import FreeSection, Parameters
-from exfit.case.ties import Tie, Ties
+from exfit.case.ties import Ties
 from exfit.errors import CaseError
-from exfit.models.sheet import Model, Parameter
+from exfit.models.blocks import SHORTEST
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model, Parameter, SearchRange, typical
 from exfit.models.speed_multiplier import times_speed
+
+ALONE = "FIRST_ORDER"  # the model whose output is vt itself
+BOUNDS = (0.1, 10.0)  # times the start
+WITHIN = 2.0  # a factor: a start is at least so far from the bounds that its sheet names
+
+
+def free_of(
+    model: Model | Machine, values: Mapping[str, float] | None = None
+) -> tuple[Parameter, ...]:
+    """Return the parameters that a bump test is fitted for: those marked in the data sheet.
+
+    Left out is what has no effect with these values, by default the typical ones: a gain or time
+    of zero, the lag of a term whose gain is zero, and one of two alternatives. Of a sheet without a
+    mark, as a user's own may be, they are its time constants and gains.
+    """
+    own = typical(model.sheet) if values is None else values
+
+    def acts(row: Parameter, search: SearchRange) -> bool:
+        value = own[row.symbol]
+        if value == 0.0 or (search.needs and own[search.needs] == 0.0):
+            return False
+        if search.unlike and own[search.unlike] == value:
+            return False
+        return len({own[symbol] for symbol in search.instead_of}) <= 1
+
+    marked = [(row, row.search) for row in model.sheet if row.search is not None]
+    if marked:
+        return tuple(row for row, search in marked if acts(row, search))
+    return tuple(
+        row
+        for row in model.sheet
+        if own[row.symbol] > 0.0 and (row.is_time or row.symbol.upper().startswith("K"))
+    )
+
+
+def bounds_of(row: Parameter, start: float | None = None) -> tuple[float, float]:
+    """Return a tenth and ten times a start, as far as units of its kind and the sheet go."""
+    value = row.typical if start is None else start
+    low, high = (share * value for share in BOUNDS)
+    if row.search is not None:
+        low = max(low, min(row.search.low, value / WITHIN))
+        high = min(high, max(row.search.high, value * WITHIN))
+    if row.is_time:
+        low = max(low, SHORTEST)
+    return max(low, row.low), min(high, row.high)
 
 
 def with_exciter(case: Case, name: str, model: Model) -> Case:
@@ -22,9 +68,22 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
     """
     if case.parts.exciter is None:
         raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to replace"])
-    own = _names_of_exciter(case)
+    symbols = (row.symbol for row in case.parts.exciter.sheet)
+    own = {*symbols, *case.parameters.free, *case.parameters.fixed}  # with helpers of its ties
     ties = {tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}
-    _refuse_ties(case, ties, own)
+    faults = [
+        f"{case.path}: {tied} {tie.text}: {used} belongs to {case.subject}; a case for other "
+        "models needs a number here"
+        for tied, tie in ties.items()
+        for used in tie.names
+        if used in own
+    ]
+    if faults:
+        raise CaseError(faults)
+    free = {}
+    for row in free_of(model):
+        low, high = bounds_of(row)
+        free[row.symbol] = FreeSection(start=row.typical, min=low, max=high)
     others = (part for part in case.parts.all if part.kind != "exciter")
     multiplied = times_speed(model) if case.efd_times_speed else model
     exciter = exciter_part(multiplied, exponential=False)
@@ -36,32 +95,7 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
         saturation="quadratic",
         parts=replace(case.parts, exciter=multiplied, all=(exciter, *others)),
         ties=Ties(ties),
-        parameters=Parameters(free={row.symbol: _section(row) for row in free_of(model)}),
+        parameters=Parameters(free=free),
         given_values={key: given for key, given in case.given_values.items() if key not in own},
         given_sources={key: word for key, word in case.given_sources.items() if key not in own},
     )
-
-
-def _section(row: Parameter) -> FreeSection:
-    low, high = bounds_of(row)
-    return FreeSection(start=row.typical, min=low, max=high)
-
-
-def _names_of_exciter(case: Case) -> set[str]:
-    """Return the parameters of the exciter of a case, and the helpers of its ties."""
-    exciter, section = case.parts.exciter, case.parameters
-    rows = () if exciter is None else exciter.sheet
-    return {*(row.symbol for row in rows), *section.free, *section.fixed}
-
-
-def _refuse_ties(case: Case, ties: Mapping[str, Tie], own: set[str]) -> None:
-    """Raise CaseError for each tie that uses one of the exciter's ``own`` parameters."""
-    faults = [
-        f"{case.path}: {name} {tie.text}: {used} belongs to {case.subject}; a case for other "
-        "models needs a number here"
-        for name, tie in ties.items()
-        for used in tie.names
-        if used in own
-    ]
-    if faults:
-        raise CaseError(faults)

@@ -1,39 +1,52 @@
 """The parts of a case with a data sheet: exciter, machine, network, what is added to them."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from exfit.case.saturation import saturation_ties
+from exfit.case.schema.values import FreeSection
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
 from exfit.case.yaml import Fault
 from exfit.errors import ModelError
 from exfit.models import GOVERNORS, LIMITERS, STABILISERS, Catalogue, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
-from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
+from exfit.models.sheet import (
+    Limits,
+    Model,
+    Parameter,
+    Sheet,
+    contradictions,
+    exponential_faults,
+    typical,
+)
 from exfit.plants import EVENTS, GOVERNOR, KINDS, MACHINE, NETWORK, STABILISER, Attached, PlantKind
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.signals import RECORDED
 from exfit.util.text import Place, near
 
 Data = Mapping[str, Any]
-Contradictions = Iterator[tuple[str, str]]
+Contradictions = Iterable[tuple[str, str]]
 
 # in place of a kind that does not exist, which is a fault of its own
 ANY_PLANT = replace(OPEN_CIRCUIT, events=EVENTS, signals=RECORDED)
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
+# an exciter's saturation as AEX exp(BEX E), from which its two points follow exactly
+MEANINGS = {"AEX": "factor of the saturation curve", "BEX": "exponent of the saturation curve"}
+POINTS = ("SE1", "SE2")
+# the saturation at a voltage, by the form of the curve: VX = E SE is the exponential, or SE is
+FORMS = {"exponential": "=AEX*exp(BEX*{0})/{0}", "exponential-se": "=AEX*exp(BEX*{0})"}
+
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a case: its kind, the model it names, where the file gives its parameters.
+    """A part of a case: its kind, the model it names, the section of the file about it.
 
-    ``sources`` is where the file says where their values come from. Its parameters are those of its
-    sheet, in the system under ``prefix``. ``check(values)`` yields (symbol, text) for values that
+    ``values`` is the key of that section with the fixed parameters, which are those of its sheet,
+    in the system under ``prefix``. ``check(values)`` yields (symbol, text) for values that
     contradict each other.
     """
 
@@ -41,15 +54,21 @@ class Part:
     name: str
     prefix: str
     sheet: Sheet
-    fixed: Place
-    free: Place | None
-    sources: Place
-    check: Callable[[Mapping[str, float]], Contradictions] = field(compare=False)
+    section: Place
+    values: str = "parameters"
+    check: Callable[[Mapping[str, float]], Contradictions] = field(
+        default=contradictions, compare=False
+    )
 
     @property
-    def std_errors(self) -> Place:
-        """Where the file gives the standard errors of its values."""
-        return (*self.sources[:-1], "std_errors")
+    def fixed(self) -> Place:
+        """Where the file gives its fixed parameters."""
+        return (*self.section, self.values)
+
+    @property
+    def free(self) -> Place | None:
+        """Where the file gives its free parameters; None: it has none."""
+        return None if self.kind == "network" else (*self.section, "free")
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -81,6 +100,17 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
 
     The file of a user's own model is run only if it has the hash given, where one is.
     """
+
+    def named(section: Any, place: Place, catalogue: Mapping[str, Any], kind: str) -> Any:
+        """Find what a section names in a catalogue; add a fault where there is none."""
+        name = _mapping(section).get(str(place[-1]))
+        if not isinstance(name, str) or not name:
+            return None
+        if name.upper() not in catalogue:
+            text = f"{name!r} is not a {kind} model; {near(name, catalogue)}"
+            faults.append(Fault(place, text))
+        return catalogue.get(name.upper())
+
     plant = _mapping(data.get("plant"))
     kind = kind_of(plant)
     exciter = None
@@ -88,23 +118,47 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
         exciter = _named(plant, data)
     elif kind.has_exciter:
         exciter = _exciter(data, folder, faults, model_sha256)
-    machine = _machine(plant, faults) if kind.has_machine else None
-    stabiliser = _added(data, "stabiliser", STABILISERS, faults)
-    governor = _added(data, "governor", GOVERNORS, faults)
+    machine: Machine | None = None
+    if kind.has_machine:
+        machine = named(plant, ("plant", "machine"), MACHINES, "machine")
+    added: dict[str, tuple[str, Catalogue]] = {
+        "stabiliser": (STABILISER, STABILISERS),
+        "governor": (GOVERNOR, GOVERNORS),
+    }
+    models: dict[str, Model | None] = {
+        key: named(data.get(key), (key, "model"), catalogue, key)
+        for key, (_, catalogue) in added.items()
+    }
     parts = []
     if exciter is not None:
         exponential = str(data.get("saturation")).startswith("exponential")
         parts.append(exciter_part(exciter, exponential))
     if machine is not None:
         kinds = (kind, *map(kind_of, plants_of_records(data).values()))
-        parts.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
+        parts.append(_machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
     if kind.on_load:
         parts.append(network_part(_mapping(plant.get("network")), kind))
-    added = (("stabiliser", STABILISER, stabiliser), ("governor", GOVERNOR, governor))
-    parts += [added_part(kind, prefix, model) for kind, prefix, model in added if model is not None]
-    places, limiters = limiters_of(data, faults)
-    parts += [limiter_part(at, limiter) for at, limiter in zip(places, limiters, strict=True)]
-    return Parts(exciter, machine, stabiliser, governor, tuple(parts), limiters)
+    parts += [
+        added_part(key, prefix, model)
+        for key, (prefix, _) in added.items()
+        if (model := models[key]) is not None
+    ]
+    limiters: dict[str, Attached] = {}
+    for at, entry in enumerate(_entries(data.get("limiters"))):
+        place = ("limiters", at, "model")
+        model = named(entry, place, LIMITERS, "limiter")
+        if model is None:
+            continue
+        acts_at = entry.get("place")
+        limiter = Attached(model, acts_at if isinstance(acts_at, str) else model.places[0])
+        first = limiters.setdefault(limiter.kind, limiter)
+        if first is limiter:
+            parts.append(added_part(limiter.kind, limiter.prefix, model, ("limiters", at)))
+        else:
+            name = entry["model"].upper()
+            text = f"{name}: a second one beside {first.model.name}; at most one of each kind"
+            faults.append(Fault(place, text))
+    return Parts(exciter, machine, **models, all=tuple(parts), limiters=tuple(limiters.values()))
 
 
 def kind_of(plant: Data) -> PlantKind:
@@ -120,15 +174,12 @@ def kind_of(plant: Data) -> PlantKind:
 
 def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:
     """Return the parts in a plant of another kind, of whose network some values are given."""
-    limiting = tuple(limiter.kind for limiter in parts.limiters)
-    without = ("exciter", "stabiliser", "governor", *limiting)
-    absent = ("network",) if kind.has_exciter else ("network", *without)
-    others = tuple(part for part in parts.all if part.kind not in absent)
     network = (network_part(given, kind),) if kind.on_load else ()
-    changed = replace(parts, all=(*others, *network))
     if kind.has_exciter:
-        return changed
-    return replace(changed, exciter=None, stabiliser=None, governor=None, limiters=())
+        others = tuple(part for part in parts.all if part.kind != "network")
+        return replace(parts, all=(*others, *network))
+    machine = tuple(part for part in parts.all if part.kind == "machine")
+    return Parts(None, parts.machine, None, None, (*machine, *network))
 
 
 def plants_of_records(data: Data) -> dict[Place, Data]:
@@ -143,44 +194,63 @@ def plants_of_records(data: Data) -> dict[Place, Data]:
 
 def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
     """Return the ties of a case file's data; add a fault for each that cannot be used."""
-    ties: dict[str, Tie] = {}
-    places: dict[str, Place] = {}
-    for name, place, text in _tied(data, parts):
-        places[name] = place
-        try:
-            ties[name] = parse(text)
-        except TieError as error:
-            faults.append(Fault(place, str(error)))
     names = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
     names += helpers_of(data, parts)
-    known = set(names)
-    for name, tie in list(ties.items()):
-        for used in tie.names:
-            if used not in known:
-                faults.append(
-                    Fault(places[name], f"{used} is not a parameter; {near(used, names)}")
-                )
-                ties.pop(name, None)
+    known, tied = set(names), tied_texts(data, parts)
+    ties: dict[str, Tie] = {}
+    for name, (place, text) in tied.items():
+        try:
+            tie = parse(text)
+        except TieError as error:
+            faults.append(Fault(place, str(error)))
+            continue
+        unknown = [used for used in tie.names if used not in known]
+        if not unknown:
+            ties[name] = tie
+        for used in unknown:
+            faults.append(Fault(place, f"{used} is not a parameter; {near(used, names)}"))
     try:
         return Ties(ties)
     except TieError as error:
         first = str(error).partition(" -> ")[0]
-        faults.append(Fault(places[first], str(error)))
+        faults.append(Fault(tied[first][0], str(error)))
         return Ties({})
 
 
-def used_by_ties(data: Data, parts: Parts) -> set[str]:
-    """Return the names used in the arithmetic of a case file's data."""
-    used: set[str] = set()
-    for _, _, text in _tied(data, parts):
-        with suppress(TieError):
-            used |= {*parse(text).names}
-    return used
+def tied_texts(data: Data, parts: Parts) -> dict[str, tuple[Place, str]]:
+    """Return place and text of every value that is the arithmetic of others, by its name.
+
+    The points of a saturation curve follow from AEX and BEX where these are given: those of the
+    data sheet's voltages E1 and E2, or of the case's.
+    """
+    tied: dict[str, tuple[Place, str]] = {}
+    for part in parts.all:
+        if part.kind != "network":
+            for symbol, value in _at(data, part.fixed).items():
+                if is_tie(value):
+                    tied[part.prefix + symbol] = (*part.fixed, symbol), value
+        if part.kind == "exciter" and has_saturation(part.sheet):
+            form = FORMS.get(str(data.get("saturation")))
+            places = saturation_places(data)
+            if form is not None and {name for *_, name in places} == {*MEANINGS}:
+                for symbol in POINTS:
+                    tied[symbol] = places[-1], form.format(symbol.replace("SE", "E"))
+    return tied
 
 
-def places_of_ties(data: Data, parts: Parts) -> dict[str, Place]:
-    """Return the place of the arithmetic that gives each tied parameter."""
-    return {name: place for name, place, _ in _tied(data, parts)}
+def has_saturation(sheet: Sheet) -> bool:
+    """Tell if a model has the two points of a saturation curve."""
+    return {*POINTS} <= {row.symbol for row in sheet}
+
+
+def saturation_places(data: Data) -> list[Place]:
+    """List the places at which a case file's data give AEX and BEX, in this order."""
+    return [
+        ("parameters", key, name)
+        for name in MEANINGS
+        for key in ("fixed", "free")
+        if name in _at(data, ("parameters", key))
+    ]
 
 
 def helpers_of(data: Data, parts: Parts) -> dict[str, Place]:
@@ -189,28 +259,39 @@ def helpers_of(data: Data, parts: Parts) -> dict[str, Place]:
     A name of another part (machine.H), or of what may be found about a record, is no helper.
     """
     own = next((part.symbols for part in parts.all if part.kind == "exciter"), ())
-    section = _mapping(data.get("parameters"))
     return {
         name: ("parameters", key, name)
         for key in ("fixed", "free")
-        for name in _mapping(section.get(key))
+        for name in _at(data, ("parameters", key))
         if name not in own and name.isidentifier() and name not in OF_RECORD
     }
 
 
-def _tied(data: Data, parts: Parts) -> Iterator[tuple[str, Place, str]]:
-    """Yield name, place and text of every value that is the arithmetic of others."""
-    sections: list[tuple[str, Place]] = [
-        (part.prefix, part.fixed) for part in parts.all if part.kind != "network"
-    ]
-    for prefix, place in sections:
-        section = _at(data, place)
-        for symbol, value in section.items():
-            if is_tie(value):
-                yield prefix + symbol, (*place, symbol), value
-    for part in parts.all:
-        if part.kind == "exciter":
-            yield from saturation_ties(data, part.sheet)
+def bounds_of(section: FreeSection, row: Parameter | None) -> Limits:
+    """Return the bounds of a free parameter of a case."""
+    return search_bounds(section.min, section.max, row) if section.bounds != "none" else (-inf, inf)
+
+
+def search_bounds(low: float | None, high: float | None, row: Parameter | None) -> Limits:
+    """Return the bounds of a free parameter, given those that the case has.
+
+    A missing one is the limit of the equations, which may be infinite; a time constant stays where
+    its block is not bypassed, also where its bound of 0 belongs to a start of 0 that another one
+    has replaced. Without a data sheet there is no limit.
+    """
+    lowest, highest = (-inf, inf) if row is None else row.domain
+    if row is not None and row.is_time:
+        lowest = max(lowest, SHORTEST)
+        low = None if low == 0.0 else low
+    return lowest if low is None else low, highest if high is None else high
+
+
+def is_held(start: float | None, row: Parameter | None) -> bool:
+    """Tell if a free parameter is a time constant of 0, whose block is bypassed.
+
+    The response does not depend on it there, so that no fit can leave that value.
+    """
+    return row is not None and row.is_time and row.low == 0.0 and start == 0.0
 
 
 def exciter_part(model: Model, exponential: bool) -> Part:
@@ -221,69 +302,25 @@ def exciter_part(model: Model, exponential: bool) -> Part:
         if exponential:
             yield from exponential_faults(values)
 
-    places = _places("parameters", "fixed")
-    return Part("exciter", model.name, "", model.sheet, *places, check)
+    return Part("exciter", model.name, "", model.sheet, ("parameters",), "fixed", check)
 
 
-def machine_part(machine: Machine, on_load: bool) -> Part:
-    """Return the part of a machine."""
+def added_part(kind: str, prefix: str, model: Model, section: Place = ()) -> Part:
+    """Return the part of a stabiliser, governor or limiter, in a section of its kind by default."""
+    return Part(kind, model.name, prefix, model.sheet, section or (kind,))
 
+
+def _machine_part(machine: Machine, on_load: bool) -> Part:
     def check(values: Mapping[str, float]) -> Contradictions:
         if len(values) == len(machine.sheet):
             yield from machine.faults(values)
         if on_load and values.get("Tppd0", inf) < SHORTEST:
             yield "Tppd0", f"{values['Tppd0']:g} is for open circuit; on load it must be positive"
 
-    places = _places("plant", "parameters")
-    return Part("machine", machine.name, MACHINE, machine.sheet, *places, check)
+    return Part("machine", machine.name, MACHINE, machine.sheet, ("plant",), check=check)
 
 
-def added_part(kind: str, prefix: str, model: Model) -> Part:
-    """Return the part of a stabiliser or of a governor."""
-    places = _places(kind, "parameters")
-    return Part(
-        kind,
-        model.name,
-        prefix,
-        model.sheet,
-        *places,
-        lambda values: iter(contradictions(values)),
-    )
-
-
-def limiter_part(at: int, limiter: Attached) -> Part:
-    """Return the part of a limiter, an entry of the list of a case."""
-    place = ("limiters", at)
-    return Part(
-        limiter.kind,
-        limiter.model.name,
-        limiter.prefix,
-        limiter.model.sheet,
-        (*place, "parameters"),
-        (*place, "free"),
-        (*place, "sources"),
-        lambda values: iter(contradictions(values)),
-    )
-
-
-def limiters_of(data: Data, faults: list[Fault]) -> tuple[list[int], tuple[Attached, ...]]:
-    """Return the limiters of a case, one of each kind, and their indices; add faults of names."""
-    by_kind: dict[str, tuple[int, Attached]] = {}
-    for at, entry in enumerate(_entries(data.get("limiters"))):
-        section = _mapping(entry)
-        name = _catalogue_name(section, ("limiters", at, "model"), LIMITERS, "limiter", faults)
-        if name is None:
-            continue
-        model, place = LIMITERS[name], section.get("place")
-        limiter = Attached(model, place if isinstance(place, str) else model.places[0])
-        first = by_kind.setdefault(limiter.kind, (at, limiter))[1]
-        if first is not limiter:
-            text = f"{name}: a second one beside {first.model.name}; at most one of each kind"
-            faults.append(Fault(("limiters", at, "model"), text))
-    return [at for at, _ in by_kind.values()], tuple(limiter for _, limiter in by_kind.values())
-
-
-def network_part(given: Data, kind: PlantKind, place: Place = ("plant", "network")) -> Part:
+def network_part(given: Data, kind: PlantKind, plant: Place = ("plant",)) -> Part:
     """Return the part of a network in a plant of some kind, which needs these values given."""
     sheet = kind.network(given)
     symbols = [row.symbol for row in sheet]
@@ -304,13 +341,7 @@ def network_part(given: Data, kind: PlantKind, place: Place = ("plant", "network
 
     if "Q" in given and "E" in given:
         sheet = tuple(dict.fromkeys((*sheet, *kind.network(("Q",)))))
-    sources = (*place[:-1], "sources")
-    return Part("network", "the network", NETWORK, sheet, place, None, sources, check)
-
-
-def _places(section: str, fixed: str) -> tuple[Place, Place, Place]:
-    """Find the sections of the file for fixed values, free ones, and their sources."""
-    return (section, fixed), (section, "free"), (section, "sources")
+    return Part("network", "the network", NETWORK, sheet, plant, "network", check)
 
 
 def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Model | None:
@@ -337,34 +368,8 @@ def _named(plant: Data, data: Data) -> Model:
     words = [str(word) for word in command] if isinstance(command, list) else []
     files = [word for word in words[1:] if not word.startswith("-")]
     words += [str(plant[key]) for key in ("file", "type") if key in plant]
-    section = _mapping(data.get("parameters"))
-    names = (name for key in ("fixed", "free") for name in _mapping(section.get(key)))
-    name = Path([*files, *words][0]).stem.upper()
-    return model_of_names(name, dict.fromkeys(names))
-
-
-def _machine(plant: Data, faults: list[Fault]) -> Machine | None:
-    name = _catalogue_name(plant, ("plant", "machine"), MACHINES, "machine", faults)
-    return None if name is None else MACHINES[name]
-
-
-def _added(data: Data, kind: str, catalogue: Catalogue, faults: list[Fault]) -> Model | None:
-    """Return the stabiliser or governor that a case names; None where it has none."""
-    name = _catalogue_name(_mapping(data.get(kind)), (kind, "model"), catalogue, kind, faults)
-    return None if name is None else catalogue[name]
-
-
-def _catalogue_name(
-    section: Data, place: Place, catalogue: Mapping[str, Any], kind: str, faults: list[Fault]
-) -> str | None:
-    """Return the entry that a section names; add a fault where there is none of that name."""
-    name = section.get(str(place[-1]))
-    if not isinstance(name, str) or not name:
-        return None
-    if name.upper() in catalogue:
-        return name.upper()
-    faults.append(Fault(place, f"{name!r} is not a {kind} model; {near(name, catalogue)}"))
-    return None
+    names = (name for key in ("fixed", "free") for name in _at(data, ("parameters", key)))
+    return model_of_names(Path([*files, *words][0]).stem.upper(), dict.fromkeys(names))
 
 
 def _at(data: Data, place: Place) -> dict[str, Any]:
@@ -372,18 +377,15 @@ def _at(data: Data, place: Place) -> dict[str, Any]:
     section: Any = data
     for key in place:
         if isinstance(key, int):
-            section = _entries(section)[key : key + 1]
-            section = section[0] if section else None
+            section = next(iter(_entries(section)[key : key + 1]), None)
         else:
             section = _mapping(section).get(key)
     return _mapping(section)
 
 
 def _entries(value: Any) -> list[Any]:
-    """Return a list of the file, an empty one where there is none."""
     return value if isinstance(value, list) else []
 
 
 def _mapping(value: Any) -> dict[str, Any]:
-    """Return a mapping of the file, an empty one where there is none."""
     return value if isinstance(value, dict) else {}

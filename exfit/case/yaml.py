@@ -24,6 +24,8 @@ WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]*)")
 LONGEST_WHOLE = 15  # digits: every whole number of so many is a double
 DECIMAL = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 INFINITE = re.compile(r"([-+]?)\.(inf|Inf|INF)")
+QUESTION = "?"  # in place of a value that is left to be filled in: a case that holds it is refused
+TO_BE_FILLED_IN = f"'{QUESTION}' is to be filled in"
 WORDS: dict[str, bool | float | None] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -95,7 +97,7 @@ def read_yaml(text: str, path: Path) -> tuple[YamlNode, list[Fault]]:
     if top is None:
         raise CaseError([f"{path}: the file is empty"])
     if not isinstance(top.value, dict):
-        what = _kind(top.value)
+        what = "a list" if isinstance(top.value, list) else repr(top.value)
         raise CaseError([f"{path}:{top.line}: {what}, not a mapping (key: value) at the top"])
     return top, reader.faults
 
@@ -143,7 +145,13 @@ class _Reader:
             self.faults.append(Fault(place, f"tag {event.tag} is not used here", _line(event)))
         before = self.values
         self._count(1, event)
-        node = self._content(event, place)
+        if isinstance(event, yaml.MappingStartEvent):
+            node = self._mapping(event, place)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            node = self._sequence(event, place)
+        else:
+            plain = event.implicit[0]
+            node = YamlNode(scalar(event.value) if plain else event.value, _line(event))
         if event.anchor is not None:
             self.anchors[event.anchor] = node, self.values - before
         return node
@@ -152,14 +160,6 @@ class _Reader:
         self.values += values
         if self.values > MOST_VALUES:
             raise _NoYaml(_line(event), f"more than {MOST_VALUES:,} values")
-
-    def _content(self, event: Any, place: Place) -> YamlNode:
-        if isinstance(event, yaml.MappingStartEvent):
-            return self._mapping(event, place)
-        if isinstance(event, yaml.SequenceStartEvent):
-            return self._sequence(event, place)
-        plain = event.implicit[0]
-        return YamlNode(scalar(event.value) if plain else event.value, _line(event))
 
     def _mapping(self, start: Any, place: Place) -> YamlNode:
         entries: dict[str | int, YamlNode] = {}
@@ -206,5 +206,19 @@ def _line(event: Any) -> int:
     return int(event.start_mark.line) + 1
 
 
-def _kind(value: Any) -> str:
-    return "a list" if isinstance(value, list) else repr(value)
+def open_places(content: Any) -> list[Place]:
+    """Find the places of the content of a case that are to be filled in.
+
+    What an alias repeats counts where it stands first.
+    """
+    visited: set[int] = set()
+
+    def search(inner: Any, place: Place) -> Iterator[Place]:
+        if inner == QUESTION:
+            yield place
+        if isinstance(inner, dict | list) and id(inner) not in visited:
+            visited.add(id(inner))
+            for key, entry in inner.items() if isinstance(inner, dict) else enumerate(inner):
+                yield from search(entry, (*place, key))
+
+    return [*search(content, ())]

@@ -60,7 +60,7 @@ def fit_again_and_again(
     Raises ExfitError where there is no such file, or no place for the results: a change of the
     case would not help.
     """
-    from exfit.case.watch import changed, stamps_of
+    from exfit.case.peek import changed, stamps_of
     from exfit.case.yaml import read_text
     from exfit.show import run_folder, terminal
 

@@ -224,8 +224,7 @@ def load(case: Path, model_sha256: str = "", program_sha256: str = "") -> "Case"
 
     A user's own model, or a program, is run only if its file has the hash given, where one is.
     """
-    from exfit.case.load import load_case
-    from exfit.case.program_files import refuse_changed_program
+    from exfit.case.load import load_case, refuse_changed_program
 
     loaded = load_case(case, model_sha256)
     refuse_changed_program(loaded, program_sha256)

@@ -59,9 +59,8 @@ def inspect_(
     Suggests the record, test and estimate sections of a case; guesses are marked. Writes
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
-    from exfit.case.draft.case_draft import CaseDraft
-    from exfit.case.draft.record_settings import RecordSettings
-    from exfit.case.draft.suggestion import suggested_sections
+    from exfit.case.case_draft import CaseDraft
+    from exfit.case.suggestion import RecordSettings, suggested_sections
     from exfit.show import run_folder
 
     # files of one record in several formats have one stem

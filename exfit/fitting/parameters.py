@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.bounds import bounds_of
+from exfit.case.parts import bounds_of
 from exfit.case.schema import FreeSection
 from exfit.models.sheet import Parameter
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
+from exfit.case.parts import bounds_of
 from exfit.case.schema import BumpTest, ReferenceTable
 from exfit.dsp.jumps import scatter
 from exfit.fitting.experiment import Channel, ExperimentSetup

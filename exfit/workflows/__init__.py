@@ -108,7 +108,7 @@ def read_record(
         >>> volts = {"column": "Ugen", "unit": "kV", "base": 15.75}
         >>> record = exfit.read_record("bump.csv", ["Date", "Time"], {"vt": volts})
     """
-    from exfit.case.record_section import record_section
+    from exfit.case.load import record_section
     from exfit.fitting.recordings import read_section
 
     file = {"file": Path(path), "sheet": sheet, "memory": memory, "resample": resample}
@@ -123,7 +123,7 @@ def loaded(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> Case:
 
     So is the program that simulates it.
     """
-    from exfit.case.program_files import refuse_changed_program
+    from exfit.case.load import refuse_changed_program
 
     hashes = getattr(values, "inputs", {})
     if not isinstance(case, Case):

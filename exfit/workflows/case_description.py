@@ -6,7 +6,6 @@ from typing import TypeVar
 
 from exfit.case.case import Case
 from exfit.case.parts import Part
-from exfit.case.program_files import program_files
 from exfit.case.schema import (
     AngleTable,
     BumpTest,
@@ -138,7 +137,7 @@ def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]
 
 def _scripts(case: Case) -> dict[str, Path]:
     """Return the files of what simulates a case in place of exfit, by their labels."""
-    return {f"program{number or ''}": file for number, file in enumerate(program_files(case))}
+    return {f"program{number or ''}": file for number, file in enumerate(case.program_files)}
 
 
 def _records(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[tuple[str, Record]]:

@@ -6,8 +6,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from exfit.case.bounds import bounds_of
 from exfit.case.case import Case
+from exfit.case.parts import bounds_of
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
-from exfit.case.saturation import MEANINGS
+from exfit.case.parts import MEANINGS
 from exfit.case.schema import SINGLE
 from exfit.fitting.channel_weights import balanced, weight_notes
 from exfit.fitting.descents import descent_near

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from records import case_of, config
 
-from exfit.case.bounds import is_held, search_bounds
+from exfit.case.parts import is_held, search_bounds
 from exfit.errors import CaseError
 from exfit.fitting.problem import free_parameters
 from exfit.models import MODELS

@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 from places import CONFIGS
 
-from exfit.case.draft.free_parameters import ALONE, bounds_of, free_of
 from exfit.case.load import load_case, parse_case
-from exfit.case.other_model import with_exciter
+from exfit.case.other_model import ALONE, bounds_of, free_of, with_exciter
 from exfit.errors import CaseError
 from exfit.models import MODELS
 

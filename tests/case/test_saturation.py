@@ -11,7 +11,7 @@ from records import case_of, config
 from scipy.integrate import solve_ivp
 
 from exfit.case.case import Case
-from exfit.case.saturation import has_saturation
+from exfit.case.parts import has_saturation
 from exfit.errors import CaseError
 from exfit.features.planner.export import export
 from exfit.features.planner.fields import Field

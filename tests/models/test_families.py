@@ -4,7 +4,7 @@ from itertools import groupby
 
 import pytest
 
-from exfit.case.draft.free_parameters import ALONE
+from exfit.case.other_model import ALONE
 from exfit.models import MODELS
 from exfit.models.families import edition_of, family_of, relatives, without_doubles
 

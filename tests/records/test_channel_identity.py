@@ -6,8 +6,8 @@ import yaml
 from columns import Columns
 from step_records import step_record
 
-from exfit.case.draft.case_draft import CaseDraft
-from exfit.case.draft.suggestion import record_section
+from exfit.case.case_draft import CaseDraft
+from exfit.case.suggestion import record_section
 from exfit.records.inspection import inspect
 
 TABLE = step_record(1, length=6.0).table.content

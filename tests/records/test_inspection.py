@@ -15,8 +15,8 @@ from step_records import step_record
 from tables import read_columns
 from tiers import few_of
 
-from exfit.case.draft.case_draft import CaseDraft
-from exfit.case.draft.suggestion import (
+from exfit.case.case_draft import CaseDraft
+from exfit.case.suggestion import (
     bump_section,
     record_section,
     suggested_sections,

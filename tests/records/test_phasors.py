@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pmu_records import KV, MVA, phasors_of, pmu_columns, smooth_course, write_table
 
-from exfit.case.record_section import record_section
+from exfit.case.load import record_section
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.recordings import read_section
 

@@ -10,8 +10,8 @@ from step_records import step_record
 from tiers import few_of
 from typed_rejection import Load, recorded_rejection
 
-from exfit.case.draft.case_draft import CaseDraft
-from exfit.case.draft.suggestion import bump_section
+from exfit.case.case_draft import CaseDraft
+from exfit.case.suggestion import bump_section
 from exfit.errors import ExfitError
 from exfit.features.start.starting_tests import starting_tests
 from exfit.features.start.tables import TableRow

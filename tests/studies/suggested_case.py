@@ -32,8 +32,8 @@ from records import write
 
 import exfit
 from exfit.case.case import Case
-from exfit.case.draft.case_draft import CaseDraft
-from exfit.case.draft.suggestion import record_section, weights_section
+from exfit.case.case_draft import CaseDraft
+from exfit.case.suggestion import record_section, weights_section
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 

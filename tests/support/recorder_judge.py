@@ -6,9 +6,9 @@ from pathlib import Path
 import yaml
 from recorder_files import SIGNALS, Column, RecorderFile
 
-from exfit.case.draft.case_draft import CaseDraft
-from exfit.case.draft.suggestion import bump_section, record_section
-from exfit.case.open_values import QUESTION
+from exfit.case.case_draft import CaseDraft
+from exfit.case.suggestion import bump_section, record_section
+from exfit.case.yaml import QUESTION
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 

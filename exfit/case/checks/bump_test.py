@@ -1,76 +1,65 @@
-"""What contradicts itself in a test: its steps and its references."""
+"""What contradicts itself in a test: its steps, its references, its breaker, what a fit finds."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 
+from exfit.case.checks.model import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
-from exfit.plants import BREAKER, EVENTS, PlantKind
+from exfit.plants import BREAKER, EVENTS, REFERENCES, SPEED, PlantKind
 from exfit.util.text import show
 
-Row = tuple[float, float]
-
-
-def table_faults(given: ContentNode, duration: float | None) -> Iterator[Fault]:
-    """Yield the faults of a reference that is a table; ``duration`` of a test without a record."""
-    rows = rows_of(given)
-    if rows is None or len(rows) < 2:
-        return
-    table = given.at("table")
-    yield from _row_order_faults(table, [time for time, _ in rows])
-    (first, level), (last, _) = rows[0], rows[-1]
-    if all(value == level for _, value in rows):
-        yield table.fault(f"stays at {show(level)}: there is no test")
-    elif duration is not None and not first <= 0.0 <= duration <= last:
-        covered = f"{show(first)} ... {show(last)} s"
-        text = f"{covered} does not cover the test, 0 ... {show(duration)} s: add a row"
-        yield table.fault(text)
-
-
-def _row_order_faults(table: ContentNode, times: Sequence[float]) -> Iterator[Fault]:
-    """Yield the rows whose time goes back, or is that of two others."""
-    for k, (before, time) in enumerate(pairwise(times), 1):
-        if time < before:
-            yield table.at(k).fault(f"{show(time)} s is before {show(before)} s, the row before")
-        elif k > 1 and times[k - 2] == time:
-            text = f"{show(time)} s is given more than twice: a step has two rows"
-            yield table.at(k).fault(text)
-
-
-def rows_of(given: ContentNode) -> list[Row] | None:
-    """Return the rows of a table; None where one of them is none."""
-    rows = [row.pair for row in given.at("table").entries]
-    return None if None in rows else [row for row in rows if row is not None]
-
-
-def moves_of(given: ContentNode) -> Iterator[tuple[ContentNode, float]]:
-    """Yield the instants from which on the lines of a table rise or fall, with their places."""
-    rows = rows_of(given) or []
-    for k, ((time, value), (_, then)) in enumerate(pairwise(rows)):
-        if then != value:
-            yield given.at("table", k), time
+AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
+RECORDED = "recorded"  # in place of steps: the channel of the record
 
 
 def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of a test; ``network`` is that of its plant."""
+    duration, steady = test.at("duration").number, test.at("steady_until")
     for name in EVENTS:
         yield from _step_faults(test, name)
-        yield from table_faults(test.at(name), test.at("duration").number)
-        for place, at in moves_of(test.at(name)):
-            yield from place_faults(place, at, test.at("duration").number)
+        yield from _table_faults(test.at(name), duration)
+        for place, at in _moves(test.at(name)):
+            yield from _place_faults(place, at, duration)
         if name in test and name not in kind.events:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
     for switch in test.at("network").entries:
         if switch.at("E").number is not None and "E" not in network:
             text = "only where plant.network gives E; test.E changes it by steps"
             yield switch.at("E").fault(text)
+    instants = [at for _, at in instants_of(test)]
     if kind.plays_back:
-        yield from _playback_faults(test, kind)
+        if "begin" in test:
+            text = f"not allowed with plant {kind.name}: the record drives the simulation"
+            yield test.at("begin").fault(text)
+        if steady.number is None and not kind.finds_rest and not instants:
+            yield steady.fault("is missing: until when is the record at rest?")
     elif test.content and not {*EVENTS} & test.content.keys():
         yield test.fault(f"no step: give one of {', '.join(kind.events)}")
-    yield from _rest_faults(test)
+    if steady.number is not None and instants and steady.number > min(instants):
+        text = f"{show(steady.number)} s is after the first step, at {show(min(instants))} s"
+        yield steady.fault(text)
+    if not kind.finds_rest and test.at("frequency_offset").value is not None:
+        yield test.at("frequency_offset").fault(no_event(kind))
     if kind.per_unit:
-        yield from _voltage_faults(test.at("vt0"))
+        vt0 = test.at("vt0")
+        for node, voltage in ((vt0, vt0.start), (vt0.at("min"), vt0.at("min").number)):
+            if voltage is not None and voltage <= 0:
+                yield node.fault(f"{show(voltage)} is not above 0")
+
+
+def no_event(kind: PlantKind) -> str:
+    """Say why a key of a grid event is refused."""
+    return f"not allowed with plant {kind.name}: no grid event drives it"
+
+
+def missing_without_record(test: ContentNode) -> Iterator[Fault]:
+    """Demand of a test what otherwise a record gives."""
+    if "begin" in test:
+        yield test.at("begin").fault("only with a record; without one the time begins at 0")
+    for key in ("duration", "vt0"):
+        if test.content and key not in test:
+            yield test.at(key).fault("is missing: without a record it must be given")
 
 
 def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
@@ -80,79 +69,238 @@ def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
             at = event.at("at").start
             if at is not None:
                 yield event.at("at"), at
-        yield from moves_of(test.at(name))
+        yield from _moves(test.at(name))
     opens = test.at(BREAKER, "opens")
     if opens.start is not None:
         yield opens, opens.start
 
 
-def missing_without_record(test: ContentNode) -> Iterator[Fault]:
-    """Demand of a test what otherwise a record gives."""
-    if "begin" in test:
-        text = "only with a record; without one the time begins at 0"
-        yield test.at("begin").fault(text)
-    if test.content and "duration" not in test:
-        text = "is missing: without a record it must be given"
-        yield test.at("duration").fault(text)
-    if test.content and "vt0" not in test:
-        yield test.at("vt0").fault("is missing: without a record it must be given")
+def _rows(given: ContentNode) -> list[tuple[float, float]]:
+    """Return the rows of a table; none where one of them is no row."""
+    pairs = [row.pair for row in given.at("table").entries]
+    rows = [row for row in pairs if row is not None]
+    return rows if len(rows) == len(pairs) else []
 
 
-def _playback_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:
-    """Check the keys of a test in which a record drives the simulation."""
-    if "begin" in test:
-        text = f"not allowed with plant {kind.name}: the record drives the simulation"
-        yield test.at("begin").fault(text)
-    steady = test.at("steady_until")
-    if steady.number is None and not kind.finds_rest and not any(instants_of(test)):
-        yield steady.fault("is missing: until when is the record at rest?")
+def _moves(given: ContentNode) -> Iterator[tuple[ContentNode, float]]:
+    """Yield the instants from which on the lines of a table rise or fall, with their places."""
+    for k, ((time, value), (_, then)) in enumerate(pairwise(_rows(given))):
+        if then != value:
+            yield given.at("table", k), time
 
 
-def _rest_faults(test: ContentNode) -> Iterator[Fault]:
-    """Yield a state of rest that lasts beyond the first step."""
-    first = min((at for _, at in instants_of(test)), default=None)
-    steady = test.at("steady_until")
-    if steady.number is not None and first is not None and steady.number > first:
-        text = f"{show(steady.number)} s is after the first step, at {show(first)} s"
-        yield steady.fault(text)
-
-
-def _voltage_faults(vt0: ContentNode) -> Iterator[Fault]:
-    """Refuse a voltage before the first step that no machine has."""
-    lowest = vt0.at("min")
-    if vt0.start is not None and vt0.start <= 0:
-        yield vt0.fault(f"{show(vt0.start)} is not above 0")
-    if lowest.number is not None and lowest.number <= 0:
-        yield lowest.fault(f"{show(lowest.number)} is not above 0")
+def _table_faults(given: ContentNode, duration: float | None) -> Iterator[Fault]:
+    """Yield the faults of a reference that is a table; ``duration`` of a test without a record."""
+    rows, table = _rows(given), given.at("table")
+    if len(rows) < 2:
+        return
+    times = [time for time, _ in rows]
+    for k, (before, time) in enumerate(pairwise(times), 1):
+        if time < before:
+            yield table.at(k).fault(f"{show(time)} s is before {show(before)} s, the row before")
+        elif k > 1 and times[k - 2] == time:
+            text = f"{show(time)} s is given more than twice: a step has two rows"
+            yield table.at(k).fault(text)
+    level = rows[0][1]
+    if all(value == level for _, value in rows):
+        yield table.fault(f"stays at {show(level)}: there is no test")
+    elif duration is not None and not times[0] <= 0.0 <= duration <= times[-1]:
+        covered = f"{show(times[0])} ... {show(times[-1])} s"
+        text = f"{covered} does not cover the test, 0 ... {show(duration)} s: add a row"
+        yield table.fault(text)
 
 
 def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
     """Yield steps that change nothing, are out of order, or outside the duration."""
-    before: ContentNode | None = None
+    before = ContentNode((), None)
     for step in test.at(name).entries:
-        if step.at("step").start == 0:
-            yield step.at("step").fault("0 is not a step")
         if name == "network" and step.is_section and not {"R", "X", "E"} & step.content.keys():
             yield step.fault("changes nothing: give R, X or E")
-        at = step.at("at").start
+        at, start, ramp = step.at("at").start, before.at("at").start, before.at("ramp").number
         if at is not None:
-            yield from _order_faults(step.at("at"), at, before)
-            yield from place_faults(step.at("at"), at, test.at("duration").number)
+            if start is not None and at <= start:
+                text = f"{show(at)} s is not after {show(start)} s, the step before"
+                yield step.at("at").fault(text)
+            elif start is not None and ramp is not None and at < start + ramp:
+                end = show(start + ramp)
+                text = f"{show(at)} s is before {end} s, where the ramp before ends"
+                yield step.at("at").fault(text)
+            yield from _place_faults(step.at("at"), at, test.at("duration").number)
         before = step
 
 
-def _order_faults(place: ContentNode, at: float, before: ContentNode | None) -> Iterator[Fault]:
-    """Yield a step that is not after the one before, or before the end of the ramp before."""
-    start = None if before is None else before.at("at").start
-    ramp = None if before is None else before.at("ramp").number
-    if start is not None and at <= start:
-        yield place.fault(f"{show(at)} s is not after {show(start)} s, the step before")
-    elif start is not None and ramp is not None and at < start + ramp:
-        text = f"{show(at)} s is before {show(start + ramp)} s, where the ramp before ends"
-        yield place.fault(text)
-
-
-def place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
+def _place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
     """Yield an instant outside a test that begins at 0 and has a known end."""
     if end is not None and not 0 <= at < end:
         yield place.fault(f"{show(at)} s lies outside 0 ... {show(end)} s, the duration")
+
+
+def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield the faults of a breaker that opens, beside the rest of its test and its record."""
+    breaker, channels = test.at(BREAKER), record.at("channels")
+    if not breaker.is_section:
+        if test.value == {} and kind.events == (BREAKER,):
+            yield breaker.fault(f"is missing: nothing else acts with plant {kind.name}")
+        return
+    driving, opens = driving_signals(test, record, kind), breaker.at("opens")
+    if breaker.at("speed").text == "recorded" and SPEED not in channels:
+        yield breaker.at("speed").fault("recorded needs the channel speed in the record")
+    for signal in driving:
+        idle = ("weight", "noise", "filter", "outliers", "sine") if signal == SPEED else ()
+        yield from driving_faults(channels.at(signal), idle)
+    if driving and record.at("delay").value not in (None, 0, 0.0):
+        text = f"not allowed where the record's {' and '.join(driving)} drives the simulation"
+        yield record.at("delay").fault(text)
+    if opens.is_section:  # it shifts the whole response
+        others = [name for name in (*EVENTS, "begin") if name != BREAKER and name in test]
+        if others:
+            text = f"must be a number where the test has {' and '.join(others)} as well"
+            yield opens.fault(text)
+        if driving:
+            text = f"must be a number: the record's {' and '.join(driving)} drives the simulation"
+            yield opens.fault(text)
+    if opens.start is None:
+        return
+    yield from _place_faults(opens, opens.start, test.at("duration").number)
+    events = [
+        (event.at("at"), event.at("at").number)
+        for name in ("E", "angle", "network")
+        for event in test.at(name).entries
+    ]
+    for place, at in (*events, *_moves(test.at("angle"))):
+        if at is not None and at >= opens.start:
+            parted = f"the breaker is open from {show(opens.start)} s on"
+            yield place.fault(f"{show(at)} s: no effect, as {parted}")
+
+
+def driving_signals(test: ContentNode, record: ContentNode, kind: PlantKind) -> tuple[str, ...]:
+    """Return the channels of a record that drive the machine from the opening of a breaker on."""
+    breaker = test.at(BREAKER)
+    if not breaker.is_section:
+        return ()
+    simulated = breaker.at("speed").text == "simulated"
+    possible = (*(() if kind.has_exciter else kind.driving), *(() if simulated else (SPEED,)))
+    return tuple(signal for signal in possible if signal in record.at("channels"))
+
+
+def driving_faults(
+    channel: ContentNode, idle: tuple[str, ...], fitted: bool = False
+) -> Iterator[Fault]:
+    """Yield the keys of a channel that are of no use where it drives the simulation.
+
+    ``fitted``: its scale and its offset may be found.
+    """
+    for key in idle:
+        if key in channel:
+            text = "has no effect: the signal drives the simulation and is not compared"
+            yield channel.at(key).fault(text)
+    for key in () if fitted else ("scale", "offset"):
+        if channel.at(key).is_section:
+            yield channel.at(key).fault("must be a number: the signal drives the simulation")
+
+
+def reference_faults(
+    test: ContentNode, record: ContentNode, kind: PlantKind, has_record: bool
+) -> Iterator[Fault]:
+    """Yield the faults of what a test takes from a channel of its record, or from a file."""
+    for signal in REFERENCES:
+        given, channel = test.at(signal), record.at("channels", signal)
+        recorded, elsewhere = channel.value is not None, given.value is not None
+        if given.text == RECORDED:
+            if kind.plays_back:
+                drives = f"record.channels.{signal} drives it without"
+                yield given.fault(f"not allowed with plant {kind.name}: {drives}")
+            elif not has_record:
+                yield given.fault(f"{RECORDED} needs a record")
+            elif not recorded:
+                yield channel.fault(f"is missing: test.{signal} is {RECORDED}")
+            if "begin" in test and not kind.plays_back:
+                shown = "the record shows it from its start only"
+                yield test.at("begin").fault(f"not allowed with {signal}: {RECORDED}: {shown}")
+            if "resample" in record:
+                text = f"not allowed with test.{signal}: {RECORDED}: its filter smears the jumps"
+                yield record.at("resample").fault(text)
+        elif recorded and signal in kind.recorded_inputs:
+            text = f"drives nothing: give test.{signal}: {RECORDED}"
+            if elsewhere:
+                advice = f"give {RECORDED} there, or leave this channel out"
+                text = f"test.{signal} gives the signal as well: {advice}"
+            yield channel.fault(text)
+        elif recorded and elsewhere and signal in kind.driving:
+            text = f"the record's channel {signal} gives the signal as well: leave one of them out"
+            yield given.fault(text)
+        if signal in kind.recorded_inputs:
+            yield from driving_faults(channel, ("weight", "noise", "outliers", "averaged"))
+        if "file" in given and kind.plays_back:
+            text = f"not allowed with plant {kind.name}: give the record a channel {signal}"
+            yield given.fault(text)
+
+
+def findable_faults(
+    test: ContentNode, record: ContentNode, kind: PlantKind, has_record: bool
+) -> Iterator[Fault]:
+    """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
+    channels, delay = record.at("channels"), record.at("delay")
+    steps = [step for name in REFERENCES for step in test.at(name).entries]
+    findable = [
+        test.at("vt0"),
+        *(step.at(key) for step in steps for key in AUTOMATIC),
+        test.at(BREAKER, "opens"),
+        test.at("frequency_offset"),
+        delay,
+        *(channel.at(key) for _, channel in channels.sections for key in ("scale", "offset")),
+    ]
+    for value in findable:
+        if not value.is_section:
+            continue
+        *_, above, key = value.place
+        yield from _value_faults(value)
+        scale = kind.scaled and key == "scale" and above != "vt"
+        of_event = kind.finds_rest and key in ("frequency_offset", "delay")
+        if kind.plays_back and not scale and not of_event:
+            yield value.fault(f"not allowed with plant {kind.name}: the record drives it")
+        elif value.at("start").text == "auto":
+            if not has_record:
+                yield value.at("start").fault("auto needs a record")
+            elif "vt" not in channels:
+                yield value.at("start").fault("auto needs vt in the record")
+    for step in test.at("vref").entries:
+        if "ramp" in step and "auto" in (step.at(key, "start").text for key in AUTOMATIC):
+            text = "auto finds a step: of a ramp give start, min and max of at and step"
+            yield step.at("ramp").fault(text)
+    unknown = [key for key in ("scale", "offset") if channels.at("vt", key).is_section]
+    shown = "vt0" not in test or test.at("vt0", "start").text == "auto"
+    if test.content and unknown and shown:
+        text = f"is missing: the record does not show it where {unknown[0]} of vt is to be found"
+        yield test.at("vt0").fault(text)
+    for _, channel in channels.sections:
+        frequency = channel.at("sine", "frequency")
+        if frequency.is_section:
+            yield from _needed_bounds(frequency)
+        for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
+            if node.number is not None and node.number <= 0.0:
+                yield node.fault(f"{show(node.number)} Hz must be above 0")
+    if kind.plays_back and not kind.finds_rest and (delay.number or 0.0) != 0.0:
+        yield delay.fault(f"not allowed with plant {kind.name}")
+
+
+def _value_faults(value: ContentNode) -> Iterator[Fault]:
+    """Yield the faults of one value that the fit shall find: its bounds and its start."""
+    key = value.place[-1]
+    first_step = key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)
+    shown = first_step or key == "vt0" or value.place[-2] == BREAKER
+    if value.at("start").text == "auto" and not shown:
+        text = "auto finds the first step of vref, its at and its step, vt0, or breaker.opens"
+        yield value.at("start").fault(text)
+    yield from _needed_bounds(value)
+    low, high = value.at("min").number, value.at("max").number
+    if key in ("step", "scale") and low is not None and high is not None and low <= 0 <= high:
+        yield value.at("min").fault(f"{show(low)} ... {show(high)} contains 0")
+
+
+def _needed_bounds(value: ContentNode) -> Iterator[Fault]:
+    """Yield the bounds that are missing, unless a record shows the value, or contradict it."""
+    for bound in ("min", "max"):
+        if bound not in value and value.at("start").text != "auto":
+            yield value.at(bound).fault("is missing")
+    yield from bound_faults(value)

@@ -1,18 +1,19 @@
 """The schema of the case file, section by section; pydantic checks it.
 
-The descriptions reach editors through the JSON Schema, and the documentation of the keys.
+Here is the whole of the file, and what its report judges by. The descriptions reach editors through
+the JSON Schema, and the documentation of the keys.
 """
 
-from exfit.case.schema.columns import Filter, MedianSection, Time, TimeColumn
-from exfit.case.schema.document import AsFoundSection, CaseDocument, CriteriaSection, ReportRequest
+from typing import Annotated
+
+from pydantic import Field
+
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
 from exfit.case.schema.plants import (
     ExternalPlant,
     FmuPlant,
     Governor,
-    InfiniteBus,
     Limiter,
-    OpenCircuit,
     Plant,
     SaturationName,
     Stabiliser,
@@ -31,7 +32,6 @@ from exfit.case.schema.records import (
 )
 from exfit.case.schema.tests import (
     MOST_ROWS,
-    AngleStep,
     AngleTable,
     BumpTest,
     FindableStep,
@@ -41,18 +41,35 @@ from exfit.case.schema.tests import (
     StepSection,
     Switch,
 )
-from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
+from exfit.case.schema.values import (
+    Bus,
+    Fact,
+    Filter,
+    FreeSection,
+    Frozen,
+    MachineId,
+    MedianSection,
+    Number,
+    Positive,
+    Section,
+    Text,
+    Time,
+    TimeColumn,
+    Unknown,
+    Value,
+    nothing,
+    start_value,
+)
+from exfit.util.criteria import Criteria
 
 __all__ = [
     "MOST_ROWS",
     "SINGLE",
-    "AngleStep",
     "AngleTable",
     "AsFoundSection",
     "BumpTest",
     "CaseDocument",
     "ChannelSection",
-    "CriteriaSection",
     "CurrentPhasor",
     "Estimate",
     "ExternalPlant",
@@ -61,11 +78,9 @@ __all__ = [
     "FmuPlant",
     "FreeSection",
     "Governor",
-    "InfiniteBus",
     "Limit",
     "Limiter",
     "MedianSection",
-    "OpenCircuit",
     "Parameters",
     "PhasesSection",
     "PhasorsSection",
@@ -90,3 +105,156 @@ __all__ = [
     "VoltagePhasor",
     "start_value",
 ]
+
+DEFAULTS = Criteria()
+
+
+class AsFoundSection(Section):
+    """The model in the planner's base before the test; the report compares it with the fitted."""
+
+    source: Text | None = Field(
+        default=None, description="Where it is from, such as unit3.dyr, bus 101, machine 1."
+    )
+    bus: Bus | None = Field(
+        default=None, description="Bus of the unit there; an export finds its records by it."
+    )
+    id: MachineId | None = Field(
+        default=None, description='Machine id of the unit there, such as "1".'
+    )
+    file: Text | None = Field(
+        default=None,
+        description="The planner's file that it is from; path, relative to the case file.",
+    )
+    model: Text | None = Field(
+        default=None, description="Name of its exciter in the catalogue; default: that of the case."
+    )
+    parameters: Frozen[Number] = Field(
+        default_factory=nothing,
+        description="Its values: KA of the exciter, machine.H, stabiliser.KS. What is missing is "
+        "as in the case; of another exciter it has its typical value.",
+    )
+    unused: Frozen[Number] = Field(
+        default_factory=nothing,
+        description="Values of its records that the planner's program reads and does without, such "
+        "as TA of ST3C in PSS/E: 0 in the case; an export writes them back.",
+    )
+
+
+class CriteriaSection(Section):
+    """Limits of the differences between simulated and recorded response."""
+
+    rmse: Positive = Field(
+        default=DEFAULTS.rmse,
+        description="Of the rms of the difference, in % of the change that was recorded.",
+    )
+    final_value: Positive = Field(
+        default=DEFAULTS.final_value, description="Of the final value, in % of that change."
+    )
+    overshoot: Positive = Field(
+        default=DEFAULTS.overshoot, description="Of the overshoot, in % of that change."
+    )
+    rise_time: Positive = Field(
+        default=DEFAULTS.rise_time, description="Of the rise time, in % of the recorded one."
+    )
+    peak_time: Positive = Field(
+        default=DEFAULTS.peak_time, description="Of the peak time, in % of the recorded one."
+    )
+    settling_time: Positive = Field(
+        default=DEFAULTS.settling_time,
+        description="Of the settling time, in % of the recorded one.",
+    )
+    time: Positive = Field(
+        default=DEFAULTS.time, description="s; a time that differs by no more meets its criterion."
+    )
+
+
+class ReportRequest(Section):
+    """What the report judges by."""
+
+    criteria: CriteriaSection = Field(
+        default_factory=CriteriaSection, description="When a response matches its record."
+    )
+
+
+ABOUT = Field(
+    default_factory=nothing,
+    description="Facts about unit and test that the report shows, under any names, such as Plant, "
+    "Unit, Rated, Test date, Tested by.",
+)
+
+
+class CaseDocument(Section):
+    """A model, its plant, a test, its record, and the parameters to be fitted."""
+
+    about: Frozen[Fact] = ABOUT
+    model: Text | None = Field(
+        default=None,
+        description="Name of a model, in upper or lower case, or path of a .py file; none with "
+        "plant machine-playback or machine-on-load.",
+    )
+    saturation: SaturationName = Field(
+        default="quadratic",
+        description="Form of the exciter's saturation curve, given by E1, SE1, E2, SE2 or, if "
+        "it is exponential, by AEX and BEX.",
+    )
+    efd_times_speed: bool = Field(
+        default=False,
+        description="Whether the exciter's output is multiplied by the speed of the machine, as "
+        "spdmlt in PSLF; it acts where the speed is simulated or recorded.",
+    )
+    plant: Annotated[Plant, Field(discriminator="type")] = Field(
+        description="The plant: what surrounds the exciter during the test."
+    )
+    stabiliser: Stabiliser | None = Field(
+        default=None, description="A power system stabiliser; it acts on load only."
+    )
+    governor: Governor | None = Field(
+        default=None,
+        description="A turbine with its governor; it acts where the speed follows from the power. "
+        "Default: the power of the turbine is constant.",
+    )
+    limiters: tuple[Limiter, ...] = Field(
+        default=(),
+        description="Limiters of over- and underexcitation, at most one of each kind; on open "
+        "circuit only what limits the field current acts.",
+    )
+    test: BumpTest | None = Field(
+        default=None,
+        description="The steps that were made; with records, each of them has its own.",
+    )
+    record: RecordFile | None = Field(
+        default=None, description="The measured signals; not required by simulate."
+    )
+    records: tuple[Recording, ...] = Field(
+        default=(),
+        min_length=1,
+        description="In place of test and record: several tests with their records, in one fit.",
+    )
+    parameters: Parameters = Field(
+        default_factory=Parameters, description="Fixed and free parameters of the exciter."
+    )
+    estimate: Estimate = Field(
+        default_factory=Estimate, description="How the free parameters are estimated."
+    )
+    simulation: SimulationSection = Field(
+        default_factory=SimulationSection, description="The grid of the simulation."
+    )
+    validations: tuple[Recording, ...] = Field(
+        default=(),
+        alias="validate",
+        description="Records on which the result is validated; they are not used in the fit.",
+    )
+    accept: Limit | None = Field(
+        default=None,
+        description="Limit of the error on records that were not fitted, which then judges alone; "
+        "beyond it the exit code is 3. Default: such a record must be matched better than by a "
+        "constant, with an rmse of at most 3 times that of the fit, or 3 times the noise of the "
+        "record where that is larger.",
+    )
+    as_found: AsFoundSection | None = Field(
+        default=None,
+        description="The model in the planner's base before the test; default: the start values.",
+    )
+    report: ReportRequest = Field(
+        default_factory=ReportRequest, description="What the report judges by."
+    )

@@ -1,9 +1,9 @@
 """The sections of the case file about the fit: its parameters, its search, its simulation."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import BaseModel, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
 from exfit.case.schema.values import (
     STATED,
@@ -20,6 +20,7 @@ from exfit.case.schema.values import (
     Sources,
     StdErrors,
     nothing,
+    section_or_number,
 )
 from exfit.util.strategies import (
     DEFAULT_SEARCH,
@@ -115,13 +116,9 @@ class Iterations(Section):
     lm: Count = Field(default=MOST_ITERATIONS, description="Levenberg-Marquardt.")
 
 
-def _is_mapping(value: Any) -> str:
-    return "[phases]" if isinstance(value, dict | BaseModel) else "[number]"
-
-
 IterationLimit = Annotated[
-    Annotated[Count, Tag("[number]")] | Annotated[Iterations, Tag("[phases]")],
-    Discriminator(_is_mapping),
+    Annotated[Count, Tag("[number]")] | Annotated[Iterations, Tag("[section]")],
+    Discriminator(section_or_number),
 ]
 
 

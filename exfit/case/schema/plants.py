@@ -32,22 +32,17 @@ else:
     Heard = Literal[HEARD]
     Place = Literal[PLACES]
 
-MACHINE = Field(description=f"Machine model: {', '.join(MACHINE_NAMES)}.")
-MACHINE_DATA = Field(
-    default_factory=nothing,
-    description="Machine data; a missing value is the typical one.",
-)
 SWING = (
     "What drives the speed in 2H d(dw)/dt: power, (Pm - D dw) / (1 + dw) - Te, as in PSS/E, or "
     "torque, Pm - D dw - Te, as in ANDES."
 )
-MACHINE_FREE = Field(
-    default_factory=nothing, description="Machine data that are fitted, as under parameters.free."
-)
+LOAD = Field(description="P and Q until the breaker opens, pu on the base of the machine.")
 
 
 class PlantSection(Section):
     """What surrounds the exciter."""
+
+    type: str
 
     @property
     def given(self) -> Mapping[str, float]:
@@ -55,31 +50,30 @@ class PlantSection(Section):
         return {}
 
 
-class OpenCircuit(PlantSection):
-    """A machine with its breaker open, at rated speed."""
+class WithData(PlantSection):
+    """A plant with the data of a machine."""
 
-    type: Literal["open-circuit"] = Field(description="Kind of plant.")
-    machine: Text = MACHINE
-    parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[FreeSection] = MACHINE_FREE
-    sources: Sources = STATED
-    std_errors: StdErrors = STD_ERRORS
-
-
-class InfiniteBus(PlantSection):
-    """A machine behind R + jX to a source of constant voltage and frequency."""
-
-    type: Literal["infinite-bus"] = Field(description="Kind of plant.")
-    machine: Text = MACHINE
-    parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[FreeSection] = MACHINE_FREE
-    network: Frozen[Number] = Field(
-        description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
-        "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
+    parameters: Frozen[Given] = Field(
+        default_factory=nothing, description="Machine data; a missing value is the typical one."
     )
-    swing: Swing = Field(default="power", description=SWING)
+    free: Frozen[FreeSection] = Field(
+        default_factory=nothing,
+        description="Machine data that are fitted, as under parameters.free.",
+    )
     sources: Sources = STATED
     std_errors: StdErrors = STD_ERRORS
+
+
+class WithMachine(WithData):
+    """A plant with a machine of exfit."""
+
+    machine: Text = Field(description=f"Machine model: {', '.join(MACHINE_NAMES)}.")
+
+
+class WithNetwork(PlantSection):
+    """A plant with a network."""
+
+    network: Frozen[Number]
 
     @property
     def given(self) -> Mapping[str, float]:
@@ -87,16 +81,30 @@ class InfiniteBus(PlantSection):
         return self.network
 
 
-class GridPlayback(PlantSection):
+class OpenCircuit(WithMachine):
+    """A machine with its breaker open, at rated speed."""
+
+    type: Literal["open-circuit"] = Field(description="Kind of plant.")
+
+
+class InfiniteBus(WithMachine, WithNetwork):
+    """A machine behind R + jX to a source of constant voltage and frequency."""
+
+    type: Literal["infinite-bus"] = Field(description="Kind of plant.")
+    network: Frozen[Number] = Field(
+        description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
+        "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
+    )
+    swing: Swing = Field(default="power", description=SWING)
+
+
+class GridPlayback(WithMachine, WithNetwork):
     """A unit driven by the voltage and the angle or frequency that were recorded in a grid event.
 
     Its p and q, and what else was recorded, are compared.
     """
 
     type: Literal["grid-playback"] = Field(description="Kind of plant.")
-    machine: Text = MACHINE
-    parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[FreeSection] = MACHINE_FREE
     network: Frozen[Number] = Field(
         description="f0 (Hz); R and X of the step-up transformer, where vt and its angle are "
         "recorded on its other side; P and Q at the start where p or q is not recorded; Rc and Xc "
@@ -108,35 +116,16 @@ class GridPlayback(PlantSection):
         description="Where p and q are recorded, and given: at the recorded voltage, or at the "
         "terminals.",
     )
-    sources: Sources = STATED
-    std_errors: StdErrors = STD_ERRORS
-
-    @property
-    def given(self) -> Mapping[str, float]:
-        """The values of the network."""
-        return self.network
 
 
-class MachineOnLoad(PlantSection):
+class MachineOnLoad(WithMachine, WithNetwork):
     """A machine alone that is at rest on load until its breaker opens.
 
     Its field voltage stays, or is that of the record's channel efd.
     """
 
     type: Literal["machine-on-load"] = Field(description="Kind of plant; the case has no model.")
-    machine: Text = MACHINE
-    parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[FreeSection] = MACHINE_FREE
-    network: Frozen[Number] = Field(
-        description="P and Q until the breaker opens, pu on the base of the machine."
-    )
-    sources: Sources = STATED
-    std_errors: StdErrors = STD_ERRORS
-
-    @property
-    def given(self) -> Mapping[str, float]:
-        """The values of the load."""
-        return self.network
+    network: Frozen[Number] = LOAD
 
 
 class Playback(PlantSection):
@@ -154,15 +143,10 @@ class Playback(PlantSection):
         return {} if self.vref is None else {"vref": self.vref}
 
 
-class MachinePlayback(PlantSection):
+class MachinePlayback(WithMachine):
     """A recorded field voltage drives the machine on open circuit; vt and ifd are compared."""
 
     type: Literal["machine-playback"] = Field(description="Kind of plant; the case has no model.")
-    machine: Text = MACHINE
-    parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[FreeSection] = MACHINE_FREE
-    sources: Sources = STATED
-    std_errors: StdErrors = STD_ERRORS
 
 
 class NoPlant(PlantSection):
@@ -171,14 +155,13 @@ class NoPlant(PlantSection):
     type: Literal["none"] = Field(description="Kind of plant.")
 
 
-class PlantElsewhere(PlantSection):
+class PlantElsewhere(WithData):
     """A unit that exfit does not simulate; its twin, a plant of exfit, has all else.
 
     The keys of the twin stand beside those of what simulates it. Without a twin the parameters are
     those that the case names, and derivatives are quotients of the runs.
     """
 
-    type: str
     twin: Literal["open-circuit", "infinite-bus"] | None = Field(
         default=None,
         description="The plant of exfit that gives the exact derivatives; default: none, they are "
@@ -191,26 +174,19 @@ class PlantElsewhere(PlantSection):
         description="Names that parameters have there, where they are others, such as KA: K_A.",
     )
     machine: Text | None = Field(default=None, description="Machine model of the twin.")
-    parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[FreeSection] = MACHINE_FREE
     network: Frozen[Number] = Field(
         default_factory=nothing, description="As that of the twin infinite-bus."
     )
     swing: Swing = Field(default="power", description=SWING)
-    sources: Sources = STATED
-    std_errors: StdErrors = STD_ERRORS
 
     @property
     def plant(self) -> "OpenCircuit | InfiniteBus | Self":
         """The twin as a plant of its own, or this one where it has none."""
         if self.twin is None:
             return self
-        shared = ("machine", "parameters", "free", "sources", "std_errors")
-        sections = {key: getattr(self, key) for key in shared}
-        if self.twin == "open-circuit":
-            return OpenCircuit.model_construct(type=self.twin, **sections)
-        network, swing = self.network, self.swing
-        return InfiniteBus.model_construct(type=self.twin, **sections, network=network, swing=swing)
+        twin = OpenCircuit if self.twin == "open-circuit" else InfiniteBus
+        shared = {key: getattr(self, key) for key in twin.model_fields}
+        return twin.model_construct(**{**shared, "type": self.twin})
 
 
 class ExternalPlant(PlantElsewhere):
@@ -299,7 +275,7 @@ class OffLine(PlantSection):
     whole: ClassVar[WholePlant] = OpenCircuit
 
 
-class OnLine(PlantSection):
+class OnLine(WithNetwork):
     """The machine of the case behind R + jX to a source."""
 
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
@@ -310,26 +286,14 @@ class OnLine(PlantSection):
     swing: Swing = Field(default="power", description=SWING)
     sources: Sources = STATED
 
-    @property
-    def given(self) -> Mapping[str, float]:
-        """The values of the network."""
-        return self.network
 
-
-class AloneOnLoad(PlantSection):
+class AloneOnLoad(WithNetwork):
     """The machine of the case without its exciter, on load until its breaker opens."""
 
     type: Literal["machine-on-load"] = Field(description="Kind of plant.")
     whole: ClassVar[WholePlant] = MachineOnLoad
-    network: Frozen[Number] = Field(
-        description="P and Q until the breaker opens, pu on the base of the machine."
-    )
+    network: Frozen[Number] = LOAD
     sources: Sources = STATED
-
-    @property
-    def given(self) -> Mapping[str, float]:
-        """The values of the load."""
-        return self.network
 
 
 class Stabiliser(AddedModel):

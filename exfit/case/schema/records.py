@@ -13,18 +13,20 @@ from pydantic import (
     WrapSerializer,
 )
 
-from exfit.case.messages import FILE_NAME
-from exfit.case.schema.columns import Filter, Time
 from exfit.case.schema.plants import AloneOnLoad, OffLine, OnLine
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import (
+    FILE_NAME,
     Count,
+    Filter,
     Findable,
+    Interval,
     NotNegative,
-    Number,
     Positive,
     Section,
     Text,
+    Time,
+    not_zero,
     thawed,
 )
 from exfit.signals import RECORDED
@@ -161,13 +163,11 @@ class ChannelSection(Compared):
         description="Value of 1 pu in that unit; for ifd the field current on the air-gap line at "
         "rated voltage.",
     )
-    scale: Findable = Field(
-        default=1.0,
-        description="Factor; or {start, min, max} to fit it.",
+    scale: Annotated[Findable, not_zero("must not be 0")] = Field(
+        default=1.0, description="Factor; or {start, min, max} to fit it."
     )
     offset: Findable = Field(
-        default=0.0,
-        description="Added after scaling, pu; or {start, min, max} to fit it.",
+        default=0.0, description="Added after scaling, pu; or {start, min, max} to fit it."
     )
 
 
@@ -232,11 +232,11 @@ class RecordFile(Section):
         description="Column with the flags of a PMU: rows that are not valid are refused, or left "
         "out with gaps: skip.",
     )
-    window: tuple[Number, Number] | None = Field(
+    window: Interval | None = Field(
         default=None,
         description="Start and end of the part that is used, s; default: the whole record.",
     )
-    mask: tuple[tuple[Number, Number], ...] = Field(
+    mask: tuple[Interval, ...] = Field(
         default=(), description="Parts that are not compared: start and end of each, s."
     )
     switchings: Literal["find", "mask", "compare"] = Field(

@@ -1,20 +1,22 @@
 """The sections of the case file about a test: what was done to the unit."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from math import pi
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from exfit.case.schema.columns import Filter, Time
 from exfit.case.schema.values import (
+    Filter,
     Findable,
     NotNegative,
     Number,
     Positive,
     Section,
     Text,
+    Time,
+    not_zero,
     start_value,
 )
 from exfit.plants import REFERENCES
@@ -23,20 +25,30 @@ MOST_ROWS = 1000  # of a table; a longer one is a file
 RADIANS = {"rad": 1.0, "deg": pi / 180.0}  # in each unit of an angle
 AngleUnit = Literal["rad", "deg"]
 Rows = tuple[tuple[Number, Number], ...]
+NOT_ZERO = not_zero("0 is not a step")
+
+
+def _moves(rows: Rows) -> Iterator[tuple[float, float, float | None]]:
+    """Yield the lines of a table that rise or fall: when, by how much, how long if no step."""
+    for (at, value), (end, then) in pairwise(rows):
+        if then != value:
+            yield at, then - value, end - at if end > at else None
 
 
 class StepSection(Section):
     """A step of a signal."""
 
     at: Number = Field(description="Time, s.")
-    step: Number = Field(description="Change, pu; not zero.")
+    step: Annotated[Number, NOT_ZERO] = Field(description="Change, pu; not zero.")
 
 
 class FindableStep(Section):
     """A step or ramp of a signal, whose time and size may be fitted."""
 
     at: Findable = Field(description="Time, s; or {start, min, max} to fit it.")
-    step: Findable = Field(description="Change, pu, not zero; or {start, min, max} to fit it.")
+    step: Annotated[Findable, NOT_ZERO] = Field(
+        description="Change, pu, not zero; or {start, min, max} to fit it."
+    )
     ramp: Positive | None = Field(
         default=None,
         description="Time that the change takes, in a line, s; default: it is a step.",
@@ -57,9 +69,7 @@ class ReferenceTable(Section):
     def events(self) -> tuple[FindableStep, ...]:
         """Its steps and ramps in order of time."""
         return tuple(
-            FindableStep(at=at, step=then - value, ramp=end - at if end > at else None)
-            for (at, value), (end, then) in pairwise(self.table)
-            if then != value
+            FindableStep(at=at, step=step, ramp=ramp) for at, step, ramp in _moves(self.table)
         )
 
 
@@ -83,7 +93,9 @@ class ReferenceFile(Section):
     )
     unit: Text | None = Field(default=None, description="Unit of the column, such as kV, pu or %.")
     base: Positive | None = Field(default=None, description="Value of 1 pu in that unit.")
-    scale: Number = Field(default=1.0, description="Factor; not zero.")
+    scale: Annotated[Number, not_zero("must not be 0")] = Field(
+        default=1.0, description="Factor; not zero."
+    )
     filter: Filter | None = Field(
         default=None,
         description="{lowpass: Hz} or {median: samples}, against its noise; its jumps stay.",
@@ -123,7 +135,7 @@ class AngleStep(Section):
     """A step or ramp of the angle of the source."""
 
     at: Number = Field(description="Time, s.")
-    step: Number = Field(
+    step: Annotated[Number, NOT_ZERO] = Field(
         description="Change, not zero. Positive: the source advances; the unit gives less power."
     )
     unit: AngleUnit = Field(description="Unit of the change.")
@@ -152,9 +164,8 @@ class AngleTable(Section):
     def events(self) -> tuple[AngleStep, ...]:
         """Its steps and ramps in order of time."""
         return tuple(
-            AngleStep(at=at, step=then - value, unit=self.unit, ramp=end - at if end > at else None)
-            for (at, value), (end, then) in pairwise(self.table)
-            if then != value
+            AngleStep(at=at, step=step, unit=self.unit, ramp=ramp)
+            for at, step, ramp in _moves(self.table)
         )
 
 
@@ -265,11 +276,10 @@ class BumpTest(Section):
     @property
     def tables(self) -> Mapping[str, Rows]:
         """The rows of its tables, by signal."""
-        given = {name: getattr(self, name) for name in (*REFERENCES, "angle")}
         return {
-            name: table.table
-            for name, table in given.items()
-            if isinstance(table, ReferenceTable | AngleTable)
+            name: given.table
+            for name in (*REFERENCES, "angle")
+            if isinstance(given := getattr(self, name), ReferenceTable | AngleTable)
         }
 
     @property

@@ -1,4 +1,4 @@
-"""The values of the case file: numbers, texts, what a fit finds, what is known beforehand."""
+"""The values of the case file: numbers, texts, what a fit finds, filters, columns of time."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -16,10 +16,9 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from exfit.case.messages import MAGNITUDE, PERCENT
 from exfit.case.ties import is_tie
 from exfit.util.sources import NOT_STATED, SOURCES
-from exfit.util.text import magnitude_fault
+from exfit.util.text import magnitude_fault, show
 
 if TYPE_CHECKING:
     Source = str
@@ -27,6 +26,16 @@ else:
     Source = Literal[SOURCES]
 
 Value = TypeVar("Value")
+
+FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._%-]*$"  # of any system; a percent sign as in up-5%
+PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
+LONGEST_WHOLE = 15  # digits: every whole number of so many is a double
+REFUSED = "refused"  # the kind of fault of a value that a function here refuses
+
+
+def refusal(text: str) -> PydanticCustomError:
+    """Make the fault of a value, in words that the user reads."""
+    return PydanticCustomError(REFUSED, "{text}", {"text": text})
 
 
 def nothing() -> Mapping[str, Any]:
@@ -40,11 +49,42 @@ def thawed(values: Mapping[str, Any], serialize: Callable[[Any], Any]) -> Any:
 
 
 def _usable(value: float) -> float:
-    """Return a number; raises PydanticCustomError for one too large or small to compute with."""
+    """Refuse a number that is too large or small to compute with."""
     fault = magnitude_fault(value)
     if fault is not None:
-        raise PydanticCustomError(MAGNITUDE, "{fault}", {"fault": fault})
+        raise refusal(fault)
     return value
+
+
+def not_zero(text: str) -> AfterValidator:
+    """Make the check that refuses 0, or 0 as a start, with a text."""
+
+    def check(value: Any) -> Any:
+        if start_value(value) == 0.0:
+            raise refusal(text)
+        return value
+
+    return AfterValidator(check)
+
+
+def _rising(interval: tuple[float, float]) -> tuple[float, float]:
+    start, end = map(show, interval)
+    if interval[0] >= interval[1]:
+        raise refusal(f"start {start} is not below end {end}")
+    return interval
+
+
+def _odd(count: int) -> int:
+    if count % 2 == 0:
+        raise refusal(f"{show(count)} is not an odd number")
+    return count
+
+
+def _kept(fact: float | str) -> float | str:
+    """Refuse a number of more digits than a number keeps, as a serial number."""
+    if isinstance(fact, float) and abs(fact) >= 10.0**LONGEST_WHOLE:
+        raise refusal(f"more than {LONGEST_WHOLE} digits are not kept; put the number in quotes")
+    return fact
 
 
 Finite = Annotated[float, Strict(), Field(allow_inf_nan=False)]
@@ -56,6 +96,7 @@ Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict(), Field(min_length=1)]
 MachineId = Annotated[str, Strict(), Field(min_length=1, max_length=2)]
 Bus = Annotated[int, Strict(), Field(ge=1, le=999_999)]  # as PSS/E numbers them
+Interval = Annotated[tuple[Number, Number], AfterValidator(_rising)]
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
 
 Sources = Frozen[Source]
@@ -72,43 +113,41 @@ STD_ERRORS = Field(
 )
 
 
-def _is_tie(value: Any) -> str:
+# marks in brackets stand in no file: the messages take them out of the place of a fault
+def _tie_or_number(value: Any) -> str:
     return "[tie]" if is_tie(value) else "[number]"
 
 
-def _is_percent(value: Any) -> str:
-    return "[percent]" if isinstance(value, str) else "[number]"
-
-
-def _is_text(value: Any) -> str:
+def _number_or_text(value: Any) -> str:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return "[number]" if number else "[text]"
 
 
-def _is_word(value: Any) -> str:
-    return "[auto]" if isinstance(value, str) else "[number]"
+def _text_or_number(value: Any) -> str:
+    return "[text]" if isinstance(value, str) else "[number]"
 
 
-def _is_unknown(value: Any) -> str:
-    return "[unknown]" if isinstance(value, dict | BaseModel) else "[number]"
+def section_or_number(value: Any) -> str:
+    """Tell a section from a number, for pydantic."""
+    return "[section]" if isinstance(value, dict | BaseModel) else "[number]"
 
 
-# marks in brackets stand in no file: the messages take them out of the place of a fault
 Given = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[str, Field(pattern="^="), Tag("[tie]")],
-    Discriminator(_is_tie),
+    Discriminator(_tie_or_number),
 ]
 Fact = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[Text, Tag("[text]")],
-    Discriminator(_is_text),
+    Discriminator(_number_or_text),
+    AfterValidator(_kept),
 ]
 Start = Annotated[
-    Annotated[Number, Tag("[number]")] | Annotated[Literal["auto"], Tag("[auto]")],
-    Discriminator(_is_word),
+    Annotated[Number, Tag("[number]")] | Annotated[Literal["auto"], Tag("[text]")],
+    Discriminator(_text_or_number),
 ]
 Spread = Annotated[
-    Annotated[Positive, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[percent]")],
-    Discriminator(_is_percent),
+    Annotated[Positive, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[text]")],
+    Discriminator(_text_or_number),
 ]
 
 
@@ -171,8 +210,8 @@ class Unknown(Section):
 
 
 Findable = Annotated[
-    Annotated[Number, Tag("[number]")] | Annotated[Unknown, Tag("[unknown]")],
-    Discriminator(_is_unknown),
+    Annotated[Number, Tag("[number]")] | Annotated[Unknown, Tag("[section]")],
+    Discriminator(section_or_number),
 ]
 
 
@@ -180,3 +219,47 @@ def start_value(value: "float | Unknown | None") -> float | None:
     """Return a value where it is a number: given, or the start of one that is found."""
     start = value.start if isinstance(value, Unknown) else value
     return None if start == "auto" else start
+
+
+class LowPassSection(Section):
+    """A low-pass filter, applied forwards and backwards, so without delay."""
+
+    lowpass: Positive = Field(description="Cut-off frequency, Hz.")
+
+
+class MedianSection(Section):
+    """A running median."""
+
+    median: Annotated[Count, AfterValidator(_odd)] = Field(description="Number of samples, odd.")
+
+
+def _kind_of_filter(value: Any) -> str:
+    median = isinstance(value, MedianSection) or (isinstance(value, dict) and "median" in value)
+    return "[median]" if median else "[lowpass]"
+
+
+Filter = Annotated[
+    Annotated[LowPassSection, Tag("[lowpass]")] | Annotated[MedianSection, Tag("[median]")],
+    Discriminator(_kind_of_filter),
+]
+
+
+class TimeColumn(Section):
+    """The column with the time, and its unit."""
+
+    column: Text = Field(description="Name of the column.")
+    unit: Literal["s", "ms", "us", "min"] = Field(description="Unit of its numbers.")
+
+
+def _kind_of_clock(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "[pair]"
+    return "[column]" if isinstance(value, dict | BaseModel) else "[name]"
+
+
+Time = Annotated[
+    Annotated[Text, Tag("[name]")]
+    | Annotated[tuple[Text, Text], Tag("[pair]")]
+    | Annotated[TimeColumn, Tag("[column]")],
+    Discriminator(_kind_of_clock),
+]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from exfit.case.draft.case_draft import CaseDraft
+from exfit.case.case_draft import CaseDraft
 from exfit.features.design.designed_test import DesignedTest
 from exfit.features.design.experiment_design import Design
 from exfit.results.tables import effects_table

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 from math import sqrt
 
-from exfit.case.draft.bases import Base
-from exfit.case.draft.case_draft import Noted, Remark, Section, in_braces
-from exfit.case.draft.suggestion import channel_entry, record_of, rounded
-from exfit.case.open_values import QUESTION
+from exfit.case.case_draft import Noted, Remark, Section, in_braces
+from exfit.case.suggestion import Base, channel_entry, record_of, rounded
+from exfit.case.yaml import QUESTION
 from exfit.records.angles import unit_by_range
 from exfit.records.inspection import Inspection
 from exfit.records.pmu_recognition import InspectedPhasor, PmuContent

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from exfit.case.open_values import open_places
 from exfit.case.peek import command_of, content_of, files_in, fmu_of
-from exfit.case.yaml import decoded
+from exfit.case.yaml import decoded, open_places
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.features.fleet.folder import IndexEntry, case_name
 from exfit.features.fleet.summary import CaseStatus, facts_of

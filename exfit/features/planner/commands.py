@@ -76,7 +76,7 @@ def _import_one(
     dyr: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
 ) -> None:
     """Write the case of one unit."""
-    from exfit.case.draft.suggestion import relative
+    from exfit.case.suggestion import relative
     from exfit.features.planner.fields import located
     from exfit.features.planner.import_case import import_unit, imported_case
 

@@ -43,8 +43,7 @@ class OfRecords:
 
     def parsed(self) -> "RecordOptions":
         """Return them as a case takes them; raises ExfitError, UsageError where they cannot be."""
-        from exfit.case.draft.bases import bases_of
-        from exfit.case.draft.record_settings import RecordSettings
+        from exfit.case.suggestion import RecordSettings, bases_of
         from exfit.features.planner.import_all import RecordOptions
 
         others = (self.sizes, self.bases, self.clock, self.unit, self.sheet)

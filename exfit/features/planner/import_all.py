@@ -6,9 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
-from exfit.case.draft.bases import Base
-from exfit.case.draft.record_settings import RecordSettings
-from exfit.case.draft.suggestion import relative
+from exfit.case.suggestion import Base, RecordSettings, relative
 from exfit.errors import ExfitError
 from exfit.features.planner.fields import DynamicsFault, located, text_of
 from exfit.features.planner.import_case import imported_case, read_file, unit_data

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from exfit.case.draft.case_draft import (
+from exfit.case.case_draft import (
     CaseDraft,
     Noted,
     Section,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from exfit.case.draft.suggestion import relative
+from exfit.case.suggestion import relative
 from exfit.errors import DynamicsError, ExfitError
 from exfit.features.planner.fields import located, text_of
 from exfit.features.planner.import_all import key_of

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from exfit.case.case import Case
-from exfit.case.draft.free_parameters import ALONE
 from exfit.case.load import CaseOrPath
-from exfit.case.other_model import with_exciter
+from exfit.case.other_model import ALONE, with_exciter
 from exfit.errors import CaseError
 from exfit.features.rank.ranking import RankedModel, ranked, ranking_sentences
 from exfit.fitting.system import typical_values_used

@@ -24,9 +24,8 @@ from exfit.features.planner.commands import BUSES
 from exfit.util.text import dotted, printable
 
 if TYPE_CHECKING:
-    from exfit.case.draft.bases import Base
-    from exfit.case.draft.case_draft import CaseDraft, OpenValue
-    from exfit.case.draft.record_settings import RecordSettings
+    from exfit.case.case_draft import CaseDraft, OpenValue
+    from exfit.case.suggestion import Base, RecordSettings
     from exfit.features.start.starting_tests import StartingTest
     from exfit.features.start.starting_unit import UnitData
 
@@ -136,8 +135,7 @@ def new(
     validates. Values are typical, or those of a planner's file. What the record does not show is
     asked on a terminal, or left as "?", and the case is refused until it is filled in.
     """
-    from exfit.case.draft.bases import bases_of, rated_bases
-    from exfit.case.draft.record_settings import RecordSettings
+    from exfit.case.suggestion import RecordSettings, bases_of, rated_bases
     from exfit.features.start.starting_case import starting_case
     from exfit.features.start.starting_tests import doubtful_bases
 
@@ -218,7 +216,7 @@ def _refuse_unused(given: UnitSources) -> None:
 
 def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -> "UnitData":
     """Return the data of a unit of a planner's file; what of it is left out is reported."""
-    from exfit.case.draft.suggestion import relative
+    from exfit.case.suggestion import relative
     from exfit.features.planner.fields import located
     from exfit.features.planner.import_case import import_unit, unit_data
 

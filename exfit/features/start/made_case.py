@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from exfit.case.draft.bases import Base
-from exfit.case.draft.case_draft import CaseDraft, OpenValue
+from exfit.case.case_draft import CaseDraft, OpenValue
+from exfit.case.suggestion import Base
 from exfit.errors import ExfitError
 from exfit.features.start.starting_case import starting_case
 from exfit.features.start.starting_tests import (

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from exfit.case.draft.case_draft import (
+from exfit.case.case_draft import (
     CaseDraft,
     Noted,
     Remark,
@@ -12,8 +12,8 @@ from exfit.case.draft.case_draft import (
     parameter,
     with_sources,
 )
-from exfit.case.draft.free_parameters import ALONE, bounds_of, free_of
-from exfit.case.draft.suggestion import (
+from exfit.case.other_model import ALONE, bounds_of, free_of
+from exfit.case.suggestion import (
     channels_section,
     record_of,
     relative,
@@ -22,7 +22,7 @@ from exfit.case.draft.suggestion import (
     suggested_event,
     weights_section,
 )
-from exfit.case.open_values import QUESTION
+from exfit.case.yaml import QUESTION
 from exfit.features.start.starting_tests import StartingTest
 from exfit.features.start.starting_unit import PartData, UnitData
 from exfit.models.machines import Machine

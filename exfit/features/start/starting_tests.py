@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from math import copysign
 from typing import NamedTuple, NoReturn
 
-from exfit.case.draft.bases import Base
+from exfit.case.suggestion import Base
 from exfit.errors import ExfitError, FileError
 from exfit.records.contradictions import LARGEST_STEP, sign_disputed_by, size_in_words
 from exfit.records.inspection import Inspection

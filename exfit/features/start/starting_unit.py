@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from exfit.case.draft.case_draft import Section
-from exfit.case.draft.suggestion import relative
+from exfit.case.case_draft import Section
 from exfit.case.load import load_case
+from exfit.case.suggestion import relative
 from exfit.errors import CaseError, ExfitError
 from exfit.models import find
 from exfit.models.machines import Machine, find_machine

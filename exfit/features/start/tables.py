@@ -7,9 +7,9 @@ from math import isfinite
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from exfit.case.draft.bases import Base, base_of
-from exfit.case.draft.record_settings import RecordSettings
-from exfit.case.messages import FILE_NAME, PATTERNS
+from exfit.case.json_schema import PATTERNS
+from exfit.case.schema.values import FILE_NAME
+from exfit.case.suggestion import Base, RecordSettings, base_of
 from exfit.errors import ExfitError, FileError
 from exfit.features.start.cells import Cells, read_cells
 from exfit.features.start.starting_tests import StartingTest, renamed, started

@@ -5,9 +5,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from exfit.case.draft.case_draft import CaseDraft, Noted, Section, with_sources
-from exfit.case.draft.free_parameters import BOUNDS, bounds_of, free_of
-from exfit.case.draft.suggestion import relative
+from exfit.case.case_draft import CaseDraft, Noted, Section, with_sources
+from exfit.case.other_model import BOUNDS, bounds_of, free_of
+from exfit.case.suggestion import relative
 from exfit.case.yaml import read_yaml
 from exfit.errors import ExfitError
 from exfit.features.planner.export import comment_lines, export, place_of

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.draft.free_parameters import ALONE
+from exfit.case.other_model import ALONE
 from exfit.case.peek import section_of, stabiliser_inputs
 from exfit.engine.system import System
 from exfit.engine.trace import evaluate

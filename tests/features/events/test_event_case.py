@@ -5,10 +5,9 @@ import pytest
 import yaml
 from pmu_records import KV, MVA, pmu_columns, smooth_course, write_table
 
-from exfit.case.draft.bases import rated_bases
-from exfit.case.draft.case_draft import CaseDraft
-from exfit.case.draft.record_settings import RecordSettings
-from exfit.case.record_section import record_section
+from exfit.case.case_draft import CaseDraft
+from exfit.case.load import record_section
+from exfit.case.suggestion import RecordSettings, rated_bases
 from exfit.features.events.suggestion import event_sections
 from exfit.features.start.starting_case import starting_case
 from exfit.features.start.starting_tests import starting_tests

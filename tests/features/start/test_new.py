@@ -10,8 +10,8 @@ from places import SAMPLES
 from step_records import step_record
 from tiers import few_of
 
-from exfit.case.draft.free_parameters import bounds_of, free_of
 from exfit.case.load import load_case
+from exfit.case.other_model import bounds_of, free_of
 from exfit.errors import CaseError
 from exfit.features.start.starting_case import starting_case
 from exfit.features.start.starting_tests import starting_tests

@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from exfit.case.assembly import CheckedContent, validated_document
 from exfit.case.case import Case
 from exfit.case.checks.content import contradictions
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import name_faults
-from exfit.case.load import faults_with_lines, parse_case
+from exfit.case.load import faults_with_lines, parse_case, validated
 from exfit.case.parts import kind_of, parts_of, ties_of
 from exfit.case.peek import files_in
 from exfit.case.schema import Recording
@@ -129,11 +128,11 @@ class Programme:
         content = {key: value for key, value in inner.content.items() if value != []}
         parts = parts_of(content, self.folder, faults)
         ties = ties_of(content, parts, faults)
-        return Case.of(CheckedContent(self._document(content), parts, ties), self.path)
+        return Case.of(self._document(content), parts, ties, self.path)
 
     def _document(self, content: Content) -> ProgrammeDocument:
         faults: list[Fault] = []
-        document = validated_document(content, faults, ProgrammeDocument)
+        document = validated(content, faults, ProgrammeDocument)
         if document is None:
             raise CaseError(f"{self.path}: {dotted(fault.place)}: {fault.text}" for fault in faults)
         return document
@@ -149,7 +148,7 @@ def load_programme(path: Path) -> Programme:
     if TESTS not in top.value:
         case = parse_case(text, path)
         return Programme(path=path, text=text, content=top.value, about=case.about, single=case)
-    document = validated_document(top.value, faults, ProgrammeDocument)
+    document = validated(top.value, faults, ProgrammeDocument)
     places = {fault.place for fault in faults}
     for fault in programme_faults(top.value, path.parent):
         if fault.place not in places:

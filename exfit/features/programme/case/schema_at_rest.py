@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WrapSerializer
 
-from exfit.case.messages import FILE_NAME
 from exfit.case.schema.estimate import Limit
 from exfit.case.schema.plants import SaturationName
 from exfit.case.schema.values import (
+    FILE_NAME,
     Findable,
     FreeSection,
     Frozen,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 
-from exfit.case.saturation import MEANINGS
+from exfit.case.parts import MEANINGS
 from exfit.features.report.sections.texts import DASH, number
 from exfit.inference.confidence import Interval
 from exfit.results.description import SheetRow

@@ -1,24 +1,97 @@
 """The sections of a case that a recorder's file suggests, with what must be checked."""
 
 import os
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from exfit.case.draft.bases import Base
-from exfit.case.draft.case_draft import Noted, Remark, Section, in_braces
-from exfit.case.open_values import QUESTION
+from exfit.case.case_draft import Noted, Remark, Section, in_braces
+from exfit.case.yaml import QUESTION
+from exfit.errors import ExfitError
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
 from exfit.records.channel_names import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
-from exfit.records.inspection import Inspection
+from exfit.records.formats import open_table
+from exfit.records.inspection import Inspection, inspect
 from exfit.records.rejection import POWERS, BreakerOpening
 from exfit.records.steps import RecordedStep, bounds_of_instant
-from exfit.records.units import unit_of
+from exfit.records.units import alike, scale_between, unit_of, usual
 from exfit.registry import parts
 from exfit.signals import COMPARED, OF_EVENT, RECORDED, SIGNALS
+from exfit.util.text import near
+
+BASE = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D.*)?")
+
+
+@dataclass(frozen=True)
+class Base:
+    """What 1 pu of a signal is, in a unit; without one it is that of the channel."""
+
+    value: float
+    unit: str | None
+
+    def in_unit(self, unit: str | None, channel: str) -> float:
+        """Return the value in the unit of a channel; raises ExfitError where that is another."""
+        if unit is None or self.unit is None or alike(unit, self.unit):
+            return self.value
+        scale = scale_between(self.unit, unit)
+        if scale is None:
+            raise ExfitError(f"base {self.value:g} {self.unit}: {channel} is in {unit}")
+        return float(f"{self.value * scale:.12g}")
+
+
+def base_of(text: str, place: str) -> Base:
+    """Return the base that a text is, as 15.75kV; raises ExfitError, which begins with a place."""
+    parts = BASE.fullmatch(text.strip())
+    unit = parts["unit"].strip() if parts is not None and parts["unit"] else None
+    if parts is None or float(parts["value"]) <= 0.0 or (unit and unit_of(unit) is None):
+        raise ExfitError(f"{place}: {text!r} is not a positive number with a unit, as 15.75kV")
+    return Base(float(parts["value"]), None if unit is None else usual(unit))
+
+
+def bases_of(texts: tuple[str, ...]) -> dict[str, Base]:
+    """Return bases by signal from texts as vt=15.75kV; raises ExfitError."""
+    bases = {}
+    for text in texts:
+        signal, equals, value = text.partition("=")
+        if not equals or signal not in RECORDED:
+            hint = near(signal, RECORDED) if equals else "give it as vt=15.75kV"
+            raise ExfitError(f"--base {text}: not a signal and its base; {hint}")
+        bases[signal] = base_of(value, f"--base {text}")
+    return bases
+
+
+def rated_bases(bases: Mapping[str, Base], kv: float | None, mva: float | None) -> dict[str, Base]:
+    """Return bases with those that the ratings of a unit give to signals without one."""
+    rated = {} if kv is None else {"vt": Base(kv, "kV")}
+    if mva is not None:
+        rated |= {"p": Base(mva, "MW"), "q": Base(mva, "Mvar")}
+    return {**rated, **bases}
+
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """Columns of the time of a record and their unit, its sheet, the column of its voltage.
+
+    ``memory`` (GB) is what reading may take. What is empty or None is as the file shows it.
+    """
+
+    clock: tuple[str, ...] = ()
+    unit: str | None = None
+    sheet: str | None = None
+    voltage: str | None = None
+    memory: float | None = None
+
+    def inspect(self, file: Path) -> Inspection:
+        """Inspect a recorder's file; raises RecordError where it is none."""
+        table = open_table(file, self.sheet, self.memory)
+        inspection = inspect(table, self.clock or None, self.unit)
+        return replace(inspection, sheet=self.sheet, memory=self.memory)
+
 
 NO_BASES: Mapping[str, Base] = MappingProxyType({})
 DIGITS = 4

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from channel_records import response_of
 
-from exfit.case.draft.free_parameters import bounds_of, free_of
+from exfit.case.other_model import bounds_of, free_of
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 

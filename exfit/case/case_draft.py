@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from exfit.case.open_values import QUESTION
-from exfit.case.yaml import read_yaml
+from exfit.case.yaml import QUESTION, read_yaml
 from exfit.models.sheet import Parameter
 from exfit.util.sources import SOURCES
 from exfit.util.text import Place, yaml_number

@@ -6,7 +6,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from exfit.case.draft.case_draft import CaseDraft, Noted, plain_text
+from exfit.case.case_draft import CaseDraft, Noted, plain_text
 from exfit.case.yaml import read_yaml
 
 NAMES = st.text(

@@ -1,0 +1,94 @@
+"""What contradicts itself in what is attached to a unit: stabiliser, governor, limiters."""
+
+from collections.abc import Iterator
+
+from exfit.case.checks.node import ContentNode
+from exfit.case.parts import Parts, kind_of, plants_of_records
+from exfit.case.yaml import Fault
+from exfit.models.sheet import Model, typical
+from exfit.plants import PlantKind, Stabilised, acts_without_load, inputs_at, inputs_for_limiters
+from exfit.plants.controls import HEARD, rests_at, rests_with_output
+from exfit.util.text import show, show_value
+
+
+def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
+    """Yield what does not act, has other inputs than its model, or does not rest at the start."""
+    plants = [kind, *map(kind_of, plants_of_records(content.content).values())]
+    on_load = any(plant.on_load for plant in plants)
+    off_line = kind.closed_loop and not on_load
+    for name in ("stabiliser", "governor"):
+        section = content.at(name)
+        if section.content:
+            if kind.has_exciter and not kind.has_machine:
+                yield section.fault(f"not allowed with plant {kind.name}: nothing feeds it")
+            if off_line and section.at("free").content:
+                yield section.at("free").fault(f"on open circuit a {name} does not act")
+    stabiliser, governor = content.at("stabiliser"), content.at("governor")
+    if stabiliser.content and parts.stabiliser is not None:
+        yield from _stabiliser_faults(stabiliser, parts.stabiliser, on_load)
+    if governor.content and parts.governor is not None:
+        records = (*content.at("records").entries, *content.at("validate").entries)
+        values = _start_values(governor, parts.governor)
+        nodes = (content.at("plant"), *(record.at("plant") for record in records))
+        for power in dict.fromkeys(plant.at("network", "P").number for plant in nodes):
+            if power is None or values is None or rests_at(parts.governor, values, power):
+                continue
+            rest = f"{parts.governor.name} does not rest at P = {show(power)} pu"
+            yield governor.at("parameters").fault(f"{rest}: one of its limits is in the way")
+    if kind.has_exciter:
+        yield from _limiter_faults(content, parts, off_line)
+
+
+def _stabiliser_faults(section: ContentNode, model: Model, on_load: bool) -> Iterator[Fault]:
+    """Yield inputs of another number than the model's, and an output that moves a unit at rest."""
+    inputs, values = section.at("inputs"), _start_values(section, model)
+    if isinstance(inputs.value, list) and len(inputs.value) != len(model.inputs):
+        text = f"{len(inputs.value)} given; {model.name} takes {len(model.inputs)}"
+        yield inputs.fault(text)
+        return
+    heard = tuple(entry.text or "" for entry in inputs.entries) or model.inputs
+    if not on_load or values is None or not {*heard} <= {*HEARD}:
+        return
+    if rests_with_output(Stabilised(model, heard), values):
+        rest = f"{model.name} does not rest at 0 with inputs {', '.join(heard)}"
+        yield section.at("parameters").fault(f"{rest}: its washout is left out")
+
+
+def _limiter_faults(content: ContentNode, parts: Parts, off_line: bool) -> Iterator[Fault]:
+    """Yield limiters at a place that they or the exciter do not have, and what cannot be fitted."""
+    exciter, by_kind = parts.exciter, {limiter.kind: limiter for limiter in parts.limiters}
+    fed = frozenset() if exciter is None else inputs_for_limiters(exciter)
+    for part in parts.all:
+        limiter = by_kind.get(part.kind)
+        if limiter is None:
+            continue
+        section, name = content.at(*part.section), limiter.model.name
+        if limiter.place not in limiter.model.places:
+            places = ", ".join(limiter.model.places)
+            text = f"{show_value(limiter.place)}: {name} acts at {places}"
+            yield section.at("place").fault(text)
+        elif exciter is not None and (missing := {*inputs_at(limiter).values()} - fed):
+            others = [
+                other
+                for other in limiter.model.places
+                if fed.issuperset(inputs_at(limiter._replace(place=other)).values())
+            ]
+            word = f"{limiter.place} ({', '.join(sorted(missing))})"
+            has = f"it has {', '.join(others)}"
+            text = f"{exciter.name} has no input {word} for {name}: "
+            text += has if others else "none of its inputs is for this limiter"
+            yield section.at("place").fault(text)
+        if off_line and not acts_without_load(limiter) and section.at("free").content:
+            text = f"on open circuit {name} does not act: there is no current"
+            yield section.at("free").fault(text)
+
+
+def _start_values(section: ContentNode, model: Model) -> dict[str, float] | None:
+    """Return the values at which a fit starts; None where one lies outside its data sheet."""
+    given = {symbol: value.number for symbol, value in section.at("parameters").sections} | {
+        symbol: value.start for symbol, value in section.at("free").sections
+    }
+    values = typical(model.sheet)
+    values |= {symbol: value for symbol, value in given.items() if value is not None}
+    within = all(row.low <= values[row.symbol] <= row.high for row in model.sheet)
+    return values if within else None
