@@ -302,27 +302,20 @@ def zero(x: Signal) -> Signal:
     return (x <= 0.0) & (x >= 0.0)
 
 
-class CommutatorStart(NamedTuple):
-    """The start of a commutator exciter: the values computed there, and the VR that holds EFD."""
+def commutator_start(efd: Signal, p: Signal, x: Signal) -> Signal:
+    """Write KE0, VRMAX0 and VRMIN0, the values in use, into x and return the VR that holds EFD.
 
-    KE: Signal
-    VRMAX: Signal
-    VRMIN: Signal
-    vr: Signal
-
-
-def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
-    """Return KE, VRMAX and VRMIN, computed as PSS/E does where they are given as 0.
+    They are computed as PSS/E does where KE and VRMAX are given as 0.
 
     VRMAX = 0: the VR that holds the higher of E1, E2 (with KE only where KE > 0), and
     VRMIN = -VRMAX. KE = 0, self-excited: such that VR starts at VRMAX / 10.
     """
     high = larger(p.E1, p.E2)
     computed = zero(p.VRMAX)
-    ceiling = where(computed, exciter_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
-    floor = where(computed, -ceiling, p.VRMIN)
-    KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
-    return CommutatorStart(KE, ceiling, floor, exciter_demand(efd, KE, p))
+    x.VRMAX0 = where(computed, exciter_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
+    x.VRMIN0 = where(computed, -x.VRMAX0, p.VRMIN)
+    x.KE0 = where(zero(p.KE), (x.VRMAX0 / 10.0 - p.saturation(efd).vx) / efd, p.KE)
+    return exciter_demand(efd, x.KE0, p)
 
 
 def compound_source(

@@ -1,6 +1,5 @@
 """Alternator exciters with rate feedback: AC1A, AC1C, EXAC1 and EXAC1A."""
 
-from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import (
     Signal,
     clip,
@@ -8,12 +7,11 @@ from exfit.models.blocks import (
     lag,
     larger,
     lead_lag,
-    limited_integrator,
     limited_lag,
     rectifier,
-    rectifier_supply,
     washout,
 )
+from exfit.models.exciter_parts import alternator, alternator_rest, limited_alternator, regulated
 from exfit.models.sheet import (
     AS_IN_PSSE,
     OF_A_LIST,
@@ -42,19 +40,15 @@ def ac1a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     between the two.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
-    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    va = regulated(vfe, s, u, p, d)
     vr = clip(clip(va, u.vuel, u.voel), p.VRMIN, p.VRMAX)
-    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
-    return rectifier(ve, p.KC * u.ifd)
+    efd, d.VE = alternator(vr, vfe, s, u, p)
+    return efd
 
 
 def ac1a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
+    ve, vfe = alternator_rest(efd, u, p)
     error = vfe / p.KA
     x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, vfe, ve, vfe
     return u.vc1 + error - u.vs
@@ -107,19 +101,16 @@ def ac1c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     InterPSS draw the same.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc - vf, s.VL, p.TC, p.TB)
-    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    va = regulated(vfe, s, u, p, d, u.vsum)
     efe = clip(clip(va, u.vuel, u.voel), p.EFEMIN, p.EFEMAX)
-    efd, d.VE = alternator(efe, vfe, s, u, p)
+    efd, d.VE = limited_alternator(efe, vfe, s, u, p)
     return efd
 
 
 AC1C = documented(
     ac1c,
     ac1a_rest,
-    (*renamed(AC1A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *FIELD_LIMITS),
+    (*renamed(AC1A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VL VA VE VF",
     aliases=("ESAC1C",),
     records=(
@@ -135,14 +126,14 @@ AC1C = documented(
 )
 
 
-def regulated(vf: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+def exciter_of_1981(vf: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of all states but that of the feedback VF into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc - vf, s.VL, p.TC, p.TB)
     vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
-    return rectifier(ve, p.KC * u.ifd)
+    efd, d.VE = alternator(vr, vfe, s, u, p)
+    return efd
 
 
 def exac1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -161,13 +152,12 @@ def exac1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     VRMAX and VRMIN behind it.
     """
     vf, d.VF = washout(field_demand(s.VE, u.ifd, p), s.VF, p.KF, p.TF)
-    return regulated(vf, s, u, p, d)
+    return exciter_of_1981(vf, s, u, p, d)
 
 
 def exac1_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
+    ve, vfe = alternator_rest(efd, u, p)
     error = vfe / p.KA
     x.VC, x.VL, x.VR, x.VE, x.VF = u.vc1, error, vfe, ve, vfe
     return u.vc1 + error - u.vs
@@ -213,7 +203,7 @@ def exac1a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """
     efd = rectifier(larger(s.VE, 0.0), p.KC * u.ifd)
     vf, d.VF = washout(efd, s.VF, p.KF, p.TF)
-    return regulated(vf, s, u, p, d)
+    return exciter_of_1981(vf, s, u, p, d)
 
 
 def exac1a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:

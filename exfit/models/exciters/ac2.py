@@ -1,20 +1,13 @@
 """Alternator exciters with high initial response: AC2A, AC2C and EXAC2."""
 
-from exfit.models.alternators import FLOOR, alternator
 from exfit.models.blocks import (
     Signal,
     clip,
     field_ceiling,
     field_demand,
-    lag,
-    lead_lag,
-    limited_integrator,
-    limited_lag,
-    rectifier,
-    rectifier_supply,
     smaller,
-    washout,
 )
+from exfit.models.exciter_parts import alternator, alternator_rest, limited_alternator, regulated
 from exfit.models.sheet import (
     AS_IN_PSSE,
     LIMIT,
@@ -53,21 +46,15 @@ def ac2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     VA = VFE / KB + KH VFE.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vemax = field_ceiling(s.VE, vfe, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
-    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    gated = clip(p.KB * (va - p.KH * vfe), u.vuel, u.voel)
-    vr = clip(gated, p.VRMIN, p.VRMAX)
-    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, 0.0, vemax)
-    return rectifier(ve, p.KC * u.ifd)
+    va = regulated(vfe, s, u, p, d)
+    vr = clip(clip(p.KB * (va - p.KH * vfe), u.vuel, u.voel), p.VRMIN, p.VRMAX)
+    efd, d.VE = alternator(vr, vfe, s, u, p, 0.0, field_ceiling(s.VE, vfe, p))
+    return efd
 
 
 def ac2a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
+    ve, vfe = alternator_rest(efd, u, p)
     va = vfe / p.KB + p.KH * vfe
     error = va / p.KA
     x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, va, ve, vfe
@@ -131,19 +118,16 @@ def ac2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     parameters that PowerWorld lists.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc - vf, s.VL, p.TC, p.TB)
-    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    gated = clip(p.KB * (va - p.KH * vfe), u.vuel, u.voel)
-    efd, d.VE = alternator(clip(gated, p.EFEMIN, p.EFEMAX), vfe, s, u, p)
+    va = regulated(vfe, s, u, p, d, u.vsum)
+    efe = clip(clip(p.KB * (va - p.KH * vfe), u.vuel, u.voel), p.EFEMIN, p.EFEMAX)
+    efd, d.VE = limited_alternator(efe, vfe, s, u, p)
     return efd
 
 
 AC2C = documented(
     ac2c,
     ac2a_rest,
-    (*renamed(AC2A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *FLOOR),
+    (*renamed(AC2A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VEMIN=0.0)),
     "VC VL VA VE VF",
     aliases=("ESAC2C",),
     records=(
@@ -183,29 +167,16 @@ def exac2(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     UEL and OEL inputs, which some programs add at the first summing point.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
-    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    va = regulated(vfe, s, u, p, d)
     gated = smaller(va - p.KH * vfe, p.KL * (p.VLR - vfe))
     vr = clip(p.KB * gated, p.VRMIN, p.VRMAX)
-    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
-    return rectifier(ve, p.KC * u.ifd)
-
-
-def exac2_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
-    """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
-    va = vfe / p.KB + p.KH * vfe
-    error = va / p.KA
-    x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, va, ve, vfe
-    return u.vc1 + error - u.vs
+    efd, d.VE = alternator(vr, vfe, s, u, p)
+    return efd
 
 
 EXAC2 = documented(
     exac2,
-    exac2_rest,
+    ac2a_rest,
     sheet(
         *shared(TR=0.0, TB=0.0, TC=0.0, KA=400.0, TA=0.01, VAMAX=8.0, VAMIN=-8.0, KB=25.0),
         *shared(VRMAX_OF_EXCITER=105.0, VRMIN_OF_EXCITER=-95.0, TE=0.6),

@@ -13,10 +13,10 @@ from exfit.models.blocks import (
     pi_rest,
     pid,
     rectifier,
-    rectifier_supply,
     washout,
     where,
 )
+from exfit.models.exciter_parts import alternator_rest
 from exfit.models.sheet import (
     LIMIT,
     OF_A_LIST,
@@ -73,8 +73,8 @@ def ac3a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def ac3a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    va = field_demand(ve, u.ifd, p) / (p.KR * efd)
+    ve, vfe = alternator_rest(efd, u, p)
+    va = vfe / (p.KR * efd)
     error = va / p.KA
     x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, va, ve, feedback(efd, p)
     return u.vc1 + error - u.vs
@@ -156,11 +156,8 @@ def ac3c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def ac3c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VE = rectifier_supply(efd, p.KC * u.ifd)
-    x.VA = field_demand(x.VE, u.ifd, p) / (p.KR * efd)
-    x.VL = x.VA / p.KA
+    ac3a_rest(efd, u, p, x)
     x.VD, x.VI = pi_rest(x.VL, p.KPR, p.KIR)
-    x.VC, x.VF = u.vc1, feedback(efd, p)
     return u.vc1 + x.VD - u.vs
 
 
@@ -228,18 +225,9 @@ def exac3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     return efd
 
 
-def exac3_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
-    """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    va = field_demand(ve, u.ifd, p) / (p.KR * efd)
-    error = va / p.KA
-    x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, va, ve, feedback(efd, p)
-    return u.vc1 + error - u.vs
-
-
 EXAC3 = documented(
     exac3,
-    exac3_rest,
+    ac3a_rest,
     sheet(
         *shared(TR=0.0, TB=0.0, TC=0.0, KA=78.04, TA=0.013, VAMAX=1.0, VAMIN=-0.95, TE=3.71),
         ("KLV", 0.167, *UP_TO_1000, "gain of the low voltage limiter"),

@@ -12,6 +12,14 @@ from exfit.models.sheet import (
 )
 
 
+def limited_error(limiters: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Return the voltage error, with what limiters add, between its limits behind a lead-lag."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vi = clip(u.vref + u.vs + limiters - vc, p.VIMIN, p.VIMAX)
+    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    return vl
+
+
 def ac4a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """AC4A: alternator with a controlled rectifier (IEEE Std 421.5-2005, 6.4).
 
@@ -28,9 +36,7 @@ def ac4a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     out, as in the standard. PSS/E's older EXAC4 differs in its limits and is a
     separate model.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vi = clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX)
-    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    vl = limited_error(u.vsum, s, u, p, d)
     ceiling = p.VRMAX - p.KC * u.ifd
     efd, d.VR = limited_lag(larger(vl, u.vuel), s.VR, p.KA, p.TA, p.VRMIN, ceiling)
     return efd
@@ -82,11 +88,8 @@ def ac4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     the drawing of 2005 and the program InterPSS, which adds the gate of the OEL and
     where the limit of the lag winds up.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vi = clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX)
-    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
-    gated = clip(vl, u.vuel, u.voel)
-    ceiling = p.VRMAX - p.KC * u.ifd
+    vl = limited_error(u.vsum, s, u, p, d)
+    gated, ceiling = clip(vl, u.vuel, u.voel), p.VRMAX - p.KC * u.ifd
     efd, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, ceiling)
     return efd
 
@@ -125,28 +128,15 @@ def exac4(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     after PSS/E's EXAC4 agree; a third has the same limits, but non-windup. Not
     modelled: UEL and OEL, which are added to vs.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vi = clip(u.vref + u.vs - vc, p.VIMIN, p.VIMAX)
-    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
-    vr, d.VR = lag(vl, s.VR, p.KA, p.TA)
+    vr, d.VR = lag(limited_error(0.0, s, u, p, d), s.VR, p.KA, p.TA)
     drop = p.KC * u.ifd
     return clip(vr, p.VRMIN - drop, p.VRMAX - drop)
 
 
-def exac4_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
-    """Write the states that hold efd into x and return vref."""
-    error = efd / p.KA
-    x.VC, x.VL, x.VR = u.vc1, error, efd
-    return u.vc1 + error - u.vs
-
-
 EXAC4 = documented(
     exac4,
-    exac4_rest,
-    sheet(
-        *shared(TR=0.0, VIMAX=10.0, VIMIN=-10.0, TC_FREE=1.0, TB_FREE=10.0, KA=200.0, TA=0.015),
-        *shared(VRMAX_OF_EFD=5.64, VRMIN_OF_EFD=-4.53, KC=0.0),
-    ),
+    ac4a_rest,
+    AC4A.sheet,
     "VC VL VR",
     records=(record("EXAC4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),),
     pslf_records=(

@@ -1,6 +1,5 @@
 """Simplified alternator exciters: AC5A and AC5C."""
 
-from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import (
     Signal,
     clip,
@@ -10,9 +9,9 @@ from exfit.models.blocks import (
     lag,
     lead_lag,
     limited_lag,
-    rectifier_supply,
     washout,
 )
+from exfit.models.exciter_parts import alternator_rest, limited_alternator
 from exfit.models.sheet import (
     LAG_OF_KF,
     OF_A_LIST,
@@ -123,16 +122,16 @@ def ac5c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vl, s.VF, p.KF, p.TF1)
     error = u.vref + u.vs + u.vsum - vc - vf
     va, d.VA = limited_lag(error, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    efd, d.VE = alternator(clip(va, u.vuel, u.voel), vfe, s, u, p)
+    efe = clip(va, u.vuel, u.voel)
+    efd, d.VE = limited_alternator(efe, vfe, s, u, p)
     return efd
 
 
 def ac5c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VE = rectifier_supply(efd, p.KC * u.ifd)
-    x.VA = x.VL = x.VF = field_demand(x.VE, u.ifd, p)
-    x.VC = u.vc1
-    return u.vc1 + x.VA / p.KA - u.vs
+    x.VE, vfe = alternator_rest(efd, u, p)
+    x.VC, x.VA, x.VL, x.VF = u.vc1, vfe, vfe, vfe
+    return u.vc1 + vfe / p.KA - u.vs
 
 
 AC5C = documented(
@@ -141,7 +140,7 @@ AC5C = documented(
     (
         *renamed(AC5A.sheet, VRMAX="VAMAX", VRMIN="VAMIN"),
         *shared(KC_FREE=0.2, KD=0.38),
-        *FIELD_LIMITS,
+        *shared(VFEMAX=99.0, VEMIN=0.0),
     ),
     "VC VA VE VL VF",
     aliases=("ESAC5C",),

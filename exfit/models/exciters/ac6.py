@@ -1,17 +1,14 @@
 """Alternator exciters with a field current limiter: AC6A and AC6C."""
 
-from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import (
     Signal,
     clip,
     field_demand,
     lag,
     lead_lag,
-    limited_integrator,
     limited_lead_lag,
-    rectifier,
-    rectifier_supply,
 )
+from exfit.models.exciter_parts import alternator, alternator_rest, limited_alternator
 from exfit.models.sheet import (
     FREE,
     LAG_OF_TC,
@@ -33,6 +30,15 @@ from exfit.models.sheet import (
 def limiter(vfe: Signal, p: Signal) -> Signal:
     """Return VH, the output of the limiter where the field current is above VFELIM."""
     return clip(p.KH * (vfe - p.VFELIM), 0.0, p.VHMAX)
+
+
+def amplified(vfe: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
+    """Return VA, the error behind lag and lead, and VF, what the field current limiter takes."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vk, d.VK = lead_lag(p.KA * (u.vref + u.vs + u.vsum - vc), s.VK, p.TK, p.TA)
+    va, d.VA = limited_lead_lag(vk, s.VA, p.TC, p.TB, p.VAMIN, p.VAMAX)
+    vf, d.VH = lead_lag(limiter(vfe, p), s.VH, p.TJ, p.TH)
+    return va, vf
 
 
 def ac6a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -59,19 +65,15 @@ def ac6a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     to vs.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vk, d.VK = lead_lag(p.KA * (u.vref + u.vs + u.vsum - vc), s.VK, p.TK, p.TA)
-    va, d.VA = limited_lead_lag(vk, s.VA, p.TC, p.TB, p.VAMIN, p.VAMAX)
-    vf, d.VH = lead_lag(limiter(vfe, p), s.VH, p.TJ, p.TH)
+    va, vf = amplified(vfe, s, u, p, d)
     vr = clip(va - vf, u.vt * p.VRMIN, u.vt * p.VRMAX)
-    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
-    return rectifier(ve, p.KC * u.ifd)
+    efd, d.VE = alternator(vr, vfe, s, u, p)
+    return efd
 
 
 def ac6a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
+    ve, vfe = alternator_rest(efd, u, p)
     vh = limiter(vfe, p)
     va = vfe + vh
     x.VC, x.VK, x.VA, x.VE, x.VH = u.vc1, va, va, ve, vh
@@ -146,20 +148,16 @@ def ac6c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     state runs on.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vk, d.VK = lead_lag(p.KA * (u.vref + u.vs + u.vsum - vc), s.VK, p.TK, p.TA)
-    va, d.VA = limited_lead_lag(vk, s.VA, p.TC, p.TB, p.VAMIN, p.VAMAX)
-    vf, d.VH = lead_lag(limiter(vfe, p), s.VH, p.TJ, p.TH)
-    gated = clip(va, u.vuel, u.voel)
-    efe = clip(gated - vf, u.vt * p.EFEMIN, u.vt * p.EFEMAX)
-    efd, d.VE = alternator(efe, vfe, s, u, p)
+    va, vf = amplified(vfe, s, u, p, d)
+    efe = clip(clip(va, u.vuel, u.voel) - vf, u.vt * p.EFEMIN, u.vt * p.EFEMAX)
+    efd, d.VE = limited_alternator(efe, vfe, s, u, p)
     return efd
 
 
 AC6C = documented(
     ac6c,
     ac6a_rest,
-    (*renamed(AC6A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *FIELD_LIMITS),
+    (*renamed(AC6A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VK VA VE VH",
     aliases=("ESAC6C",),
     records=(

@@ -1,21 +1,24 @@
 """Alternator exciters with an inner field loop: AC7B and AC7C."""
 
-from exfit.models.alternators import SUPPLY, alternator, supply
 from exfit.models.blocks import (
     Signal,
     clip,
-    field_ceiling,
     field_demand,
+    inf,
     lag,
     larger,
-    limited_integrator,
     pi,
     pi_rest,
     pid,
     rectifier,
-    rectifier_supply,
     washout,
     where,
+)
+from exfit.models.exciter_parts import (
+    ALTERNATOR_SUPPLY,
+    alternator_rest,
+    limited_alternator,
+    supply,
 )
 from exfit.models.sheet import (
     FREE,
@@ -32,7 +35,38 @@ from exfit.models.sheet import (
     record,
     shared,
     sheet,
+    with_typical,
 )
+
+Limits = tuple[Signal, Signal]
+
+
+def inner_loop(
+    at_error: Limits, at_output: Limits, vs: Signal, s: Signal, u: Signal, p: Signal, d: Signal
+) -> Signal:
+    """Write the slopes into d and return efd.
+
+    Limiters hold the error and the PID's output between two limits; ``vs`` is the supply of the
+    amplifier.
+    """
+    vfe = field_demand(s.VE, u.ifd, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
+    error = clip(u.vref + u.vs + u.vsum - vc - vf, *at_error)
+    vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
+    inner = clip(vr, *at_output) - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
+    va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
+    efd, d.VE = limited_alternator(larger(vs * va, -p.KL * vfe), vfe, s, u, p)
+    return efd
+
+
+def at_rest(efd: Signal, vs: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd with a supply ``vs`` into x and return vref."""
+    x.VE, vfe = alternator_rest(efd, u, p)
+    inner, x.VA = pi_rest(vfe / vs, p.KPA, p.KIA)
+    x.VD, x.VI = pi_rest(inner + p.KF1 * efd + p.KF2 * vfe, p.KPR, p.KIR)
+    x.VC, x.VF = u.vc1, vfe
+    return u.vc1 + x.VD - u.vs
 
 
 def ac7b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -59,27 +93,12 @@ def ac7b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     integrates, 1/sTE: the 1/(1+sTE) in the figure of 2005 is a misprint. An UEL is
     added at the first summing point.
     """
-    vfe = field_demand(s.VE, u.ifd, p)
-    vemax = field_ceiling(s.VE, vfe, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
-    error = u.vref + u.vs + u.vsum - vc - vf
-    vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
-    inner = vr - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
-    va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
-    vfd = larger(p.KP * u.vt * va, -p.KL * vfe)
-    ve, d.VE = limited_integrator(vfd - vfe, s.VE, p.TE, p.VEMIN, vemax)
-    return rectifier(ve, p.KC * u.ifd)
+    return inner_loop((-inf, inf), (-inf, inf), p.KP * u.vt, s, u, p, d)
 
 
 def ac7b_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
-    inner, x.VA = pi_rest(vfe / (p.KP * u.vt), p.KPA, p.KIA)
-    error, x.VI = pi_rest(inner + p.KF1 * efd + p.KF2 * vfe, p.KPR, p.KIR)
-    x.VC, x.VD, x.VF, x.VE = u.vc1, error, vfe, ve
-    return u.vc1 + error - u.vs
+    return at_rest(efd, p.KP * u.vt, u, p, x)
 
 
 AC7B = documented(
@@ -122,9 +141,9 @@ AC7B = documented(
 )
 
 
-def amplifier_supply(efd: Signal, u: Signal, vfe: Signal, p: Signal) -> Signal:
+def amplifier_supply(efd: Signal, vfe: Signal, u: Signal, p: Signal) -> Signal:
     """Return VS, what the amplifier gets: of a source of its own, or of the exciter."""
-    return where(p.SW2 < 1.5, supply(u, vfe, p), p.KR * efd)
+    return where(p.SW2 < 1.5, supply(p.KC1 * vfe, u, p), p.KR * efd)
 
 
 def ac7c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -160,26 +179,14 @@ def ac7c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     sample.
     """
     vfe = field_demand(s.VE, u.ifd, p)
-    fed_back = rectifier(s.VE, p.KC * u.ifd)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
-    error = clip(u.vref + u.vs + u.vsum - vc - vf, u.vuel, u.voel)
-    vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
-    inner = clip(vr, u.vuel_out, u.voel_out) - p.KF1 * fed_back - p.KF2 * vfe
-    va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
-    vfd = larger(amplifier_supply(fed_back, u, vfe, p) * va, -p.KL * vfe)
-    efd, d.VE = alternator(vfd, vfe, s, u, p)
-    return efd
+    vs = amplifier_supply(rectifier(s.VE, p.KC * u.ifd), vfe, u, p)
+    return inner_loop((u.vuel, u.voel), (u.vuel_out, u.voel_out), vs, s, u, p, d)
 
 
 def ac7c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VE = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(x.VE, u.ifd, p)
-    inner, x.VA = pi_rest(vfe / amplifier_supply(efd, u, vfe, p), p.KPA, p.KIA)
-    x.VD, x.VI = pi_rest(inner + p.KF1 * efd + p.KF2 * vfe, p.KPR, p.KIR)
-    x.VC, x.VF = u.vc1, vfe
-    return u.vc1 + x.VD - u.vs
+    _, vfe = alternator_rest(efd, u, p)
+    return at_rest(efd, amplifier_supply(efd, vfe, u, p), u, p, x)
 
 
 AC7C = documented(
@@ -187,10 +194,8 @@ AC7C = documented(
     ac7c_rest,
     (
         *AC7B.sheet,
-        *(row for row in SUPPLY if row.symbol not in ("KP", "KC1", "VBMAX")),
+        *(row for row in with_typical(ALTERNATOR_SUPPLY, KC1=0.2, VBMAX=7.0) if row.symbol != "KP"),
         *sheet(
-            ("KC1", 0.2, *UP_TO_100, "loading factor of the supply's rectifier"),
-            *shared(VBMAX=7.0),
             ("SW2", 1.0, "1", (1.0, 2.0), "supply of the amplifier: 1 VB, 2 field voltage"),
             *shared(KR=4.0),
         ),

@@ -1,22 +1,51 @@
 """Alternator exciters with a PID: AC8B, AC8C and ESAC8B."""
 
-from exfit.models.alternators import SUPPLY, alternator, supply
 from exfit.models.blocks import (
     Signal,
     clip,
     exciter,
     exciter_demand,
-    field_ceiling,
     field_demand,
+    inf,
     lag,
-    limited_integrator,
     limited_lag,
     pi_rest,
     pid,
-    rectifier,
-    rectifier_supply,
+)
+from exfit.models.exciter_parts import (
+    ALTERNATOR_SUPPLY,
+    alternator_rest,
+    limited_alternator,
+    supply,
 )
 from exfit.models.sheet import OF_A_LIST, TWO_GATES, documented, record, shared, sheet
+
+Limits = tuple[Signal, Signal]
+
+
+def regulated(
+    at_error: Limits, at_output: Limits, vb: Signal, s: Signal, u: Signal, p: Signal, d: Signal
+) -> Signal:
+    """Write the slopes into d and return efd.
+
+    Limiters hold the error and the PID's output between two limits; ``vb`` is the supply of the
+    power stage.
+    """
+    vfe = field_demand(s.VE, u.ifd, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = clip(u.vref + u.vs + u.vsum - vc, *at_error)
+    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
+    vr, d.VR = limited_lag(clip(vpid, *at_output), s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    efd, d.VE = limited_alternator(vr * vb, vfe, s, u, p)
+    return efd
+
+
+def at_rest(efd: Signal, vb: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd with a supply ``vb`` into x and return vref."""
+    x.VE, vfe = alternator_rest(efd, u, p)
+    x.VC, x.VR = u.vc1, vfe / vb
+    x.VD, x.VI = pi_rest(x.VR / p.KA, p.KPR, p.KIR)
+    return u.vc1 + x.VD - u.vs
 
 
 def ac8b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -35,23 +64,12 @@ def ac8b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     is at its limit. UEL and OEL are added at the summing point. PSS/E's ESAC8B is
     another model.
     """
-    vfe = field_demand(s.VE, u.ifd, p)
-    vemax = field_ceiling(s.VE, vfe, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = u.vref + u.vs + u.vsum - vc
-    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
-    vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, p.VEMIN, vemax)
-    return rectifier(ve, p.KC * u.ifd)
+    return regulated((-inf, inf), (-inf, inf), 1.0, s, u, p, d)
 
 
 def ac8b_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    ve = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(ve, u.ifd, p)
-    error, x.VI = pi_rest(vfe / p.KA, p.KPR, p.KIR)
-    x.VC, x.VD, x.VR, x.VE = u.vc1, error, vfe, ve
-    return u.vc1 + error - u.vs
+    return at_rest(efd, 1.0, u, p, x)
 
 
 AC8B = documented(
@@ -121,29 +139,20 @@ def ac8c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     also be added behind the first gate (VOS = 2 in a PSS/E record): not modelled,
     and the same where no limiter acts. The supply's data are not those of a sample.
     """
-    vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = clip(u.vref + u.vs + u.vsum - vc, u.vuel, u.voel)
-    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
-    gated = clip(vpid, u.vuel_out, u.voel_out)
-    vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    efd, d.VE = alternator(vr * supply(u, vfe, p), vfe, s, u, p)
-    return efd
+    vb = supply(p.KC1 * field_demand(s.VE, u.ifd, p), u, p)
+    return regulated((u.vuel, u.voel), (u.vuel_out, u.voel_out), vb, s, u, p, d)
 
 
 def ac8c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VE = rectifier_supply(efd, p.KC * u.ifd)
-    vfe = field_demand(x.VE, u.ifd, p)
-    x.VC, x.VR = u.vc1, vfe / supply(u, vfe, p)
-    x.VD, x.VI = pi_rest(x.VR / p.KA, p.KPR, p.KIR)
-    return u.vc1 + x.VD - u.vs
+    _, vfe = alternator_rest(efd, u, p)
+    return at_rest(efd, supply(p.KC1 * vfe, u, p), u, p, x)
 
 
 AC8C = documented(
     ac8c,
     ac8c_rest,
-    (*AC8B.sheet, *SUPPLY),
+    (*AC8B.sheet, *ALTERNATOR_SUPPLY),
     "VC VI VD VR VE",
     aliases=("ESAC8C",),
     records=(

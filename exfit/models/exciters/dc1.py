@@ -5,20 +5,47 @@ from exfit.models.blocks import (
     clip,
     commutator_start,
     exciter,
-    lag,
+    inf,
     larger,
     lead_lag,
     limited_lag,
-    washout,
 )
-from exfit.models.commutators import (
-    COMMUTATOR_SETPOINTS,
-    COMMUTATOR_STATES,
-    commutator_rest,
-    excited,
-    regulator_input,
+from exfit.models.exciter_parts import error_less_feedback
+from exfit.models.sheet import (
+    OF_A_LIST,
+    OF_TWO_PROGRAMS,
+    documented,
+    record,
+    renamed,
+    shared,
+    sheet,
 )
-from exfit.models.sheet import OF_A_LIST, OF_TWO_PROGRAMS, documented, record, shared, sheet
+
+STATES, SETPOINTS = "VC VL VR EFD VF", "KE0 VRMAX0 VRMIN0"
+
+
+def excited(
+    regulated: Signal,
+    supply: Signal,
+    s: Signal,
+    p: Signal,
+    d: Signal,
+    low: Signal = -inf,
+    high: Signal = inf,
+) -> Signal:
+    """Return EFD between ``low`` and ``high``; VR is limited in proportion to ``supply``."""
+    floor, ceiling = supply * s.VRMIN0, supply * s.VRMAX0
+    vr, d.VR = limited_lag(regulated, s.VR, p.KA, p.TA, floor, ceiling)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, low, high)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vr = commutator_start(efd, p, x)
+    error = vr / p.KA
+    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, vr, efd, efd
+    return u.vc1 + error - u.vs
 
 
 def dc1a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -41,18 +68,18 @@ def dc1a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     setpoints KE0, VRMAX0, VRMIN0.
     Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
     """
-    vl = regulator_input(s, u, p, d)
-    return excited(larger(vl, u.vuel), 1.0, s, p, d)
+    vl, d.VL = lead_lag(error_less_feedback(p.TF, s, u, p, d), s.VL, p.TC, p.TB)
+    return excited(larger(vl, u.vuel), 1.0, s, p, d, 0.0)
 
 
 DC1A = documented(
     dc1a,
-    commutator_rest,
+    rest,
     sheet(
         *shared(TR=0.0, KA=46.0, TA=0.06, TB=0.0, TC=0.0, VRMAX_OR_0=1.0, VRMIN=-0.9, KE_OR_0=0.0),
         *shared(TE=0.46, KF=0.1, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
     ),
-    COMMUTATOR_STATES,
+    STATES,
     aliases=("ESDC1A",),
     records=(
         record(
@@ -71,7 +98,7 @@ DC1A = documented(
             doubt=OF_A_LIST,
         ),
     ),
-    setpoints=COMMUTATOR_SETPOINTS,
+    setpoints=SETPOINTS,
 )
 
 
@@ -97,19 +124,18 @@ def dc1c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
     them.
     """
-    vl = regulator_input(s, u, p, d, u.vsum)
-    gated = clip(vl, u.vuel, u.voel)
-    return excited(gated, 1.0, s, p, d, p.VEMIN, p.VEMAX)
+    vl, d.VL = lead_lag(error_less_feedback(p.TF, s, u, p, d, u.vsum), s.VL, p.TC, p.TB)
+    return excited(clip(vl, u.vuel, u.voel), 1.0, s, p, d, p.VEMIN, p.VEMAX)
 
 
 DC1C = documented(
     dc1c,
-    commutator_rest,
+    rest,
     (
         *DC1A.sheet,
         *shared(VEMAX=99.0, VEMIN=0.0),
     ),
-    COMMUTATOR_STATES,
+    STATES,
     aliases=("ESDC1C",),
     records=(
         record(
@@ -120,7 +146,7 @@ DC1C = documented(
             doubt=OF_TWO_PROGRAMS,
         ),
     ),
-    setpoints=COMMUTATOR_SETPOINTS,
+    setpoints=SETPOINTS,
 )
 
 
@@ -145,18 +171,18 @@ def dc2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     setpoints KE0, VRMAX0, VRMIN0.
     Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
     """
-    vl = regulator_input(s, u, p, d)
-    return excited(larger(vl, u.vuel), u.vt, s, p, d)
+    vl, d.VL = lead_lag(error_less_feedback(p.TF, s, u, p, d), s.VL, p.TC, p.TB)
+    return excited(larger(vl, u.vuel), u.vt, s, p, d, 0.0)
 
 
 DC2A = documented(
     dc2a,
-    commutator_rest,
+    rest,
     sheet(
         *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0, VRMAX_AT_VT_OR_0=4.95, VRMIN_AT_VT=-4.9),
         *shared(KE_OR_0=1.0, TE=1.33, KF=0.02, TF=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
     ),
-    COMMUTATOR_STATES,
+    STATES,
     aliases=("ESDC2A",),
     records=(
         record(
@@ -175,7 +201,7 @@ DC2A = documented(
             doubt=OF_A_LIST,
         ),
     ),
-    setpoints=COMMUTATOR_SETPOINTS,
+    setpoints=SETPOINTS,
 )
 
 
@@ -200,19 +226,18 @@ def dc2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
     them.
     """
-    vl = regulator_input(s, u, p, d, u.vsum)
-    gated = clip(vl, u.vuel, u.voel)
-    return excited(gated, u.vt, s, p, d, p.VEMIN, p.VEMAX)
+    vl, d.VL = lead_lag(error_less_feedback(p.TF, s, u, p, d, u.vsum), s.VL, p.TC, p.TB)
+    return excited(clip(vl, u.vuel, u.voel), u.vt, s, p, d, p.VEMIN, p.VEMAX)
 
 
 DC2C = documented(
     dc2c,
-    commutator_rest,
+    rest,
     (
         *DC2A.sheet,
         *shared(VEMAX=99.0, VEMIN=0.0),
     ),
-    COMMUTATOR_STATES,
+    STATES,
     aliases=("ESDC2C",),
     records=(
         record(
@@ -223,7 +248,7 @@ DC2C = documented(
             doubt=OF_TWO_PROGRAMS,
         ),
     ),
-    setpoints=COMMUTATOR_SETPOINTS,
+    setpoints=SETPOINTS,
 )
 
 
@@ -246,21 +271,14 @@ def ieeet1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     setpoints KE0, VRMAX0, VRMIN0.
     Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = u.vref + u.vs - vc - vf
-    vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
-    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
-    return efd
+    return excited(error_less_feedback(p.TF, s, u, p, d), 1.0, s, p, d)
 
 
 def ieeet1_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    start = commutator_start(efd, p)
-    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    error = start.vr / p.KA
-    x.VC, x.VR, x.EFD, x.VF = u.vc1, start.vr, efd, efd
-    return u.vc1 + error - u.vs
+    vr = commutator_start(efd, p, x)
+    x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
+    return u.vc1 + vr / p.KA - u.vs
 
 
 IEEET1 = documented(
@@ -278,7 +296,7 @@ IEEET1 = documented(
             absent={"Switch": 0.0},
         ),
     ),
-    setpoints="KE0 VRMAX0 VRMIN0",
+    setpoints=SETPOINTS,
 )
 
 
@@ -303,31 +321,18 @@ def ieeex1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     KE0, VRMAX0, VRMIN0.
     Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF1)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
-    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
-    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
-    return efd
-
-
-def ieeex1_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
-    """Write the states that hold efd into x and return vref."""
-    start = commutator_start(efd, p)
-    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    error = start.vr / p.KA
-    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
-    return u.vc1 + error - u.vs
+    vl, d.VL = lead_lag(error_less_feedback(p.TF1, s, u, p, d), s.VL, p.TC, p.TB)
+    return excited(vl, 1.0, s, p, d)
 
 
 IEEEX1 = documented(
     ieeex1,
-    ieeex1_rest,
+    rest,
     sheet(
         *shared(TR=0.0, KA=40.0, TA=0.04, TB=0.0, TC=0.0, VRMAX_OR_0=7.3, VRMIN=-7.3, KE_OR_0=1.0),
         *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
     ),
-    "VC VL VR EFD VF",
+    STATES,
     records=(
         record(
             "IEEEX1",
@@ -342,7 +347,7 @@ IEEEX1 = documented(
             doubt=OF_A_LIST,
         ),
     ),
-    setpoints="KE0 VRMAX0 VRMIN0",
+    setpoints=SETPOINTS,
 )
 
 
@@ -368,32 +373,15 @@ def exdc2(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     KE0, VRMAX0, VRMIN0.
     Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF1)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
-    low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
-    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, low, high)
-    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
-    return efd
-
-
-def exdc2_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
-    """Write the states that hold efd into x and return vref."""
-    start = commutator_start(efd, p)
-    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    error = start.vr / p.KA
-    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
-    return u.vc1 + error - u.vs
+    vl, d.VL = lead_lag(error_less_feedback(p.TF1, s, u, p, d), s.VL, p.TC, p.TB)
+    return excited(vl, u.vt, s, p, d)
 
 
 EXDC2 = documented(
     exdc2,
-    exdc2_rest,
-    sheet(
-        *shared(TR=0.0, KA=300.0, TA=0.01, TB=0.0, TC=0.0, VRMAX_AT_VT_OR_0=4.95, VRMIN_AT_VT=-4.9),
-        *shared(KE_OR_0=1.0, TE=1.33, KF=0.02, TF1=0.675, E1=3.05, SE1=0.279, E2=2.29, SE2=0.117),
-    ),
-    "VC VL VR EFD VF",
+    rest,
+    renamed(DC2A.sheet, TF="TF1"),
+    STATES,
     records=(
         record(
             "EXDC2",
@@ -410,5 +398,5 @@ EXDC2 = documented(
             doubt=OF_A_LIST,
         ),
     ),
-    setpoints="KE0 VRMAX0 VRMIN0",
+    setpoints=SETPOINTS,
 )

@@ -1,18 +1,16 @@
 """Commutator exciters with a PID: DC4B and DC4C."""
 
-from exfit.models.alternators import SUPPLY, supply
 from exfit.models.blocks import (
     Signal,
     clip,
     commutator_start,
     exciter,
     exciter_demand,
-    lag,
     limited_lag,
     pi_rest,
     pid,
-    washout,
 )
+from exfit.models.exciter_parts import ALTERNATOR_SUPPLY, error_less_feedback, supply
 from exfit.models.sheet import documented, record, shared, sheet
 
 
@@ -48,9 +46,7 @@ def dc4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     (For DC4B that is OpenIPSL's KE and InterPSS's KE and VRMAX; the standard
     computes neither.) Not modelled: UEL or OEL at the summing point.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = u.vref + u.vs - vc - vf
+    error = error_less_feedback(p.TF, s, u, p, d)
     low, high = s.VRMIN0 / p.KA, s.VRMAX0 / p.KA
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD, low, high)
     fed = u.vt * clip(vpid, u.vuel, u.voel)
@@ -61,10 +57,9 @@ def dc4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def dc4b_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    start = commutator_start(efd, p)
-    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    error, x.VI = pi_rest(start.vr / (p.KA * u.vt), p.KP, p.KI)
-    x.VC, x.VD, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
+    vr = commutator_start(efd, p, x)
+    error, x.VI = pi_rest(vr / (p.KA * u.vt), p.KP, p.KI)
+    x.VC, x.VD, x.VR, x.EFD, x.VF = u.vc1, error, vr, efd, efd
     return u.vc1 + error - u.vs
 
 
@@ -121,14 +116,12 @@ def dc4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     rectifier is InterPSS's. Typical data are the standard's, as GridKit has them,
     but for saturation (DC4B's; the SE of 1.54 at 4.8 lets no EFD pass 1.5) and KC1.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = u.vref + u.vs + u.vsum - vc - vf
+    error = error_less_feedback(p.TF, s, u, p, d, u.vsum)
     low, high = p.VRMIN / p.KA, p.VRMAX / p.KA
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, low, high)
     gated = clip(vpid, u.vuel, u.voel)
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vb = supply(u, exciter_demand(s.EFD, p.KE, p), p)
+    vb = supply(p.KC1 * exciter_demand(s.EFD, p.KE, p), u, p)
     efd, d.EFD = exciter(vr * vb, s.EFD, p.KE, p, p.VEMIN)
     return efd
 
@@ -136,7 +129,7 @@ def dc4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 def dc4c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
     vfe = exciter_demand(efd, p.KE, p)
-    x.VR = vfe / supply(u, vfe, p)
+    x.VR = vfe / supply(p.KC1 * vfe, u, p)
     error, x.VI = pi_rest(x.VR / p.KA, p.KPR, p.KIR)
     x.VC, x.VD, x.EFD, x.VF = u.vc1, error, efd, efd
     return u.vc1 + error - u.vs
@@ -151,7 +144,7 @@ DC4C = documented(
             *shared(KA_FIXED=1.0, TA=0.02, KE_SIGNED=1.0, TE=0.8, KF_FIXED=0.0, TF=1.0, VEMIN=0.0),
             *shared(E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
         ),
-        *SUPPLY,
+        *ALTERNATOR_SUPPLY,
     ),
     "VC VI VD VR EFD VF",
     doubt="rests on one public diagram for the load of its supply (KC1), that of InterPSS",

@@ -39,7 +39,7 @@ from exfit.models.blocks import (
     second_order_lead,
     where,
 )
-from exfit.models.compound import supply
+from exfit.models.exciter_parts import compound_supply
 from exfit.models.sheet import FREE, LIMIT, OF_A_LIST, TIME, record, shared, sheet
 
 SHEET = sheet(
@@ -116,14 +116,14 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     va, d.VA = pi(error - vf, s.VA, p.KA * p.TA1, p.KA, p.VR2, p.VR1)
     vl, d.VL, d.DVL = filtered(va, s.VL, s.DVL, p)
     vr = clip(vl, p.VRMIN, p.VRMAX)
-    e0 = clip(vr * supply(u, p), p.EFDMIN, p.EFDMAX)
+    e0 = clip(vr * compound_supply(u, p), p.EFDMIN, p.EFDMAX)
     d.EFD = (e0 - exciter_demand(s.EFD, p.KE, p)) * rate(p.TE)
     return where(p.TE < SHORTEST, e0, s.EFD)
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vr = where(p.TE < SHORTEST, efd, exciter_demand(efd, p.KE, p)) / supply(u, p)
+    vr = where(p.TE < SHORTEST, efd, exciter_demand(efd, p.KE, p)) / compound_supply(u, p)
     error, x.VA = pi_rest(vr, p.KA * p.TA1, p.KA)
     x.VC, x.VL, x.VF, x.EFD = u.vc1, vr, vr, efd
     x.DVL, x.DVF = 0.0, 0.0

@@ -47,7 +47,6 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    start = commutator_start(efd, p)
-    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    x.VC, x.VR, x.EFD, x.VF1, x.VF2 = u.vc1, start.vr, efd, start.vr, 0.0
-    return u.vc1 + start.vr / p.KA - u.vs
+    vr = commutator_start(efd, p, x)
+    x.VC, x.VR, x.EFD, x.VF1, x.VF2 = u.vc1, vr, efd, vr, 0.0
+    return u.vc1 + vr / p.KA - u.vs

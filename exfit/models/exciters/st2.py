@@ -4,7 +4,6 @@ from exfit.models.blocks import (
     Signal,
     clip,
     compound_source,
-    lag,
     larger,
     limited_integrator,
     limited_lag,
@@ -13,10 +12,9 @@ from exfit.models.blocks import (
     smaller,
     source_voltage,
     sqrt,
-    washout,
     where,
 )
-from exfit.models.compound import supply
+from exfit.models.exciter_parts import PID, compound_supply, error_less_feedback
 from exfit.models.sheet import (
     AS_IN_PSSE,
     OF_TWO_PROGRAMS,
@@ -26,7 +24,12 @@ from exfit.models.sheet import (
     shared,
     sheet,
 )
-from exfit.models.static import PID
+
+
+def at_rest(vr: Signal, efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states of a regulator without a PID that holds efd by VR into x; return vref."""
+    x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
+    return u.vc1 + vr / p.KA - u.vs
 
 
 def st2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -46,20 +49,16 @@ def st2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     and so KI, acts on load only. Not modelled: UEL and OEL at the summing point,
     where PSS/E's EXST2A has them and no gate.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = larger(u.vref + u.vs - vc - vf, u.vuel)
+    error = larger(error_less_feedback(p.TF, s, u, p, d), u.vuel)
     vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vb = supply(u, p)
+    vb = compound_supply(u, p)
     efd, d.EFD = limited_integrator(vr * vb - p.KE * s.EFD, s.EFD, p.TE, 0.0, p.EFDMAX)
     return efd
 
 
 def st2a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vr = p.KE * efd / supply(u, p)
-    x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
-    return u.vc1 + vr / p.KA - u.vs
+    return at_rest(p.KE * efd / compound_supply(u, p), efd, u, p, x)
 
 
 ST2A = documented(
@@ -120,9 +119,7 @@ def st2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     KI = XL = 0, KC = 0.1, VBMAX = 5.2 and EFDMAX = 4.4. PID, VBMAX and XL are not
     those of a sample.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = u.vref + u.vs + u.vsum - vc - vf
+    error = error_less_feedback(p.TF, s, u, p, d, u.vsum)
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
     gated = clip(vpid, u.vuel, u.voel)
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
@@ -183,20 +180,16 @@ def exst2(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     IEEET3, whose source is added as well, but for KP and KC. Not modelled: UEL and
     OEL other than at the summing point.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = u.vref + u.vs + u.vsum - vc - vf
+    error = error_less_feedback(p.TF, s, u, p, d, u.vsum)
     vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vb = supply(u, p)
+    vb = compound_supply(u, p)
     efd, d.EFD = limited_integrator(vr + vb - p.KE * s.EFD, s.EFD, p.TE, 0.0, p.EFDMAX)
     return efd
 
 
 def exst2_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vr = p.KE * efd - supply(u, p)
-    x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
-    return u.vc1 + vr / p.KA - u.vs
+    return at_rest(p.KE * efd - compound_supply(u, p), efd, u, p, x)
 
 
 EXST2 = documented(
@@ -241,9 +234,7 @@ def ieeet3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     clamp). The current IT, and so KI, acts on load only.
     Not modelled: UEL or OEL at the summing point.
     """
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    error = u.vref + u.vs - vc - vf
+    error = error_less_feedback(p.TF, s, u, p, d)
     vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     supplies, v4 = ieeet3_source(u, p)
     vb = where(supplies, clip(vr + v4, 0.0, p.VBMAX), 0.0)
@@ -253,9 +244,7 @@ def ieeet3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def ieeet3_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vr = p.KE * efd - ieeet3_source(u, p)[1]
-    x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
-    return u.vc1 + vr / p.KA - u.vs
+    return at_rest(p.KE * efd - ieeet3_source(u, p)[1], efd, u, p, x)
 
 
 IEEET3 = documented(

@@ -15,6 +15,7 @@ from exfit.models.blocks import (
     smaller,
     source_voltage,
 )
+from exfit.models.exciter_parts import PID, supply
 from exfit.models.sheet import (
     AS_IN_PSSE,
     FREE,
@@ -27,7 +28,20 @@ from exfit.models.sheet import (
     shared,
     sheet,
 )
-from exfit.models.static import PID, SUPPLY_SWITCH, supply
+
+
+def field_loop(vr: Signal, vb: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
+    """Return efd: VB times VM, which the loop of the field voltage makes of VR."""
+    vg = smaller(p.KG * vb * s.VM, p.VGMAX)
+    vm, d.VM = limited_lag(vr - vg, s.VM, p.KM, p.TM, p.VMMIN, p.VMMAX)
+    return vm * vb
+
+
+def field_loop_rest(efd: Signal, vb: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states that hold efd into x but those of a PID."""
+    x.VC, x.VM = u.vc1, efd / vb
+    x.VR = x.VM / p.KM + smaller(p.KG * efd, p.VGMAX)
+    x.VL = x.VR / p.KA
 
 
 def st3a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -47,23 +61,17 @@ def st3a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     both lags are non-windup. The current IT, and so KI, XL and THETAP, act on load
     only. The standard has no OEL gate here.
     """
-    vb = source_voltage(u, p)
-    vg = smaller(p.KG * vb * s.VM, p.VGMAX)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vi = larger(clip(u.vref + u.vs - vc, p.VIMIN, p.VIMAX), u.vuel)
     vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
     vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vm, d.VM = limited_lag(vr - vg, s.VM, p.KM, p.TM, p.VMMIN, p.VMMAX)
-    return vm * vb
+    return field_loop(vr, source_voltage(u, p), s, p, d)
 
 
 def st3a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vm = efd / source_voltage(u, p)
-    vr = vm / p.KM + smaller(p.KG * efd, p.VGMAX)
-    vi = vr / p.KA
-    x.VC, x.VL, x.VR, x.VM = u.vc1, vi, vr, vm
-    return u.vc1 + vi - u.vs
+    field_loop_rest(efd, source_voltage(u, p), u, p, x)
+    return u.vc1 + x.VL - u.vs
 
 
 ST3A = documented(
@@ -130,32 +138,25 @@ def st3c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     are the first set of the standard's sample data in GridKit; the PID is not that
     of a sample: GridKit lists none.
     """
-    vb = supply(u, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX)
-    vi = clip(error, u.vuel, u.voel)
+    vi = clip(clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX), u.vuel, u.voel)
     vpid, d.VI, d.VD = pid(vi, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
     vl, d.VL = lead_lag(vpid, s.VL, p.TC, p.TB)
     vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vg = smaller(p.KG * vb * s.VM, p.VGMAX)
-    vm, d.VM = limited_lag(vr - vg, s.VM, p.KM, p.TM, p.VMMIN, p.VMMAX)
-    return vm * vb
+    return field_loop(vr, supply(p.KC * u.ifd, u, p), s, p, d)
 
 
 def st3c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VM = efd / supply(u, p)
-    x.VR = x.VM / p.KM + smaller(p.KG * efd, p.VGMAX)
-    x.VL = x.VR / p.KA
+    field_loop_rest(efd, supply(p.KC * u.ifd, u, p), u, p, x)
     x.VD, x.VI = pi_rest(x.VL, p.KPR, p.KIR)
-    x.VC = u.vc1
     return u.vc1 + x.VD - u.vs
 
 
 ST3C = documented(
     st3c,
     st3c_rest,
-    (*not_searched(ST3A.sheet, "KA"), *PID, *SUPPLY_SWITCH),
+    (*not_searched(ST3A.sheet, "KA"), *PID, *shared(SW1=1.0)),
     "VC VI VD VL VR VM",
     aliases=("ESST3C",),
     records=(

@@ -13,6 +13,7 @@ from exfit.models.blocks import (
     source_voltage,
     where,
 )
+from exfit.models.exciter_parts import supply
 from exfit.models.sheet import (
     FREE,
     INTEGRAL_GAIN,
@@ -26,7 +27,6 @@ from exfit.models.sheet import (
     sheet,
     with_typical,
 )
-from exfit.models.static import SUPPLY_SWITCH, supply
 
 
 def st4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -137,7 +137,7 @@ def st4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     acts. Typical data are those of ST4B with a wider limit of the regulator, and
     VGMAX of ST3A; VAMAX and VAMIN lie within the limits of the loop, and so act.
     """
-    vb = supply(u, p)
+    vb = supply(p.KC * u.ifd, u, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = clip(u.vref + u.vs + u.vsum - vc, u.vuel, u.voel)
     vr, d.VR = pi(error, s.VR, p.KPR, p.KIR, p.VRMIN, p.VRMAX)
@@ -152,7 +152,7 @@ def st4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def st4c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VA = efd / supply(u, p)
+    x.VA = efd / supply(p.KC * u.ifd, u, p)
     inner, x.VM = pi_rest(x.VA, p.KPM, p.KIM)
     x.VG = p.KG * efd
     error, x.VR = pi_rest(inner + smaller(x.VG, p.VGMAX), p.KPR, p.KIR)
@@ -174,7 +174,7 @@ ST4C = documented(
             ("TG", 0.02, *SHORT_TIME, "feedback lag of the field voltage loop", FREE),
             *shared(VGMAX=5.8),
         ),
-        *SUPPLY_SWITCH,
+        *shared(SW1=1.0),
     ),
     "VC VR VM VA VG",
     aliases=("ESST4C",),

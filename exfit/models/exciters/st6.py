@@ -1,6 +1,7 @@
 """Static exciters with a PID and a field voltage loop: ST6B and ST6C."""
 
 from exfit.models.blocks import Signal, clip, lag, larger, limited_lag, pi_rest, pid, smaller, where
+from exfit.models.exciter_parts import STATIC_SUPPLY, supply
 from exfit.models.sheet import (
     FREE,
     INTEGRAL_GAIN,
@@ -14,7 +15,6 @@ from exfit.models.sheet import (
     shared,
     sheet,
 )
-from exfit.models.static import SUPPLY, supply
 
 
 def st6b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -125,14 +125,14 @@ def st6c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vr = clip(p.KFF * va + p.KM * (va - s.VG), p.VRMIN, p.VRMAX)
     least = smaller(clip(vr, u.vuel_out, u.voel_out), current)
     vm, d.VM = limited_lag(least, s.VM, 1.0, p.TA, p.VMMIN, p.VMMAX)
-    efd = vm * supply(u, p)
+    efd = vm * supply(p.KC * u.ifd, u, p)
     _, d.VG = lag(efd, s.VG, p.KG, p.TG)
     return efd
 
 
 def st6c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VM, x.VG = efd / supply(u, p), p.KG * efd
+    x.VM, x.VG = efd / supply(p.KC * u.ifd, u, p), p.KG * efd
     va = (x.VM + p.KM * x.VG) / (p.KFF + p.KM)
     x.VD, x.VI = pi_rest(va, p.KPA, p.KIA)
     x.VC = u.vc1
@@ -149,7 +149,7 @@ ST6C = documented(
             ("VMMAX", 4.5, *LIMIT, "ceiling of the lag before the rectifier"),
             ("VMMIN", -3.6, *LIMIT, "floor of the lag before the rectifier"),
         ),
-        *SUPPLY,
+        *STATIC_SUPPLY,
     ),
     "VC VI VD VM VG",
     aliases=("ESST6C",),

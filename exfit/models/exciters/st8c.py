@@ -53,7 +53,6 @@ from exfit.models.sheet import (
     shared,
     sheet,
 )
-from exfit.models.static import SUPPLY_SWITCH
 
 ALIASES = ("ESST8C",)
 
@@ -80,7 +79,7 @@ SHEET = (
         ("KI2", 0.5, *UP_TO_100, "gain of the second source, on load"),
         ("VB2MAX", 0.5, "pu", (0.01, 9999.0), "ceiling of the second source, on load"),
     ),
-    *SUPPLY_SWITCH,
+    *shared(SW1=1.0),
 )
 
 RECORDS = (

@@ -28,8 +28,8 @@ which are 0, 10000, 2, 0.0018, 0 and 1.2 there: most leave out what they act on.
 """
 
 from exfit.models.blocks import Signal, clip, lag, larger, smaller, washout
+from exfit.models.exciter_parts import STATIC_SUPPLY, supply
 from exfit.models.sheet import FREE, ONE_GATE, POSITIVE_TIME, SHORT_TIME, record, shared, sheet
-from exfit.models.static import SUPPLY, supply
 
 ALIASES = ("ESST9C",)
 
@@ -47,7 +47,7 @@ SHEET = (
         ("KAS", 6.1, "pu", (0.01, 1000.0), "gain of the power converter"),
         ("TAS", 0.01, *SHORT_TIME, "firing circuit time constant", FREE),
     ),
-    *SUPPLY,
+    *STATIC_SUPPLY,
 )
 
 RECORDS = (
@@ -74,12 +74,12 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     share = clip(p.KU * (raised - amplified), 0.0, 1.0)
     d.VI = (vr - s.VI) * ((1.0 - share) / p.TA + share / p.TAUEL)
     va, d.VA = lag(vr, s.VA, p.KAS, p.TAS)
-    return va * supply(u, p)
+    return va * supply(p.KC * u.ifd, u, p)
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VA = efd / supply(u, p)
+    x.VA = efd / supply(p.KC * u.ifd, u, p)
     x.VI = x.VA / p.KAS
     x.VC = x.VD = u.vc1
     return u.vc1 - u.vs
