@@ -6,10 +6,35 @@ switch on its grid: a parameter that acts through the instant alone has no deriv
 
 from exfit.engine.trace import Signal, clip, exp, larger, log, sqrt, where
 from exfit.models.blocks import Limited, limited, limited_lead_lag, pid, zero
+from exfit.models.sheet import INTEGRAL_GAIN, limits, sheet
 
 POWERS = ("p", "q")  # what a limiter sees of the stator current, beside the voltage
 LEAST_CURRENT = 1e-6  # pu; a power of less is that of this
 BEYOND = 1.0  # s by which a timer passes what it is compared with
+
+
+INVERSE_TIME = sheet(
+    ("C1", 0.0, "1", (0.0, 100.0), "exponent of the rate with SW1 = 1"),
+    ("K1", 0.0, "pu/s", (-10000.0, 10000.0), "gain of the rate with SW1 = 1"),
+    ("C2", 2.0, "1", (0.0, 100.0), "exponent of the inverse time"),
+    ("K2", 0.0296, "1", (-10000.0, 10000.0), "gain of the inverse time"),
+    *limits("VINVMAX", 100.0, 0.0, "the inverse time", ("1", (-1000.0, 1000.0))),
+    ("FIXEDRU", 0.0, "1", (-1000.0, 1000.0), "fixed count above the pick-up"),
+    ("FIXEDRD", -0.001, "1", (-1000.0, 1000.0), "fixed count below the pick-up"),
+)
+TIMER = sheet(
+    ("TMAX", 10.0, "s", (0.0, 10000.0), "ceiling of the timer"),
+    ("TMIN", 0.0, "s", (-10000.0, 1000.0), "floor of the timer"),
+    ("KFB", 0.0, "1/s", (0.0, 1000.0), "feedback of the timer"),
+)
+RATES = sheet(
+    ("KRD", -1000.0, "pu/s", (-100000.0, 0.0), "rate of the reference down"),
+    ("KRU", 1000.0, *INTEGRAL_GAIN, "rate of the reference up"),
+    ("KZRU", 0.99, "1", (0.0, 1.0), "share of the timer at which the reference rises"),
+)
+RATE_SWITCH = sheet(
+    ("SW1", 0.0, "1", (0.0, 1.0), "rates of the reference: 0 fixed, 1 by the current"),
+)
 
 
 def power(x: Signal, exponent: Signal) -> Signal:

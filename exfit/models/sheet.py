@@ -40,6 +40,7 @@ LAG_OF_KF = SearchRange(needs="KF")
 LEAD_OF_TB, LAG_OF_TC = SearchRange(unlike="TB"), SearchRange(unlike="TC")
 
 # units and ranges of many rows: limits, gains, and times, of which 0 leaves out a lag or a lead
+Kind = tuple[str, Limits]
 LIMIT = ("pu", (-9999.0, 9999.0))
 WITHIN_10, WITHIN_1000 = ("pu", (-10.0, 10.0)), ("pu", (-1000.0, 1000.0))
 WITHIN_10000 = ("pu", (-10000.0, 10000.0))
@@ -134,6 +135,12 @@ def sheet(*rows: Row | Parameter) -> Sheet:
             row = Parameter(symbol, typical, unit, *limits, *described)
         made.append(row)
     return tuple(made)
+
+
+def limits(ceiling: str, high: float, low: float, of: str, kind: Kind = LIMIT) -> Sheet:
+    """Make the rows of the ceiling and the floor of something, ``VRMAX`` and ``VRMIN``."""
+    floor = ceiling.replace("MAX", "MIN")
+    return sheet((ceiling, high, *kind, f"ceiling of {of}"), (floor, low, *kind, f"floor of {of}"))
 
 
 def chosen(table: Sheet, **typical: float) -> Sheet:

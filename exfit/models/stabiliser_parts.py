@@ -5,7 +5,6 @@ from functools import partial
 from exfit.models.blocks import Signal, clip, high_pass, lag, lead_lag, limited, where
 from exfit.models.sheet import (
     DIVIDING_TIME,
-    LIMIT,
     LONG_TIME,
     TIME,
     WASHOUT_TIME,
@@ -13,6 +12,7 @@ from exfit.models.sheet import (
     WITHIN_1000,
     WITHIN_10000,
     chosen,
+    limits,
     sheet,
 )
 
@@ -24,10 +24,8 @@ SHARED = sheet(
     ("T2", 0.0, *TIME, "first lag"),
     ("T3", 0.0, *TIME, "second lead"),
     ("T4", 0.0, *TIME, "second lag"),
-    ("LSMAX", 0.0, *LIMIT, "ceiling of the output"),
-    ("LSMIN", 0.0, *LIMIT, "floor of the output"),
-    ("VSTMAX", 0.0, *LIMIT, "ceiling of the output"),
-    ("VSTMIN", 0.0, *LIMIT, "floor of the output"),
+    *limits("LSMAX", 0.0, 0.0, "the output"),
+    *limits("VSTMAX", 0.0, 0.0, "the output"),
     ("KS1", 0.0, *WITHIN_10000, "stabiliser gain"),
     ("T10", 0.0, *TIME, "third lead"),
     ("T11", 0.0, *TIME, "third lag"),
@@ -67,16 +65,20 @@ CANONICAL = sheet(
 )
 
 INPUT_LIMITS = sheet(
-    ("VSI1MAX", 2.0, *LIMIT, "ceiling of the first input"),
-    ("VSI1MIN", -2.0, *LIMIT, "floor of the first input"),
-    ("VSI2MAX", 2.0, *LIMIT, "ceiling of the second input"),
-    ("VSI2MIN", -2.0, *LIMIT, "floor of the second input"),
+    *limits("VSI1MAX", 2.0, -2.0, "the first input"),
+    *limits("VSI2MAX", 2.0, -2.0, "the second input"),
 )
 
 SWITCH = sheet(
     ("PPSSON", 0.0, *WITHIN_10, "power at which it is switched on, or 0"),
     ("PPSSOFF", 0.0, *WITHIN_10, "power at which it is switched off"),
 )
+
+
+# what flags of records say of the inputs, and the ramp tracking filter that the typical data have
+SPEED_AND_POWER = {"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0}
+POWER_AND_SPEED = {"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0}
+FILTERED_SPEED_AND_POWER = {**SPEED_AND_POWER, "M": 5, "N": 1}
 
 
 def limited_inputs(u: Signal, p: Signal) -> tuple[Signal, Signal]:

@@ -21,7 +21,7 @@ than at the summing point.
 """
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag, limited_lead_lag
-from exfit.models.sheet import LIMIT, TIME, SearchRange, record, shared, sheet
+from exfit.models.sheet import TIME, SearchRange, limits, record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.01, K=300.0),
@@ -30,8 +30,7 @@ SHEET = sheet(
     ("T3", 0.05, *TIME, "second regulator lead"),
     ("T4", 0.01, *TIME, "second regulator lag"),
     *shared(VRMAX=5.0, VRMIN=-5.0),
-    ("EFDMAX", 5.0, *LIMIT, "ceiling of the field voltage at rated voltage"),
-    ("EFDMIN", -5.0, *LIMIT, "floor of the field voltage at rated voltage"),
+    *limits("EFDMAX", 5.0, -5.0, "the field voltage at rated voltage"),
 )
 
 RECORDS = (

@@ -40,7 +40,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciter_parts import compound_supply
-from exfit.models.sheet import FREE, LIMIT, OF_A_LIST, TIME, record, shared, sheet
+from exfit.models.sheet import FREE, LIMIT, OF_A_LIST, TIME, limits, record, shared, sheet
 
 SHEET = sheet(
     *shared(TR=0.0),
@@ -54,8 +54,7 @@ SHEET = sheet(
     *shared(VRMAX=1.0, VRMIN=-0.87, KF_FIXED=0.0),
     ("TF1", 1.0, *TIME, "stabilising feedback time constant"),
     *shared(TF2=0.0),
-    ("EFDMAX", 8.0, *LIMIT, "ceiling of the field voltage"),
-    ("EFDMIN", -0.87, *LIMIT, "floor of the field voltage"),
+    *limits("EFDMAX", 8.0, -0.87, "the field voltage"),
     *shared(KE=1.0),
     ("TE", 0.0, *TIME, "exciter time constant"),
     *shared(E1=2.8, SE1=0.08, E2=3.7, SE2=0.33, KP_OR_0=6.5, KI=0.0, KC=0.08),

@@ -17,11 +17,11 @@ from exfit.models.exciter_parts import supply
 from exfit.models.sheet import (
     FREE,
     INTEGRAL_GAIN,
-    LIMIT,
     PID_GAIN,
     SHORT_TIME,
     TWO_GATES,
     documented,
+    limits,
     record,
     shared,
     sheet,
@@ -169,8 +169,7 @@ ST4C = documented(
             for row in with_typical(ST4B.sheet, VRMAX=2.0, VRMIN=-1.74)
         ),
         *sheet(
-            ("VAMAX", 0.95, *LIMIT, "ceiling of the lag before the rectifier"),
-            ("VAMIN", -0.82, *LIMIT, "floor of the lag before the rectifier"),
+            *limits("VAMAX", 0.95, -0.82, "the lag before the rectifier"),
             ("TG", 0.02, *SHORT_TIME, "feedback lag of the field voltage loop", FREE),
             *shared(VGMAX=5.8),
         ),

@@ -16,7 +16,7 @@ of IEC 61970-302 (GovGAST).
 """
 
 from exfit.models.blocks import Signal, lag, limited_lag, smaller
-from exfit.models.sheet import DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, record, sheet
+from exfit.models.sheet import DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, limits, record, sheet
 
 SHEET = sheet(
     ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
@@ -25,8 +25,7 @@ SHEET = sheet(
     ("T3", 3.0, *DIVIDING_TIME, "exhaust temperature lag"),
     ("AT", 1.0, "pu", (0.001, 10.0), "load limit by the ambient temperature"),
     ("KT", 3.0, "1", (0.0, 1000.0), "temperature limiter gain"),
-    ("VMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
-    ("VMIN", 0.0, *WITHIN_10, "floor of the valve"),
+    *limits("VMAX", 1.0, 0.0, "the valve", WITHIN_10),
     ("Dturb", 0.18, *UP_TO_100, "turbine damping"),
 )
 

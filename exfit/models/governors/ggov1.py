@@ -75,7 +75,16 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import DIVIDING_TIME, LONG_TIME, TIME, UP_TO_10, WITHIN_10, record, sheet
+from exfit.models.sheet import (
+    DIVIDING_TIME,
+    LONG_TIME,
+    TIME,
+    UP_TO_10,
+    WITHIN_10,
+    limits,
+    record,
+    sheet,
+)
 
 SHEET = sheet(
     ("Rselect", 1.0, "1", (-2.0, 1.0), "signal of the droop: 1, 0, -1 or -2"),
@@ -88,8 +97,7 @@ SHEET = sheet(
     ("Kigov", 2.0, "1/s", (0.0, 1000.0), "integral gain of the governor"),
     ("Kdgov", 0.0, *LONG_TIME, "derivative gain of the governor"),
     ("Tdgov", 1.0, *DIVIDING_TIME, "derivative lag of the governor"),
-    ("VMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
-    ("VMIN", 0.15, *WITHIN_10, "floor of the valve"),
+    *limits("VMAX", 1.0, 0.15, "the valve", WITHIN_10),
     ("Tact", 0.5, *DIVIDING_TIME, "actuator time constant"),
     ("Kturb", 1.5, "1", (0.001, 100.0), "turbine gain"),
     ("Wfnl", 0.2, "pu", (0.0, 1.0), "fuel flow at no load"),

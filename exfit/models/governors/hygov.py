@@ -18,7 +18,16 @@ of later versions. Typical data are those of IEC 61970-302 (GovHydro1).
 """
 
 from exfit.models.blocks import Signal, clip, lag, larger, limited
-from exfit.models.sheet import AS_IN_PSSE, DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, record, sheet
+from exfit.models.sheet import (
+    AS_IN_PSSE,
+    DIVIDING_TIME,
+    TIME,
+    UP_TO_100,
+    WITHIN_10,
+    limits,
+    record,
+    sheet,
+)
 
 SHEET = sheet(
     ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
@@ -27,8 +36,7 @@ SHEET = sheet(
     ("Tf", 0.05, *DIVIDING_TIME, "filter lag"),
     ("Tg", 0.5, *TIME, "gate servo lag"),
     ("VELM", 0.2, "pu/s", (0.0001, 1000.0), "fastest motion of the gate"),
-    ("GMAX", 1.0, *WITHIN_10, "ceiling of the gate"),
-    ("GMIN", 0.0, *WITHIN_10, "floor of the gate"),
+    *limits("GMAX", 1.0, 0.0, "the gate", WITHIN_10),
     ("TW", 1.0, *DIVIDING_TIME, "water starting time"),
     ("At", 1.2, "1", (0.001, 100.0), "turbine gain"),
     ("Dturb", 0.5, *UP_TO_100, "turbine damping"),

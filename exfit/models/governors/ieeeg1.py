@@ -22,7 +22,7 @@ Typical data are those of IEC 61970-302 (GovSteamIEEE1).
 """
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag, limited
-from exfit.models.sheet import DIVIDING_TIME, TIME, WITHIN_10, record, sheet
+from exfit.models.sheet import DIVIDING_TIME, TIME, WITHIN_10, limits, record, sheet
 
 SHEET = sheet(
     ("K", 25.0, "pu", (0.01, 1000.0), "governor gain, 1 over the droop"),
@@ -31,8 +31,7 @@ SHEET = sheet(
     ("T3", 0.1, *DIVIDING_TIME, "valve positioner time constant"),
     ("UO", 1.0, "pu/s", (0.0001, 1000.0), "fastest opening of the valve"),
     ("UC", -10.0, "pu/s", (-1000.0, -0.0001), "fastest closing of the valve"),
-    ("PMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
-    ("PMIN", 0.0, *WITHIN_10, "floor of the valve"),
+    *limits("PMAX", 1.0, 0.0, "the valve", WITHIN_10),
     ("T4", 0.3, *TIME, "steam inlet lag"),
     ("K1", 0.2, "1", (0.0, 10.0), "share behind the steam inlet"),
     ("T5", 5.0, *TIME, "second boiler pass lag"),

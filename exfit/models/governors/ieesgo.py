@@ -19,7 +19,7 @@ in a public library (iTesla, REN), with limits of 0 and 1.
 """
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag
-from exfit.models.sheet import DIVIDING_TIME, TIME, WITHIN_10, record, sheet
+from exfit.models.sheet import DIVIDING_TIME, TIME, WITHIN_10, limits, record, sheet
 
 SHEET = sheet(
     ("T1", 0.0, *TIME, "controller lag"),
@@ -31,8 +31,7 @@ SHEET = sheet(
     ("K1", 14.3, "pu", (0.01, 1000.0), "governor gain, 1 over the droop"),
     ("K2", 0.7, "1", (0.0, 10.0), "share behind the reheater"),
     ("K3", 1.0, "1", (-10.0, 10.0), "share of that behind the crossover"),
-    ("PMAX", 1.0, *WITHIN_10, "ceiling of the power demand"),
-    ("PMIN", 0.0, *WITHIN_10, "floor of the power demand"),
+    *limits("PMAX", 1.0, 0.0, "the power demand", WITHIN_10),
 )
 
 RECORDS = (record("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN"),)

@@ -11,13 +11,12 @@ data are those of IEC 61970-302 (GovSteam0).
 """
 
 from exfit.models.blocks import Signal, lead_lag, limited_lag
-from exfit.models.sheet import TIME, UP_TO_100, WITHIN_10, record, sheet
+from exfit.models.sheet import TIME, UP_TO_100, WITHIN_10, limits, record, sheet
 
 SHEET = sheet(
     ("R", 0.05, "pu", (0.001, 10.0), "permanent droop"),
     ("T1", 0.5, *TIME, "valve lag"),
-    ("VMAX", 1.0, *WITHIN_10, "ceiling of the valve"),
-    ("VMIN", 0.0, *WITHIN_10, "floor of the valve"),
+    *limits("VMAX", 1.0, 0.0, "the valve", WITHIN_10),
     ("T2", 3.0, *TIME, "reheater lead"),
     ("T3", 10.0, *TIME, "reheater lag"),
     ("Dt", 0.0, *UP_TO_100, "turbine damping"),

@@ -19,7 +19,7 @@ exciter's field current as input. Typical data are those of CoLib.
 
 from exfit.models.blocks import Signal, clip, lag, limited_integrator, where
 from exfit.models.limiter_blocks import power
-from exfit.models.sheet import TIME, UP_TO_1000, UP_TO_10000, WITHIN_1000, record, sheet
+from exfit.models.sheet import TIME, UP_TO_1000, UP_TO_10000, WITHIN_1000, limits, record, sheet
 
 DOUBT = "rests on one public diagram, that of Dynawo, which CoLib describes"
 PLACES = ("summing",)
@@ -35,8 +35,7 @@ SHEET = sheet(
     ("KPOEL", 1.0, *UP_TO_10000, "proportional gain"),
     ("VOELMAX1", 0.66, *UP_TO_1000, "ceiling of the integral"),
     ("VOELMIN1", -1.0, "pu", (-1000.0, 0.0), "floor of the integral"),
-    ("VOELMAX2", 0.0, *WITHIN_1000, "ceiling of the output"),
-    ("VOELMIN2", -1.0, *WITHIN_1000, "floor of the output"),
+    *limits("VOELMAX2", 0.0, -1.0, "the output", WITHIN_1000),
 )
 
 RECORDS = (

@@ -23,7 +23,7 @@ lists, whose first set of typical data this is. PSS/E's record is not known.
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag, limited, pi, where
 from exfit.models.limiter_blocks import latch, leaky_rest, power, timer, waiting_integral
-from exfit.models.sheet import LONG_TIME, PID_GAIN, TIME, UP_TO_1000, WITHIN_1000, sheet
+from exfit.models.sheet import LONG_TIME, PID_GAIN, TIME, UP_TO_1000, WITHIN_1000, limits, sheet
 
 DOUBT = "rests on one public diagram, that of Dynawo, which CoLib describes"
 PLACES = ("takeover", "takeover-output")
@@ -44,8 +44,7 @@ SHEET = sheet(
     ("IFDREF2", 1.0, "pu", (0.0001, 100.0), "reference once it is over"),
     ("KPOEL", 0.46, *PID_GAIN, "proportional gain"),
     ("KIOEL", 17.36, *PID_GAIN, "integral gain"),
-    ("VOELMAX", 1.0, *WITHIN_1000, "ceiling of the PI"),
-    ("VOELMIN", -0.99, *WITHIN_1000, "floor of the PI"),
+    *limits("VOELMAX", 1.0, -0.99, "the PI", WITHIN_1000),
     ("KSCALE1", 0.295, "1", (0.0001, 1000.0), "scale of the field current"),
     ("TF1", 0.0, *TIME, "field current transducer lag"),
     ("IBIAS", 1.0, *WITHIN_1000, "output while it does not act"),

@@ -24,8 +24,20 @@ from exfit.models.sheet import (
     UP_TO_10000,
     WITHIN_1000,
     documented,
+    limits,
     record,
     sheet,
+    with_typical,
+)
+
+REGULATOR = sheet(
+    ("KUI", 0.0, *UP_TO_10000, "integral gain"),
+    ("KUL", 100.0, *UP_TO_10000, "proportional gain"),
+    *limits("VUIMAX", 18.0, -18.0, "the PI", WITHIN_1000),
+    ("TU1", 0.0, *TIME, "first lead"),
+    ("TU2", 0.05, *TIME, "first lag"),
+    ("TU3", 0.0, *TIME, "second lead"),
+    ("TU4", 0.0, *TIME, "second lag"),
 )
 
 
@@ -77,16 +89,8 @@ UEL1 = documented(
         ("KUC", 1.38, *UP_TO_100, "centre"),
         ("VURMAX", 5.8, *UP_TO_1000, "ceiling of the radius"),
         ("VUCMAX", 5.8, *UP_TO_1000, "ceiling of the distance from the centre"),
-        ("KUI", 0.0, *UP_TO_10000, "integral gain"),
-        ("KUL", 100.0, *UP_TO_10000, "proportional gain"),
-        ("VUIMAX", 18.0, *WITHIN_1000, "ceiling of the PI"),
-        ("VUIMIN", -18.0, *WITHIN_1000, "floor of the PI"),
-        ("TU1", 0.0, *TIME, "first lead"),
-        ("TU2", 0.05, *TIME, "first lag"),
-        ("TU3", 0.0, *TIME, "second lead"),
-        ("TU4", 0.0, *TIME, "second lag"),
-        ("VULMAX", 18.0, *WITHIN_1000, "ceiling of the output"),
-        ("VULMIN", -18.0, *WITHIN_1000, "floor of the output"),
+        *REGULATOR,
+        *limits("VULMAX", 18.0, -18.0, "the output", WITHIN_1000),
     ),
     "V V1 V3",
     places=("takeover", "takeover-output", "summing"),
@@ -199,18 +203,9 @@ UEL2C = documented(
         ("TADJ", 3.0, *LONG_TIME, "lag of the adjustable gain reduction"),
         ("SW1", 1.0, "1", (1.0, 2.0), "gain reduction: 1 fixed, 2 adjustable"),
         ("XQ", 0.6, "pu", (0.01, 10.0), "q-axis reactance of the machine, for SW1 = 2"),
-        ("KUI", 0.5, *UP_TO_10000, "integral gain"),
-        ("KUL", 0.8, *UP_TO_10000, "proportional gain"),
-        ("VUIMAX", 0.25, *WITHIN_1000, "ceiling of the PI"),
-        ("VUIMIN", 0.0, *WITHIN_1000, "floor of the PI"),
-        ("TU1", 0.0, *TIME, "first lead"),
-        ("TU2", 0.0, *TIME, "first lag"),
-        ("TU3", 0.0, *TIME, "second lead"),
-        ("TU4", 0.0, *TIME, "second lag"),
-        ("VUELMAX1", 0.25, *WITHIN_1000, "ceiling of the output"),
-        ("VUELMIN1", 0.0, *WITHIN_1000, "floor of the output"),
-        ("VUELMAX2", 99.0, *WITHIN_1000, "ceiling of the first lead-lag"),
-        ("VUELMIN2", -99.0, *WITHIN_1000, "floor of the first lead-lag"),
+        *with_typical(REGULATOR, KUI=0.5, KUL=0.8, VUIMAX=0.25, VUIMIN=0.0, TU2=0.0),
+        *limits("VUELMAX1", 0.25, 0.0, "the output", WITHIN_1000),
+        *limits("VUELMAX2", 99.0, -99.0, "the first lead-lag", WITHIN_1000),
         *(
             row
             for k, (P, Q) in enumerate(POINTS)

@@ -2,19 +2,16 @@
 
 from exfit.models.blocks import Signal, clip, lead_lag
 from exfit.models.sheet import (
-    DIVIDING_TIME,
-    LIMIT,
-    LONG_TIME,
     MOST_LAGS,
     TIME,
-    WASHOUT_TIME,
-    WITHIN_1000,
     documented,
+    limits,
     record,
     sheet,
 )
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
+    FILTERED_SPEED_AND_POWER,
     INPUT_LIMITS,
     SWITCH,
     accelerating,
@@ -35,6 +32,14 @@ PSS2A_HELD = {
 
 
 LAGS = 5  # of the ramp tracking filter: the highest M
+
+
+def shaped(v: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
+    """Pass the signal through the gain and three leads and lags."""
+    v1, d.V1 = lead_lag(p.KS1 * v, s.V1, p.T1, p.T2)
+    v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
+    v10, d.V10 = lead_lag(v3, s.V10, p.T10, p.T11)
+    return v10
 
 
 def pss2b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -58,10 +63,7 @@ def pss2b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     to 5. With T10 = T11 = 0 and input limits out of reach this is PSS2A, whose
     record has no such rows: it is read as PSS2B with these values.
     """
-    v = accelerating(s, u, p, d, LAGS, 1.0)
-    v1, d.V1 = lead_lag(p.KS1 * v, s.V1, p.T1, p.T2)
-    v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
-    v10, d.V10 = lead_lag(v3, s.V10, p.T10, p.T11)
+    v10 = shaped(accelerating(s, u, p, d, LAGS, 1.0), s, p, d)
     return clip(v10, p.VSTMIN, p.VSTMAX)
 
 
@@ -75,22 +77,11 @@ PSS2B = documented(
     pss2b,
     pss2b_rest,
     sheet(
-        ("TW1", 10.0, *WASHOUT_TIME, "first washout of the first input"),
-        ("TW2", 10.0, *LONG_TIME, "second washout of the first input"),
-        ("T6", 0.0, *TIME, "transducer lag of the first input"),
-        ("TW3", 10.0, *WASHOUT_TIME, "first washout of the second input"),
-        ("TW4", 0.0, *LONG_TIME, "second washout of the second input"),
-        ("T7", 10.0, *LONG_TIME, "transducer lag of the second input"),
-        ("KS2", 0.99, *WITHIN_1000, "gain of the second input"),
-        ("KS3", 1.0, *WITHIN_1000, "share of the second input that is filtered"),
-        ("T8", 0.5, *TIME, "lead of the ramp tracking filter"),
-        ("T9", 0.1, *DIVIDING_TIME, "lag of the ramp tracking filter"),
+        *ACCELERATING[:-2],
         ("M", 5.0, "1", (1.0, 5.0), "number of lags of the ramp tracking filter"),
         *of_stabiliser(KS1=20.0, T1=0.15, T2=0.025, T3=0.15, T4=0.025, T10=0.0, T11=0.033),
-        ("VSI1MAX", 0.08, *LIMIT, "ceiling of the first input"),
-        ("VSI1MIN", -0.08, *LIMIT, "floor of the first input"),
-        ("VSI2MAX", 1.25, *LIMIT, "ceiling of the second input"),
-        ("VSI2MIN", -1.25, *LIMIT, "floor of the second input"),
+        *limits("VSI1MAX", 0.08, -0.08, "the first input"),
+        *limits("VSI2MAX", 1.25, -1.25, "the second input"),
         *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 V1 V3 V10",
@@ -101,12 +92,12 @@ PSS2B = documented(
             "PSS2B",
             "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "
             "VSI2MIN VSTMAX VSTMIN",
-            icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+            icons=FILTERED_SPEED_AND_POWER,
         ),
         record(
             "PSS2A",
             "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 VSTMAX VSTMIN",
-            icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+            icons=FILTERED_SPEED_AND_POWER,
             held=PSS2A_HELD,
         ),
     ),
@@ -115,7 +106,7 @@ PSS2B = documented(
             "pss2b",
             "ICS1 REMBUS1 ICS2 REMBUS2 VSI1MAX VSI1MIN TW1 TW2 VSI2MAX VSI2MIN TW3 TW4 T6 T7 KS2 "
             "KS3 T8 T9 N M KS1 T1 T2 T3 T4 T10 T11 VSTMAX VSTMIN A TA TB KS4",
-            icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+            icons=FILTERED_SPEED_AND_POWER,
             absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
             spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
         ),
@@ -123,7 +114,7 @@ PSS2B = documented(
             "pss2a",
             "ICS1 REMBUS1 ICS2 REMBUS2 TW1 TW2 TW3 TW4 T6 T7 KS2 KS3 KS4 T8 T9 N M KS1 T1 T2 T3 T4 "
             "VSTMAX VSTMIN A TA TB",
-            icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+            icons=FILTERED_SPEED_AND_POWER,
             absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
             held=PSS2A_HELD,
             spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
@@ -162,10 +153,7 @@ def pss2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     make a compensated frequency of an input of PSS/E. Typical data are a sample of
     the standard, as GridKit has them, with KS2 for H = 5.05 s.
     """
-    v = accelerating(s, u, p, d, MOST_LAGS, p.N)
-    v1, d.V1 = lead_lag(p.KS1 * v, s.V1, p.T1, p.T2)
-    v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
-    v10, d.V10 = lead_lag(v3, s.V10, p.T10, p.T11)
+    v10 = shaped(accelerating(s, u, p, d, MOST_LAGS, p.N), s, p, d)
     v12, d.V12 = lead_lag(v10, s.V12, p.T12, p.T13)
     return switched(clip(v12, p.VSTMIN, p.VSTMAX), s, u, p, d)
 
@@ -182,12 +170,9 @@ PSS2C = documented(
     pss2c_rest,
     (
         *ACCELERATING,
-        *sheet(
-            *of_stabiliser(KS1=5.0, T1=0.16, T2=0.04, T3=0.16, T4=0.04, T10=0.18, T11=0.03),
-            ("T12", 0.0, *TIME, "fourth lead"),
-            ("T13", 0.0, *TIME, "fourth lag"),
-            *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
-        ),
+        *of_stabiliser(KS1=5.0, T1=0.16, T2=0.04, T3=0.16, T4=0.04, T10=0.18, T11=0.03),
+        *sheet(("T12", 0.0, *TIME, "fourth lead"), ("T13", 0.0, *TIME, "fourth lag")),
+        *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
         *INPUT_LIMITS,
         *SWITCH,
     ),
@@ -198,7 +183,7 @@ PSS2C = documented(
             "PSS2C",
             "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "
             "VSI2MIN VSTMAX VSTMIN T12 T13 PPSSON PPSSOFF XCOMP TCOMP",
-            icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+            icons=FILTERED_SPEED_AND_POWER,
             ignored="XCOMP TCOMP",
         ),
     ),

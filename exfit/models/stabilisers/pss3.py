@@ -10,7 +10,13 @@ from exfit.models.sheet import (
     record,
     sheet,
 )
-from exfit.models.stabiliser_parts import SWITCH, of_stabiliser, switch_rest, switched
+from exfit.models.stabiliser_parts import (
+    POWER_AND_SPEED,
+    SWITCH,
+    of_stabiliser,
+    switch_rest,
+    switched,
+)
 
 
 def pss3b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -74,7 +80,7 @@ PSS3B = documented(
         record(
             "PSS3B",
             "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN",
-            icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
+            icons=POWER_AND_SPEED,
         ),
     ),
 )
@@ -125,7 +131,7 @@ PSS3C = documented(
             "PSS3C",
             "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN PPSSON PPSSOFF XCOMP "
             "TCOMP TPGFILT",
-            icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
+            icons=POWER_AND_SPEED,
             absent={"TPGFILT": 0.0},
             ignored="XCOMP TCOMP",
         ),

@@ -11,14 +11,15 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.sheet import (
-    LIMIT,
     POSITIVE_TIME,
     SHORT_TIME,
     TIME,
     WITHIN_1000,
     WITHIN_10000,
     Parameter,
+    Sheet,
     documented,
+    limits,
     record,
     sheet,
     with_typical,
@@ -26,6 +27,29 @@ from exfit.models.sheet import (
 from exfit.models.stabiliser_parts import of_stabiliser
 
 SLOWEST = 1e-6  # rad/s
+
+
+NOTCH = ("rad/s", (0.0, 10000.0))
+Pair = tuple[float, float]
+
+
+def band_rows(letter: str, name: str, gain: float, most: float, upper: Pair, lower: Pair) -> Sheet:
+    """Make the rows of a band; of each branch the first lead and its lag are given."""
+    rows: list[Parameter] = []
+    for number, first, branch, pair in ((1, 1, "upper", upper), (2, 7, "lower", lower)):
+        of = f"the {name} band's {branch} branch"
+        rows += sheet(
+            (f"K{letter}{number}", 66.0, *WITHIN_10000, f"gain of {of}"),
+            (f"K{letter}1{first}", 1.0, *WITHIN_1000, f"coefficient of {of}"),
+        )
+        for k, nth in enumerate(("first", "second", "third")):
+            lead, slow = pair if k == 0 else (0.0, 0.0)
+            rows += sheet(
+                (f"T{letter}{first + 2 * k}", lead, *TIME, f"{nth} lead of {of}"),
+                (f"T{letter}{first + 2 * k + 1}", slow, *TIME, f"{nth} lag of {of}"),
+            )
+    rows += sheet((f"K{letter}", gain, *WITHIN_10000, f"gain of the {name} band"))
+    return (*rows, *limits(f"V{letter}MAX", most, -most, f"the {name} band"))
 
 
 def transduced(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
@@ -138,75 +162,21 @@ PSS4B = documented(
         ("DLI", -0.001759, "s", (-1.0, 1.0), "first coefficient of the speed's numerator"),
         ("ALI", 0.00012739, "s2", (0.0, 1.0), "second coefficient of the speed's filter"),
         ("BLI", 0.017823, "s", (0.0, 1.0), "first coefficient of the speed's filter"),
-        ("BWLI1", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the speed's first notch"),
-        ("WLI1", 0.0, "rad/s", (0.0, 10000.0), "frequency of the speed's first notch"),
-        ("BWLI2", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the speed's second notch"),
-        ("WLI2", 0.0, "rad/s", (0.0, 10000.0), "frequency of the speed's second notch"),
+        ("BWLI1", 0.0, *NOTCH, "bandwidth of the speed's first notch"),
+        ("WLI1", 0.0, *NOTCH, "frequency of the speed's first notch"),
+        ("BWLI2", 0.0, *NOTCH, "bandwidth of the speed's second notch"),
+        ("WLI2", 0.0, *NOTCH, "frequency of the speed's second notch"),
         ("TH", 0.0125, *SHORT_TIME, "transducer lag of the power"),
         ("AH", 1.0, "s2", (0.0, 1000.0), "second coefficient of the power's filter"),
         ("BH", 2.0, "s", (0.001, 1000.0), "first coefficient of the power's filter"),
         ("M", 7.0, *POSITIVE_TIME, "twice the inertia constant H"),
-        ("BWH1", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the power's first notch"),
-        ("WH1", 0.0, "rad/s", (0.0, 10000.0), "frequency of the power's first notch"),
-        ("BWH2", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the power's second notch"),
-        ("WH2", 0.0, "rad/s", (0.0, 10000.0), "frequency of the power's second notch"),
-        ("KL1", 66.0, *WITHIN_10000, "gain of the low band's upper branch"),
-        ("KL11", 1.0, *WITHIN_1000, "coefficient of the low band's upper branch"),
-        ("TL1", 1.73, *TIME, "first lead of the low band's upper branch"),
-        ("TL2", 2.075, *TIME, "first lag of the low band's upper branch"),
-        ("TL3", 0.0, *TIME, "second lead of the low band's upper branch"),
-        ("TL4", 0.0, *TIME, "second lag of the low band's upper branch"),
-        ("TL5", 0.0, *TIME, "third lead of the low band's upper branch"),
-        ("TL6", 0.0, *TIME, "third lag of the low band's upper branch"),
-        ("KL2", 66.0, *WITHIN_10000, "gain of the low band's lower branch"),
-        ("KL17", 1.0, *WITHIN_1000, "coefficient of the low band's lower branch"),
-        ("TL7", 2.075, *TIME, "first lead of the low band's lower branch"),
-        ("TL8", 2.491, *TIME, "first lag of the low band's lower branch"),
-        ("TL9", 0.0, *TIME, "second lead of the low band's lower branch"),
-        ("TL10", 0.0, *TIME, "second lag of the low band's lower branch"),
-        ("TL11", 0.0, *TIME, "third lead of the low band's lower branch"),
-        ("TL12", 0.0, *TIME, "third lag of the low band's lower branch"),
-        ("KL", 7.5, *WITHIN_10000, "gain of the low band"),
-        ("VLMAX", 0.075, *LIMIT, "ceiling of the low band"),
-        ("VLMIN", -0.075, *LIMIT, "floor of the low band"),
-        ("KI1", 66.0, *WITHIN_10000, "gain of the intermediate band's upper branch"),
-        ("KI11", 1.0, *WITHIN_1000, "coefficient of the intermediate band's upper branch"),
-        ("TI1", 0.173, *TIME, "first lead of the intermediate band's upper branch"),
-        ("TI2", 0.2075, *TIME, "first lag of the intermediate band's upper branch"),
-        ("TI3", 0.0, *TIME, "second lead of the intermediate band's upper branch"),
-        ("TI4", 0.0, *TIME, "second lag of the intermediate band's upper branch"),
-        ("TI5", 0.0, *TIME, "third lead of the intermediate band's upper branch"),
-        ("TI6", 0.0, *TIME, "third lag of the intermediate band's upper branch"),
-        ("KI2", 66.0, *WITHIN_10000, "gain of the intermediate band's lower branch"),
-        ("KI17", 1.0, *WITHIN_1000, "coefficient of the intermediate band's lower branch"),
-        ("TI7", 0.2075, *TIME, "first lead of the intermediate band's lower branch"),
-        ("TI8", 0.2491, *TIME, "first lag of the intermediate band's lower branch"),
-        ("TI9", 0.0, *TIME, "second lead of the intermediate band's lower branch"),
-        ("TI10", 0.0, *TIME, "second lag of the intermediate band's lower branch"),
-        ("TI11", 0.0, *TIME, "third lead of the intermediate band's lower branch"),
-        ("TI12", 0.0, *TIME, "third lag of the intermediate band's lower branch"),
-        ("KI", 30.0, *WITHIN_10000, "gain of the intermediate band"),
-        ("VIMAX", 0.6, *LIMIT, "ceiling of the intermediate band"),
-        ("VIMIN", -0.6, *LIMIT, "floor of the intermediate band"),
-        ("KH1", 66.0, *WITHIN_10000, "gain of the high band's upper branch"),
-        ("KH11", 1.0, *WITHIN_1000, "coefficient of the high band's upper branch"),
-        ("TH1", 0.01513, *TIME, "first lead of the high band's upper branch"),
-        ("TH2", 0.01816, *TIME, "first lag of the high band's upper branch"),
-        ("TH3", 0.0, *TIME, "second lead of the high band's upper branch"),
-        ("TH4", 0.0, *TIME, "second lag of the high band's upper branch"),
-        ("TH5", 0.0, *TIME, "third lead of the high band's upper branch"),
-        ("TH6", 0.0, *TIME, "third lag of the high band's upper branch"),
-        ("KH2", 66.0, *WITHIN_10000, "gain of the high band's lower branch"),
-        ("KH17", 1.0, *WITHIN_1000, "coefficient of the high band's lower branch"),
-        ("TH7", 0.01816, *TIME, "first lead of the high band's lower branch"),
-        ("TH8", 0.02179, *TIME, "first lag of the high band's lower branch"),
-        ("TH9", 0.0, *TIME, "second lead of the high band's lower branch"),
-        ("TH10", 0.0, *TIME, "second lag of the high band's lower branch"),
-        ("TH11", 0.0, *TIME, "third lead of the high band's lower branch"),
-        ("TH12", 0.0, *TIME, "third lag of the high band's lower branch"),
-        ("KH", 120.0, *WITHIN_10000, "gain of the high band"),
-        ("VHMAX", 0.6, *LIMIT, "ceiling of the high band"),
-        ("VHMIN", -0.6, *LIMIT, "floor of the high band"),
+        ("BWH1", 0.0, *NOTCH, "bandwidth of the power's first notch"),
+        ("WH1", 0.0, *NOTCH, "frequency of the power's first notch"),
+        ("BWH2", 0.0, *NOTCH, "bandwidth of the power's second notch"),
+        ("WH2", 0.0, *NOTCH, "frequency of the power's second notch"),
+        *band_rows("L", "low", 7.5, 0.075, (1.73, 2.075), (2.075, 2.491)),
+        *band_rows("I", "intermediate", 30.0, 0.6, (0.173, 0.2075), (0.2075, 0.2491)),
+        *band_rows("H", "high", 120.0, 0.6, (0.01513, 0.01816), (0.01816, 0.02179)),
         *of_stabiliser(VSTMAX=0.15, VSTMIN=-0.15),
     ),
     "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
@@ -225,22 +195,7 @@ PSS4B = documented(
 )
 
 
-SAMPLE = {
-    **{"KVL": 0.5, "TVL1": 12.1, "TVL2": 14.5, "TVL7": 14.5, "TVL8": 17.4},
-    **{"VVLMAX": 0.01, "VVLMIN": -0.01},
-    "KL": 3.0,
-    **{"KI": 20.0, "TI1": 0.2018, "TI2": 0.2421, "TI7": 0.2421, "TI8": 0.2906},
-    **{"KH": 80.0, "TH1": 0.01345, "TH2": 0.01614, "TH7": 0.01614, "TH8": 0.01937},
-}
-
-
-def of_very_low(row: Parameter) -> Parameter:
-    """Return a row of the low band as one of the band of very low frequency."""
-    symbol, meaning = f"{row.symbol[0]}V{row.symbol[1:]}", row.meaning
-    return row._replace(symbol=symbol, meaning=meaning.replace("the low", "the very low"))
-
-
-VERY_LOW = tuple(of_very_low(row) for row in PSS4B.sheet if "the low band" in row.meaning)
+VERY_LOW = band_rows("VL", "very low", 0.5, 0.01, (12.1, 14.5), (14.5, 17.4))
 
 
 def pss4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -295,7 +250,15 @@ def pss4c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
 PSS4C = documented(
     pss4c,
     pss4c_rest,
-    with_typical((*PSS4B.sheet, *VERY_LOW), **SAMPLE),
+    (
+        *with_typical(
+            PSS4B.sheet,
+            KL=3.0,
+            **{"KI": 20.0, "TI1": 0.2018, "TI2": 0.2421, "TI7": 0.2421, "TI8": 0.2906},
+            **{"KH": 80.0, "TH1": 0.01345, "TH2": 0.01614, "TH7": 0.01614, "TH8": 0.01937},
+        ),
+        *VERY_LOW,
+    ),
     "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
     "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6 VL1 VL2 VL3 VL4 VL5 VL6",
     doubt="rests on one public diagram, that of InterPSS",

@@ -31,28 +31,26 @@ the standard's, as GridKit has them.
 """
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag, second_order, second_order_lead
-from exfit.models.sheet import LIMIT, WITHIN_10000, record, sheet
+from exfit.models.sheet import WITHIN_10000, Sheet, limits, record, sheet
 from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = ("speed",)
 
+
+def band_rows(letter: str, name: str, gain: float, frequency: float, most: float) -> Sheet:
+    """Make the rows of a band: its gain, its frequency and its limits."""
+    return sheet(
+        (f"K{letter}", gain, *WITHIN_10000, f"gain of the {name} band"),
+        (f"F{letter}", frequency, "Hz", (0.0001, 100.0), f"central frequency of the {name} band"),
+        *limits(f"V{letter}MAX", most, -most, f"the {name} band"),
+    )
+
+
 SHEET = sheet(
-    ("KVL", 0.5, *WITHIN_10000, "gain of the very low band"),
-    ("FVL", 0.01, "Hz", (0.0001, 100.0), "central frequency of the very low band"),
-    ("VVLMAX", 0.01, *LIMIT, "ceiling of the very low band"),
-    ("VVLMIN", -0.01, *LIMIT, "floor of the very low band"),
-    ("KL", 3.0, *WITHIN_10000, "gain of the low band"),
-    ("FL", 0.07, "Hz", (0.0001, 100.0), "central frequency of the low band"),
-    ("VLMAX", 0.075, *LIMIT, "ceiling of the low band"),
-    ("VLMIN", -0.075, *LIMIT, "floor of the low band"),
-    ("KI", 20.0, *WITHIN_10000, "gain of the intermediate band"),
-    ("FI", 0.6, "Hz", (0.0001, 100.0), "central frequency of the intermediate band"),
-    ("VIMAX", 0.6, *LIMIT, "ceiling of the intermediate band"),
-    ("VIMIN", -0.6, *LIMIT, "floor of the intermediate band"),
-    ("KH", 80.0, *WITHIN_10000, "gain of the high band"),
-    ("FH", 9.0, "Hz", (0.0001, 100.0), "central frequency of the high band"),
-    ("VHMAX", 0.6, *LIMIT, "ceiling of the high band"),
-    ("VHMIN", -0.6, *LIMIT, "floor of the high band"),
+    *band_rows("VL", "very low", 0.5, 0.01, 0.01),
+    *band_rows("L", "low", 3.0, 0.07, 0.075),
+    *band_rows("I", "intermediate", 20.0, 0.6, 0.6),
+    *band_rows("H", "high", 80.0, 9.0, 0.6),
     ("K1", 5.736, "1", (0.001, 1000.0), "rate of the slowest lag over the central frequency"),
     ("K2", 6.883, "1", (0.001, 1000.0), "rate of a lead and a lag over the central frequency"),
     ("K3", 8.259, "1", (0.001, 1000.0), "rate of the fastest lead over the central frequency"),

@@ -44,6 +44,7 @@ from exfit.models.sheet import (
 from exfit.models.stabiliser_parts import (
     CANONICAL,
     INPUT_LIMITS,
+    POWER_AND_SPEED,
     SWITCH,
     canonical,
     limited_inputs,
@@ -81,7 +82,7 @@ RECORDS = (
         "PSS6C",
         "T1 KS2 T2 KS1 T3 MACC T4 TD K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 KS VSI1MAX VSI1MIN "
         "VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
-        icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
+        icons=POWER_AND_SPEED,
         ignored="XCOMP TCOMP",
     ),
 )

@@ -38,6 +38,7 @@ from exfit.models.sheet import MOST_LAGS, record, sheet, with_typical
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
     CANONICAL,
+    FILTERED_SPEED_AND_POWER,
     INPUT_LIMITS,
     SWITCH,
     accelerating,
@@ -69,7 +70,7 @@ RECORDS = (
         "PSS7C",
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 VSI1MAX "
         "VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
-        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+        icons=FILTERED_SPEED_AND_POWER,
         ignored="XCOMP TCOMP",
     ),
 )

@@ -17,7 +17,7 @@ value by more than VCU and VCL.
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag, washout_or_lag
 from exfit.models.sheet import LONG_TIME, TIME, WITHIN_10000, record, sheet
-from exfit.models.stabiliser_parts import of_stabiliser
+from exfit.models.stabiliser_parts import SPEED_AND_POWER, of_stabiliser
 
 INPUTS = ("speed", "p")
 
@@ -40,7 +40,7 @@ RECORDS = (
     record(
         "ST2CUT",
         "K1 K2 T1 T2 T3 T4 T5 T6 T7 T8 T9 T10 LSMAX LSMIN VCU VCL",
-        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0},
+        icons=SPEED_AND_POWER,
         absent={"VCU": 0.0, "VCL": 0.0},
     ),
 )
