@@ -319,13 +319,7 @@ def commutator_start(efd: Signal, p: Signal, x: Signal) -> Signal:
 
 
 def compound_source(
-    vt: Signal,
-    p: Signal,
-    q: Signal,
-    KP: Signal,
-    KI: Signal,
-    XL: Signal = 0.0,
-    THETAP: Signal = 0.0,
+    vt: Signal, p: Signal, q: Signal, KP: Signal, KI: Signal, XL: Signal = 0.0, THETAP: Signal = 0.0
 ) -> Signal:
     """Return VE = |KP VT + j (KI + KP XL) IT|, where KP is at THETAP degrees.
 

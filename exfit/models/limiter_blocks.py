@@ -33,7 +33,7 @@ RATES = sheet(
     ("KZRU", 0.99, "1", (0.0, 1.0), "share of the timer at which the reference rises"),
 )
 RATE_SWITCH = sheet(
-    ("SW1", 0.0, "1", (0.0, 1.0), "rates of the reference: 0 fixed, 1 by the current"),
+    ("SW1", 0.0, "1", (0.0, 1.0), "rates of the reference: 0 fixed, 1 by the current")
 )
 
 
@@ -61,10 +61,7 @@ def timers(
     over: Signal, below: Signal, actual: Signal, limit: Signal, delay: Signal, p: Signal
 ) -> tuple[Signal, Signal]:
     """Return the slopes of the timers above and below a limit."""
-    return (
-        timer(actual > limit, over, delay),
-        timer(limit > actual + p.ITHOFF, below, p.TOFF),
-    )
+    return (timer(actual > limit, over, delay), timer(limit > actual + p.ITHOFF, below, p.TOFF))
 
 
 def latch(sets: Signal, resets: Signal) -> Limited:

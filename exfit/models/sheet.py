@@ -289,6 +289,9 @@ class DynamicsRecord:
     exchanged: tuple[str, ...] = ()
 
 
+Records = tuple[DynamicsRecord, ...]
+
+
 def record(
     name: str,
     cons: str,
@@ -303,9 +306,9 @@ def record(
     places: Mapping[int, str] | None = None,
     unused: Mapping[str, str] | None = None,
     exchanged: str = "",
-) -> DynamicsRecord:
-    """Return a record from its symbols in one text, ``"TR KA TA"``."""
-    return DynamicsRecord(
+) -> Records:
+    """Return a record from its symbols in one text, ``"TR KA TA"``; several are added."""
+    made = DynamicsRecord(
         name,
         tuple(cons.split()),
         tuple((icons or {}).items()),
@@ -319,6 +322,7 @@ def record(
         tuple((unused or {}).items()),
         tuple(exchanged.split()),
     )
+    return (made,)
 
 
 # what is not settled about orders of PSLF
@@ -354,11 +358,11 @@ class Model:
     sheet: Sheet
     states: tuple[str, ...]
     setpoints: tuple[str, ...]
-    records: tuple[DynamicsRecord, ...]
+    records: Records
     inputs: tuple[str, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]
-    pslf_records: tuple[DynamicsRecord, ...] = ()
+    pslf_records: Records = ()
     places: tuple[str, ...] = ()
     doubt: str = ""
 
@@ -372,8 +376,8 @@ def documented(
     text: str | None = None,
     setpoints: str = "",
     aliases: Sequence[str] = (),
-    records: Sequence[DynamicsRecord] = (),
-    pslf_records: Sequence[DynamicsRecord] = (),
+    records: Records = (),
+    pslf_records: Records = (),
     inputs: Sequence[str] = (),
     places: Sequence[str] = (),
     doubt: str = "",
@@ -392,11 +396,11 @@ def documented(
         sheet=tuple(rows),
         states=tuple(states.split()),
         setpoints=tuple(setpoints.split()),
-        records=tuple(records),
+        records=records,
         inputs=tuple(inputs),
         equations=equations,
         rest=rest,
-        pslf_records=tuple(pslf_records),
+        pslf_records=pslf_records,
         places=tuple(places),
         doubt=doubt,
     )

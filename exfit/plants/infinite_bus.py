@@ -131,11 +131,7 @@ def infinite_bus(
             it, d.delta = breaker.until_open(it), breaker.until_open(d.delta)
         vt, power, reactive = terminals.vt, terminals.p, terminals.q
         outputs = dict(
-            zip(
-                OUTPUTS,
-                (vref, vt, efd, ifd, power, reactive, it, delta, 1.0 + dw),
-                strict=True,
-            )
+            zip(OUTPUTS, (vref, vt, efd, ifd, power, reactive, it, delta, 1.0 + dw), strict=True)
         )
         return motion(d, unit.states, {**x, **outputs, **signals, MEASURED: vc1})
 

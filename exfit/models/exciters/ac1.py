@@ -64,19 +64,14 @@ AC1A = documented(
     ),
     "VC VL VA VE VF",
     aliases=("ESAC1A",),
-    records=(
-        record(
-            "ESAC1A",
-            "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN",
-        ),
+    records=record(
+        "ESAC1A", "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN"
     ),
-    pslf_records=(
-        record(
-            "esac1a",
-            "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN SPDMLT",
-            ignored="SPDMLT",
-            doubt=AS_IN_PSSE,
-        ),
+    pslf_records=record(
+        "esac1a",
+        "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN SPDMLT",
+        ignored="SPDMLT",
+        doubt=AS_IN_PSSE,
     ),
 )
 
@@ -113,15 +108,13 @@ AC1C = documented(
     (*renamed(AC1A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VL VA VE VF",
     aliases=("ESAC1C",),
-    records=(
-        record(
-            "AC1C",
-            "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 EFEMAX EFEMIN VFEMAX VEMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            places=ONE_GATE,
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC1C",
+        "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 EFEMAX EFEMIN VFEMAX VEMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        places=ONE_GATE,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 
@@ -172,14 +165,12 @@ EXAC1 = documented(
         *shared(SE2=0.03),
     ),
     "VC VL VR VE VF",
-    records=(record("EXAC1", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),),
-    pslf_records=(
-        record(
-            "exac1",
-            "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2 SPDMLT",
-            ignored="SPDMLT",
-            doubt=OF_A_LIST,
-        ),
+    records=record("EXAC1", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),
+    pslf_records=record(
+        "exac1",
+        "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 
@@ -218,5 +209,5 @@ EXAC1A = documented(
     exac1a_rest,
     EXAC1.sheet,
     "VC VL VR VE VF",
-    records=(record("EXAC1A", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),),
+    records=record("EXAC1A", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),
 )

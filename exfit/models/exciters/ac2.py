@@ -1,12 +1,6 @@
 """Alternator exciters with high initial response: AC2A, AC2C and EXAC2."""
 
-from exfit.models.blocks import (
-    Signal,
-    clip,
-    field_ceiling,
-    field_demand,
-    smaller,
-)
+from exfit.models.blocks import Signal, clip, field_ceiling, field_demand, smaller
 from exfit.models.exciter_parts import alternator, alternator_rest, limited_alternator, regulated
 from exfit.models.sheet import (
     AS_IN_PSSE,
@@ -72,20 +66,16 @@ AC2A = documented(
     ),
     "VC VL VA VE VF",
     aliases=("ESAC2A",),
-    records=(
-        record(
-            "ESAC2A",
-            "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2",
-        ),
+    records=record(
+        "ESAC2A",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2",
     ),
-    pslf_records=(
-        record(
-            "esac2a",
-            "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2 "
-            "SPDMLT",
-            ignored="SPDMLT",
-            doubt=AS_IN_PSSE,
-        ),
+    pslf_records=record(
+        "esac2a",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2 "
+        "SPDMLT",
+        ignored="SPDMLT",
+        doubt=AS_IN_PSSE,
     ),
 )
 
@@ -130,15 +120,13 @@ AC2C = documented(
     (*renamed(AC2A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VEMIN=0.0)),
     "VC VL VA VE VF",
     aliases=("ESAC2C",),
-    records=(
-        record(
-            "AC2C",
-            "TR TB TC KA TA VAMAX VAMIN KB EFEMAX EFEMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2 "
-            "VEMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC2C",
+        "TR TB TC KA TA VAMAX VAMIN KB EFEMAX EFEMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2 "
+        "VEMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 
@@ -186,19 +174,15 @@ EXAC2 = documented(
         *shared(E1=4.4, SE1=0.037, E2=3.3, SE2=0.012),
     ),
     "VC VL VA VE VF",
-    records=(
-        record(
-            "EXAC2",
-            "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE KL KH KF TF KC KD KE VLR E1 SE1 E2 SE2",
-        ),
+    records=record(
+        "EXAC2",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE KL KH KF TF KC KD KE VLR E1 SE1 E2 SE2",
     ),
-    pslf_records=(
-        record(
-            "exac2",
-            "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE KL KH KF TF KC KD KE VLR E1 SE1 E2 SE2 "
-            "SPDMLT",
-            ignored="SPDMLT",
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "exac2",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE KL KH KF TF KC KD KE VLR E1 SE1 E2 SE2 "
+        "SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )

@@ -90,20 +90,15 @@ AC3A = documented(
     ),
     "VC VL VA VE VF",
     aliases=("ESAC3A",),
-    records=(
-        record(
-            "ESAC3A",
-            "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2",
-        ),
+    records=record(
+        "ESAC3A",
+        "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2",
     ),
-    pslf_records=(
-        record(
-            "esac3a",
-            "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 "
-            "SPDMLT",
-            ignored="SPDMLT",
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "esac3a",
+        "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 
@@ -175,16 +170,14 @@ AC3C = documented(
     ),
     "VC VL VA VE VF VI VD",
     aliases=("ESAC3C",),
-    records=(
-        record(
-            "AC3C",
-            "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 "
-            "KPR KIR KDR TDR VPIDMAX VPIDMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            places=ONE_GATE,
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC3C",
+        "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 KPR "
+        "KIR KDR TDR VPIDMAX VPIDMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        places=ONE_GATE,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 
@@ -237,10 +230,7 @@ EXAC3 = documented(
         *shared(E1=4.64, SE1=0.186, E2=6.19, SE2=1.391),
     ),
     "VC VL VA VE VF",
-    records=(
-        record(
-            "EXAC3",
-            "TR TB TC KA TA VAMAX VAMIN TE KLV KR KF TF KN EFDN KC KD KE VLV E1 SE1 E2 SE2",
-        ),
+    records=record(
+        "EXAC3", "TR TB TC KA TA VAMAX VAMIN TE KLV KR KF TF KN EFDN KC KD KE VLV E1 SE1 E2 SE2"
     ),
 )

@@ -58,14 +58,8 @@ AC4A = documented(
     ),
     "VC VL VR",
     aliases=("ESAC4A",),
-    records=(record("ESAC4A", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),),
-    pslf_records=(
-        record(
-            "esac4a",
-            "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
-            doubt=AS_IN_PSSE,
-        ),
-    ),
+    records=record("ESAC4A", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),
+    pslf_records=record("esac4a", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC", doubt=AS_IN_PSSE),
 )
 
 
@@ -100,15 +94,13 @@ AC4C = documented(
     AC4A.sheet,
     "VC VL VR",
     aliases=("ESAC4C",),
-    records=(
-        record(
-            "AC4C",
-            "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            places=ONE_GATE,
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC4C",
+        "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        places=ONE_GATE,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 
@@ -138,11 +130,6 @@ EXAC4 = documented(
     ac4a_rest,
     AC4A.sheet,
     "VC VL VR",
-    records=(record("EXAC4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),),
-    pslf_records=(
-        record(
-            "exac4",
-            "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
-        ),
-    ),
+    records=record("EXAC4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),
+    pslf_records=record("exac4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),
 )

@@ -79,14 +79,12 @@ AC5A = documented(
     ),
     "VC VR VE VL VF",
     aliases=("ESAC5A",),
-    records=(record("ESAC5A", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2"),),
-    pslf_records=(
-        record(
-            "esac5a",
-            "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 SPDMLT",
-            ignored="SPDMLT",
-            doubt=OF_A_LIST,
-        ),
+    records=record("ESAC5A", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2"),
+    pslf_records=record(
+        "esac5a",
+        "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 
@@ -139,19 +137,16 @@ AC5C = documented(
     ac5c_rest,
     (
         *renamed(AC5A.sheet, VRMAX="VAMAX", VRMIN="VAMIN"),
-        *shared(KC_FREE=0.2, KD=0.38),
-        *shared(VFEMAX=99.0, VEMIN=0.0),
+        *shared(KC_FREE=0.2, KD=0.38, VFEMAX=99.0, VEMIN=0.0),
     ),
     "VC VA VE VL VF",
     aliases=("ESAC5C",),
-    records=(
-        record(
-            "AC5C",
-            "TR KA TA VAMAX VAMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 KC KD VFEMAX VEMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            places=ONE_GATE,
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC5C",
+        "TR KA TA VAMAX VAMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 KC KD VFEMAX VEMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        places=ONE_GATE,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )

@@ -1,13 +1,6 @@
 """Alternator exciters with a field current limiter: AC6A and AC6C."""
 
-from exfit.models.blocks import (
-    Signal,
-    clip,
-    field_demand,
-    lag,
-    lead_lag,
-    limited_lead_lag,
-)
+from exfit.models.blocks import Signal, clip, field_demand, lag, lead_lag, limited_lead_lag
 from exfit.models.exciter_parts import alternator, alternator_rest, limited_alternator
 from exfit.models.sheet import (
     FREE,
@@ -99,21 +92,16 @@ AC6A = documented(
     ),
     "VC VK VA VE VH",
     aliases=("ESAC6A",),
-    records=(
-        record(
-            "ESAC6A",
-            "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 "
-            "SE2",
-        ),
+    records=record(
+        "ESAC6A",
+        "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 SE2",
     ),
-    pslf_records=(
-        record(
-            "esac6a",
-            "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 "
-            "SE2 SPDMLT",
-            ignored="SPDMLT",
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "esac6a",
+        "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 SE2 "
+        "SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 
@@ -160,15 +148,13 @@ AC6C = documented(
     (*renamed(AC6A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VK VA VE VH",
     aliases=("ESAC6C",),
-    records=(
-        record(
-            "AC6C",
-            "TR KA TA TK TB TC VAMAX VAMIN EFEMAX EFEMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 "
-            "E2 SE2 VFEMAX VEMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            places=ONE_GATE,
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC6C",
+        "TR KA TA TK TB TC VAMAX VAMIN EFEMAX EFEMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 "
+        "SE2 VFEMAX VEMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        places=ONE_GATE,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )

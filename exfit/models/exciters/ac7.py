@@ -122,21 +122,17 @@ AC7B = documented(
         *shared(E2=4.725, SE2=0.075),
     ),
     "VC VI VD VF VA VE",
-    records=(
-        record(
-            "AC7B",
-            "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
-            "VFEMAX VEMIN E1 SE1 E2 SE2",
-        ),
+    records=record(
+        "AC7B",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
+        "VFEMAX VEMIN E1 SE1 E2 SE2",
     ),
-    pslf_records=(
-        record(
-            "esac7b",
-            "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL TE VFEMAX VEMIN KE KC KD KF1 "
-            "KF2 KF3 TF E1 SE1 E2 SE2 SPDMLT",
-            ignored="SPDMLT",
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "esac7b",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL TE VFEMAX VEMIN KE KC KD KF1 KF2 "
+        "KF3 TF E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 
@@ -202,15 +198,13 @@ AC7C = documented(
     ),
     "VC VI VD VF VA VE",
     aliases=("ESAC7C",),
-    records=(
-        record(
-            "AC7C",
-            "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
-            "VFEMAX VEMIN E1 SE1 E2 SE2 KI XL THETAP KC1 VBMAX KR",
-            icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1, "SW2": 1},
-            ignored="OEL UEL",
-            places=TWO_GATES,
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "AC7C",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
+        "VFEMAX VEMIN E1 SE1 E2 SE2 KI XL THETAP KC1 VBMAX KR",
+        icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1, "SW2": 1},
+        ignored="OEL UEL",
+        places=TWO_GATES,
+        doubt=OF_TWO_PROGRAMS,
     ),
 )

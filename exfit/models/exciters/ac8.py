@@ -88,8 +88,8 @@ AC8B = documented(
             "E2 SE2",
             doubt="its order is that of OPAL-RT's library and of PSS/E's AC8C; ANDES and InterPSS "
             "have VRMAX VRMIN VFEMAX VEMIN TA KA TE KC KD KE behind VPIDMIN",
-        ),
-        record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
+        )
+        + record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2")
     ),
     pslf_records=(
         record(
@@ -100,14 +100,14 @@ AC8B = documented(
             ignored="SPDMLT",
             held={"VPIDMAX": 999.0, "VPIDMIN": -999.0},
             doubt=OF_A_LIST,
-        ),
-        record(
+        )
+        + record(
             "exac8b",
             "TR KPR KIR KDR TDR VIMAX TA VRMAX VRMIN KE TE KC KD E1 SE1 E2 SE2 LIMFLG",
             absent={"VIMAX": 999.0, "LIMFLG": 0.0},
             held={"KA": 1.0, "VPIDMAX": 999.0, "VPIDMIN": -999.0, "VFEMAX": 999.0, "VEMIN": 0.0},
             spelled={"KPR": "kvp", "KIR": "kvi", "KDR": "kvd", "TDR": "tvd"},
-        ),
+        )
     ),
 )
 
@@ -155,17 +155,14 @@ AC8C = documented(
     (*AC8B.sheet, *ALTERNATOR_SUPPLY),
     "VC VI VD VR VE",
     aliases=("ESAC8C",),
-    records=(
-        record(
-            "AC8C",
-            "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN E1 SE1 "
-            "E2 SE2 KP KI XL THETAP KC1 VBMAX",
-            icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1},
-            ignored="OEL UEL",
-            places=TWO_GATES,
-            doubt="PSS/E 36 reads constants in this order as AC8CU1, a user's model of five "
-            "integers",
-        ),
+    records=record(
+        "AC8C",
+        "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN E1 SE1 E2 "
+        "SE2 KP KI XL THETAP KC1 VBMAX",
+        icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1},
+        ignored="OEL UEL",
+        places=TWO_GATES,
+        doubt="PSS/E 36 reads constants in this order as AC8CU1, a user's model of five integers",
     ),
 )
 
@@ -209,5 +206,5 @@ ESAC8B = documented(
         *shared(SE2=0.3),
     ),
     "VC VI VD VR VE",
-    records=(record("ESAC8B", "TR KP KI KD TD KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),),
+    records=record("ESAC8B", "TR KP KI KD TD KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
 )

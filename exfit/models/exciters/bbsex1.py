@@ -33,13 +33,11 @@ SHEET = sheet(
     *limits("EFDMAX", 5.0, -5.0, "the field voltage at rated voltage"),
 )
 
-RECORDS = (
-    record(
-        "BBSEX1",
-        "TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN SWITCH",
-        absent={"SWITCH": 0.0},
-        spelled={"TR": "TF"},
-    ),
+RECORDS = record(
+    "BBSEX1",
+    "TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN SWITCH",
+    absent={"SWITCH": 0.0},
+    spelled={"TR": "TF"},
 )
 
 STATES = "VC VL VR"

@@ -81,22 +81,18 @@ DC1A = documented(
     ),
     STATES,
     aliases=("ESDC1A",),
-    records=(
-        record(
-            "ESDC1A",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
-            absent={"Switch": 0.0},
-        ),
+    records=record(
+        "ESDC1A",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
     ),
-    pslf_records=(
-        record(
-            "esdc1a",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
-            ignored="SPDMLT UELIN",
-            absent={"EXCLIM": 1.0},
-            spelled={"TF": "tf1"},
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "esdc1a",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
+        ignored="SPDMLT UELIN",
+        absent={"EXCLIM": 1.0},
+        spelled={"TF": "tf1"},
+        doubt=OF_A_LIST,
     ),
     setpoints=SETPOINTS,
 )
@@ -131,20 +127,15 @@ def dc1c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 DC1C = documented(
     dc1c,
     rest,
-    (
-        *DC1A.sheet,
-        *shared(VEMAX=99.0, VEMIN=0.0),
-    ),
+    (*DC1A.sheet, *shared(VEMAX=99.0, VEMIN=0.0)),
     STATES,
     aliases=("ESDC1C",),
-    records=(
-        record(
-            "DC1C",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "DC1C",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        doubt=OF_TWO_PROGRAMS,
     ),
     setpoints=SETPOINTS,
 )
@@ -184,22 +175,18 @@ DC2A = documented(
     ),
     STATES,
     aliases=("ESDC2A",),
-    records=(
-        record(
-            "ESDC2A",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
-            absent={"Switch": 0.0},
-        ),
+    records=record(
+        "ESDC2A",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
     ),
-    pslf_records=(
-        record(
-            "esdc2a",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
-            ignored="SPDMLT UELIN",
-            absent={"EXCLIM": 1.0},
-            spelled={"TF": "tf1"},
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "esdc2a",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
+        ignored="SPDMLT UELIN",
+        absent={"EXCLIM": 1.0},
+        spelled={"TF": "tf1"},
+        doubt=OF_A_LIST,
     ),
     setpoints=SETPOINTS,
 )
@@ -233,20 +220,15 @@ def dc2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 DC2C = documented(
     dc2c,
     rest,
-    (
-        *DC2A.sheet,
-        *shared(VEMAX=99.0, VEMIN=0.0),
-    ),
+    (*DC2A.sheet, *shared(VEMAX=99.0, VEMIN=0.0)),
     STATES,
     aliases=("ESDC2C",),
-    records=(
-        record(
-            "DC2C",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "DC2C",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
+        doubt=OF_TWO_PROGRAMS,
     ),
     setpoints=SETPOINTS,
 )
@@ -289,12 +271,8 @@ IEEET1 = documented(
         *shared(KF=0.08, TF=1.0, E1=3.1, SE1=0.33, E2=2.3, SE2=0.1),
     ),
     "VC VR EFD VF",
-    records=(
-        record(
-            "IEEET1",
-            "TR KA TA VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
-            absent={"Switch": 0.0},
-        ),
+    records=record(
+        "IEEET1", "TR KA TA VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2", absent={"Switch": 0.0}
     ),
     setpoints=SETPOINTS,
 )
@@ -333,19 +311,13 @@ IEEEX1 = documented(
         *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
     ),
     STATES,
-    records=(
-        record(
-            "IEEEX1",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
-            absent={"Switch": 0.0},
-        ),
+    records=record(
+        "IEEEX1",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
     ),
-    pslf_records=(
-        record(
-            "exdc1",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 E1 SE1 E2 SE2",
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "exdc1", "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 E1 SE1 E2 SE2", doubt=OF_A_LIST
     ),
     setpoints=SETPOINTS,
 )
@@ -382,21 +354,17 @@ EXDC2 = documented(
     rest,
     renamed(DC2A.sheet, TF="TF1"),
     STATES,
-    records=(
-        record(
-            "EXDC2",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
-            absent={"Switch": 0.0},
-            times_speed=True,
-        ),
+    records=record(
+        "EXDC2",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
+        times_speed=True,
     ),
-    pslf_records=(
-        record(
-            "exdc2",
-            "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2",
-            absent={"TF2": 0.0},
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "exdc2",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2",
+        absent={"TF2": 0.0},
+        doubt=OF_A_LIST,
     ),
     setpoints=SETPOINTS,
 )

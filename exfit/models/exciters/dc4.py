@@ -72,13 +72,11 @@ DC4B = documented(
         *shared(KF_FIXED=0.0, TF=1.0, VEMIN=0.0, E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
     ),
     "VC VI VD VR EFD VF",
-    records=(
-        record(
-            "DC4B",
-            "TR KP KI KD TD VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2",
-            icons={"OEL": 2, "UEL": 2},
-            places={2: "takeover"},
-        ),
+    records=record(
+        "DC4B",
+        "TR KP KI KD TD VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2",
+        icons={"OEL": 2, "UEL": 2},
+        places={2: "takeover"},
     ),
     setpoints="KE0 VRMAX0 VRMIN0",
 )
@@ -148,14 +146,12 @@ DC4C = documented(
     ),
     "VC VI VD VR EFD VF",
     doubt="rests on one public diagram for the load of its supply (KC1), that of InterPSS",
-    records=(
-        record(
-            "DC4C",
-            "TR KPR KIR KDR TDR VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2 KP KI XL THETAP "
-            "KC1 VBMAX",
-            icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-            ignored="OEL UEL SCL",
-            doubt="PSS/E 36 reads constants in this order as DC4CU1, a user's model",
-        ),
+    records=record(
+        "DC4C",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2 KP KI XL THETAP KC1 "
+        "VBMAX",
+        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+        ignored="OEL UEL SCL",
+        doubt="PSS/E 36 reads constants in this order as DC4CU1, a user's model",
     ),
 )

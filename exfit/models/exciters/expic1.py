@@ -60,21 +60,17 @@ SHEET = sheet(
     *shared(E1=2.8, SE1=0.08, E2=3.7, SE2=0.33, KP_OR_0=6.5, KI=0.0, KC=0.08),
 )
 
-RECORDS = (
-    record(
-        "EXPIC1",
-        "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 KP "
-        "KI KC",
-    ),
+RECORDS = record(
+    "EXPIC1",
+    "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 KP KI "
+    "KC",
 )
 
-PSLF_RECORDS = (
-    record(
-        "expic1",
-        "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 KP "
-        "KI KC",
-        doubt=OF_A_LIST,
-    ),
+PSLF_RECORDS = record(
+    "expic1",
+    "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 KP KI "
+    "KC",
+    doubt=OF_A_LIST,
 )
 
 STATES = "VC VA VL DVL VF DVF EFD"

@@ -23,7 +23,7 @@ SHEET = sheet(
 )
 
 # rc/rfd = 0 is a bridge that carries negative field current
-RECORDS = (record("SCRX", "TATB TB K TE EMIN EMAX CSWITCH RCRFD", absent={"RCRFD": 0.0}),)
+RECORDS = record("SCRX", "TATB TB K TE EMIN EMAX CSWITCH RCRFD", absent={"RCRFD": 0.0})
 
 STATES = "VL EB"
 

@@ -18,16 +18,14 @@ SHEET = sheet(
     ("EMAX", 4.0, *LIMIT, "ceiling of the field voltage"),
 )
 
-RECORDS = (record("SEXS", "TATB TB K TE EMIN EMAX"),)
+RECORDS = record("SEXS", "TATB TB K TE EMIN EMAX")
 
-PSLF_RECORDS = (
-    record(
-        "sexs",
-        "TATB TB K TE EMIN EMAX KC TC EFDMIN EFDMAX SPARE",
-        absent={"TC": 0.0, "EFDMIN": -999.0, "EFDMAX": 999.0, "SPARE": 0.0},
-        ignored="KC",
-        doubt="what stands behind EMAX is not confirmed; it is taken to be without effect",
-    ),
+PSLF_RECORDS = record(
+    "sexs",
+    "TATB TB K TE EMIN EMAX KC TC EFDMIN EFDMAX SPARE",
+    absent={"TC": 0.0, "EFDMIN": -999.0, "EFDMAX": 999.0, "SPARE": 0.0},
+    ignored="KC",
+    doubt="what stands behind EMAX is not confirmed; it is taken to be without effect",
 )
 
 STATES = "VL EFD"

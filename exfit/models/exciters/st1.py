@@ -138,13 +138,11 @@ ST1A = documented(
     ),
     "VC VL VL1 VA VF",
     aliases=("ESST1A",),
-    records=(
-        record(
-            "ESST1A",
-            "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
-            icons={"UEL": 1, "VOS": 1},
-            places={3: "takeover"},
-        ),
+    records=record(
+        "ESST1A",
+        "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
+        icons={"UEL": 1, "VOS": 1},
+        places={3: "takeover"},
     ),
     pslf_records=(
         record(
@@ -153,12 +151,12 @@ ST1A = documented(
             "PSSIN",
             absent={"PSSIN": 0.0},
             ignored="UELIN",
-        ),
-        record(
+        )
+        + record(
             "exst1",
             "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF TC1 TB1 VAMAX VAMIN XE ILR KLR",
             absent={"XE": 0.0},
-        ),
+        )
     ),
 )
 
@@ -211,20 +209,16 @@ ST1C = documented(
     st1c_rest,
     (
         *ST1A.sheet,
-        *sheet(
-            ("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 VA"),
-        ),
+        *sheet(("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 VA")),
     ),
     "VC VL VL1 VA VF",
     aliases=("ESST1C",),
-    records=(
-        record(
-            "ST1C",
-            "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
-            icons={"UEL": 1, "VOS": 1, "OEL": 1},
-            ignored="UEL OEL",
-            places=TWO_GATES,
-        ),
+    records=record(
+        "ST1C",
+        "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
+        icons={"UEL": 1, "VOS": 1, "OEL": 1},
+        ignored="UEL OEL",
+        places=TWO_GATES,
     ),
 )
 
@@ -272,5 +266,5 @@ EXST1 = documented(
         *shared(VRMAX_OF_EFD_AT_VT=8.0, VRMIN_OF_EFD_AT_VT=-3.0, KC=0.2, KF=0.1, TF=1.0),
     ),
     "VC VL VA VF",
-    records=(record("EXST1", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF"),),
+    records=record("EXST1", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF"),
 )

@@ -71,15 +71,11 @@ ST2A = documented(
     "VC VR EFD VF",
     aliases=("ESST2A", "EXST2A"),
     records=(
-        record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),
-        record("EXST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),
+        record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX")
+        + record("EXST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX")
     ),
-    pslf_records=(
-        record(
-            "esst2a",
-            "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX",
-            doubt=AS_IN_PSSE,
-        ),
+    pslf_records=record(
+        "esst2a", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX", doubt=AS_IN_PSSE
     ),
 )
 
@@ -139,22 +135,16 @@ def st2c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 ST2C = documented(
     st2c,
     st2c_rest,
-    (
-        *not_searched(ST2A.sheet, "KA"),
-        *PID,
-        *shared(XL=0.081, THETAP=0.0, VBMAX=9.0),
-    ),
+    (*not_searched(ST2A.sheet, "KA"), *PID, *shared(XL=0.081, THETAP=0.0, VBMAX=9.0)),
     "VC VI VD VR EFD VF",
     aliases=("ESST2C",),
-    records=(
-        record(
-            "ST2C",
-            "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN TE EFDMAX KE KF TF KP KI XL "
-            "THETAP KC VBMAX",
-            icons={"OEL": 1, "UEL": 1, "SCL": 1},
-            ignored="OEL UEL SCL",
-            doubt=OF_TWO_PROGRAMS,
-        ),
+    records=record(
+        "ST2C",
+        "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN TE EFDMAX KE KF TF KP KI XL THETAP "
+        "KC VBMAX",
+        icons={"OEL": 1, "UEL": 1, "SCL": 1},
+        ignored="OEL UEL SCL",
+        doubt=OF_TWO_PROGRAMS,
     ),
 )
 
@@ -200,7 +190,7 @@ EXST2 = documented(
         *shared(TF=0.53, KP_OR_0=0.9, KI=1.86, KC=0.1, EFDMAX=2.8),
     ),
     "VC VR EFD VF",
-    records=(record("EXST2", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),),
+    records=record("EXST2", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),
 )
 
 
@@ -257,5 +247,5 @@ IEEET3 = documented(
         *shared(KE_ABOVE_0=1.0),
     ),
     "VC VR EFD VF",
-    records=(record("IEEET3", "TR KA TA VRMAX VRMIN TE KF TF KP KI VBMAX KE"),),
+    records=record("IEEET3", "TR KA TA VRMAX VRMIN TE KF TF KP KI VBMAX KE"),
 )

@@ -87,21 +87,17 @@ ST3A = documented(
     ),
     "VC VL VR VM",
     aliases=("ESST3A",),
-    records=(
-        record(
-            "ESST3A",
-            "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM VMMAX "
-            "VMMIN",
-        ),
+    records=record(
+        "ESST3A",
+        "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM VMMAX "
+        "VMMIN",
     ),
-    pslf_records=(
-        record(
-            "esst3a",
-            "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM VMMAX "
-            "VMMIN",
-            spelled={"THETAP": "angp"},
-            doubt=AS_IN_PSSE,
-        ),
+    pslf_records=record(
+        "esst3a",
+        "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM VMMAX "
+        "VMMIN",
+        spelled={"THETAP": "angp"},
+        doubt=AS_IN_PSSE,
     ),
 )
 
@@ -159,16 +155,14 @@ ST3C = documented(
     (*not_searched(ST3A.sheet, "KA"), *PID, *shared(SW1=1.0)),
     "VC VI VD VL VR VM",
     aliases=("ESST3C",),
-    records=(
-        record(
-            "ST3C",
-            "TR VIMAX VIMIN KPR KIR KDR TDR VPIDMAX VPIDMIN TC TB KA TA VRMAX VRMIN KM TM VMMAX "
-            "VMMIN KG VGMAX KP KI XL THETAP KC VBMAX",
-            icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-            ignored="OEL UEL SCL",
-            doubt=OF_TWO_PROGRAMS,
-            unused={"TA": ""},
-        ),
+    records=record(
+        "ST3C",
+        "TR VIMAX VIMIN KPR KIR KDR TDR VPIDMAX VPIDMIN TC TB KA TA VRMAX VRMIN KM TM VMMAX VMMIN "
+        "KG VGMAX KP KI XL THETAP KC VBMAX",
+        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+        ignored="OEL UEL SCL",
+        doubt=OF_TWO_PROGRAMS,
+        unused={"TA": ""},
     ),
 )
 
@@ -229,10 +223,7 @@ EXST3 = documented(
         *shared(KG=1.0, KP=6.15, KI=0.0, EFDMAX=6.9, KC=0.2, XL=0.081, VGMAX=5.8, THETAP=0.0),
     ),
     "VC VL VR",
-    records=(
-        record(
-            "EXST3",
-            "TR VIMAX VIMIN KJ TC TB KA TA VRMAX VRMIN KG KP KI EFDMAX KC XL VGMAX THETAP",
-        ),
+    records=record(
+        "EXST3", "TR VIMAX VIMIN KJ TC TB KA TA VRMAX VRMIN KG KP KI EFDMAX KC XL VGMAX THETAP"
     ),
 )

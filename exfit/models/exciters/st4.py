@@ -78,10 +78,8 @@ ST4B = documented(
     ),
     "VC VR VA VM",
     aliases=("ESST4B",),
-    records=(
-        record(
-            "ESST4B", "TR KPR KIR VRMAX VRMIN TA KPM KIM VMMAX VMMIN KG KP KI VBMAX KC XL THETAP"
-        ),
+    records=record(
+        "ESST4B", "TR KPR KIR VRMAX VRMIN TA KPM KIM VMMAX VMMIN KG KP KI VBMAX KC XL THETAP"
     ),
     pslf_records=(
         record(
@@ -89,12 +87,12 @@ ST4B = documented(
             "TR KPR KIR TA VRMAX VRMIN KPM KIM VMMAX VMMIN KG KP THETAP KI KC XL VBMAX VGMAX",
             absent={"VGMAX": 999.0},
             spelled={"THETAP": "angp"},
-        ),
-        record(
+        )
+        + record(
             "exst4b",
             "TR KPR KIR TA VRMAX VRMIN KPM KIM VMMAX VMMIN KG KP THETAP KI KC XL VBMAX",
             spelled={"THETAP": "angp"},
-        ),
+        )
     ),
 )
 
@@ -177,14 +175,12 @@ ST4C = documented(
     ),
     "VC VR VM VA VG",
     aliases=("ESST4C",),
-    records=(
-        record(
-            "ST4C",
-            "TR KPR KIR VRMAX VRMIN KPM KIM VMMAX VMMIN TA VAMAX VAMIN KG TG VGMAX KP KI XL THETAP "
-            "KC VBMAX",
-            icons={"VOS": 1, "OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-            ignored="OEL UEL SCL",
-            places=TWO_GATES,
-        ),
+    records=record(
+        "ST4C",
+        "TR KPR KIR VRMAX VRMIN KPM KIM VMMAX VMMIN TA VAMAX VAMIN KG TG VGMAX KP KI XL THETAP KC "
+        "VBMAX",
+        icons={"VOS": 1, "OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+        ignored="OEL UEL SCL",
+        places=TWO_GATES,
     ),
 )

@@ -98,12 +98,10 @@ ST5B = documented(
         *shared(KC=0.004),
     ),
     "VC VL1 VL2 VE",
-    records=(
-        record(
-            "ST5B",
-            "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
-            ignored="TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
-        ),
+    records=record(
+        "ST5B",
+        "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
+        ignored="TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
     ),
 )
 
@@ -173,13 +171,11 @@ ST5C = documented(
     ),
     "VC VL1 VL2 VE VU1 VU2 VO1 VO2",
     aliases=("ESST5C",),
-    records=(
-        record(
-            "ST5C",
-            "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
-            icons={"OEL": 1, "UEL": 1},
-            ignored="OEL UEL",
-        ),
+    records=record(
+        "ST5C",
+        "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
+        icons={"OEL": 1, "UEL": 1},
+        ignored="OEL UEL",
     ),
 )
 
@@ -223,5 +219,5 @@ URST5T = documented(
     urst5t_rest,
     ST5B.sheet,
     "VC VL1 VL2 VE",
-    records=(record("URST5T", "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC"),),
+    records=record("URST5T", "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC"),
 )

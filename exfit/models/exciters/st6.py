@@ -76,12 +76,10 @@ ST6B = documented(
         ("TG", 0.02, "s", (0.001, 10.0), "feedback lag of the field voltage loop", FREE),
     ),
     "VC VI VD VG",
-    records=(
-        record(
-            "ST6B",
-            "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG",
-            icons={"OEL": 1},
-        ),
+    records=record(
+        "ST6B",
+        "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG",
+        icons={"OEL": 1},
     ),
 )
 
@@ -144,20 +142,17 @@ ST6C = documented(
     (
         *ST6B.sheet,
         *sheet(
-            *shared(TA_OF_FIRING=0.02),
-            *limits("VMMAX", 4.5, -3.6, "the lag before the rectifier"),
+            *shared(TA_OF_FIRING=0.02), *limits("VMMAX", 4.5, -3.6, "the lag before the rectifier")
         ),
         *STATIC_SUPPLY,
     ),
     "VC VI VD VM VG",
     aliases=("ESST6C",),
-    records=(
-        record(
-            "ST6C",
-            "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG VMMAX VMMIN TA KP "
-            "KI XL THETAP KC VBMAX",
-            icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-            ignored="OEL UEL SCL",
-        ),
+    records=record(
+        "ST6C",
+        "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG VMMAX VMMIN TA KP KI "
+        "XL THETAP KC VBMAX",
+        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+        ignored="OEL UEL SCL",
     ),
 )

@@ -87,21 +87,17 @@ ST7B = documented(
         ("TIA", 3.0, *POSITIVE_TIME, "feedback time constant, that of the integral", FREE),
     ),
     "VC VG VL VF",
-    records=(
-        record(
-            "ST7B",
-            "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA",
-            icons={"OEL": 0, "UEL": 0},
-            places={3: "takeover"},
-        ),
+    records=record(
+        "ST7B",
+        "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA",
+        icons={"OEL": 0, "UEL": 0},
+        places={3: "takeover"},
     ),
-    pslf_records=(
-        record(
-            "esst7b",
-            "TR KPA KIA TIA TB TC TF TG KL KH VRMAX VRMIN VMAX VMIN UEL OEL TS",
-            absent={"UEL": 0.0, "OEL": 0.0, "TS": 0.0},
-            doubt=OF_A_LIST,
-        ),
+    pslf_records=record(
+        "esst7b",
+        "TR KPA KIA TIA TB TC TF TG KL KH VRMAX VRMIN VMAX VMIN UEL OEL TS",
+        absent={"UEL": 0.0, "OEL": 0.0, "TS": 0.0},
+        doubt=OF_A_LIST,
     ),
 )
 
@@ -150,18 +146,13 @@ def st7c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 ST7C = documented(
     st7c,
     st7c_rest,
-    (
-        *ST7B.sheet,
-        *shared(TA_OF_FIRING=0.01),
-    ),
+    (*ST7B.sheet, *shared(TA_OF_FIRING=0.01)),
     "VC VG VL VF VE",
     aliases=("ESST7C",),
-    records=(
-        record(
-            "ST7C",
-            "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA TA",
-            icons={"OEL": 0, "UEL": 0},
-            ignored="OEL UEL",
-        ),
+    records=record(
+        "ST7C",
+        "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA TA",
+        icons={"OEL": 0, "UEL": 0},
+        ignored="OEL UEL",
     ),
 )

@@ -80,15 +80,13 @@ SHEET = (
     *shared(SW1=1.0),
 )
 
-RECORDS = (
-    record(
-        "ST8C",
-        "TR KPR KIR VPIMAX VPIMIN KPA KIA VAMAX VAMIN KA TA VRMAX VRMIN KF TF KC1 KP KI1 XL THETAP "
-        "VB1MAX KC2 KI2 VB2MAX",
-        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-        ignored="OEL UEL SCL",
-        places=ONE_GATE,
-    ),
+RECORDS = record(
+    "ST8C",
+    "TR KPR KIR VPIMAX VPIMIN KPA KIA VAMAX VAMIN KA TA VRMAX VRMIN KF TF KC1 KP KI1 XL THETAP "
+    "VB1MAX KC2 KI2 VB2MAX",
+    icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+    ignored="OEL UEL SCL",
+    places=ONE_GATE,
 )
 
 STATES = "VC VI VA VR VF"

@@ -50,14 +50,12 @@ SHEET = (
     *STATIC_SUPPLY,
 )
 
-RECORDS = (
-    record(
-        "ST9C",
-        "TR TCD TBD ZA KA KU TA TAUEL VRMAX VRMIN KAS TAS KP THETAP KI XL KC VBMAX",
-        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-        ignored="OEL UEL SCL",
-        places=ONE_GATE,
-    ),
+RECORDS = record(
+    "ST9C",
+    "TR TCD TBD ZA KA KU TA TAUEL VRMAX VRMIN KAS TAS KP THETAP KI XL KC VBMAX",
+    icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+    ignored="OEL UEL SCL",
+    places=ONE_GATE,
 )
 
 STATES = "VC VD VI VA"

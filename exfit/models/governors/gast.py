@@ -29,7 +29,7 @@ SHEET = sheet(
     ("Dturb", 0.18, *UP_TO_100, "turbine damping"),
 )
 
-RECORDS = (record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),)
+RECORDS = record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb")
 
 STATES = "V1 V2 V3"
 

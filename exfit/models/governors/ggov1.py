@@ -120,29 +120,24 @@ SHEET = sheet(
     ("Trate_Mbase", 1.0, "1", (0.01, 100.0), "turbine rating over the machine's base"),
 )
 
-RECORDS = (
-    record(
-        "GGOV1",
-        "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng "
-        "Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown",
-        icons={"Rselect": 1, "Flag": 0},
-        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
-        ignored="Trate",
-        held={"Trate_Mbase": 1.0},
-    ),
+RECORDS = record(
+    "GGOV1",
+    "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng Tfload "
+    "Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown",
+    icons={"Rselect": 1, "Flag": 0},
+    absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+    ignored="Trate",
+    held={"Trate_Mbase": 1.0},
 )
 
-PSLF_RECORDS = (
-    record(
-        "ggov1",
-        "R Rselect Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc "
-        "Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET Aset Ka Ta db Tsa Tsb "
-        "Rup Rdown",
-        icons={"Rselect": 1, "Flag": 0},
-        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
-        ignored="PMWSET",
-        held={"Trate_Mbase": 1.0},
-    ),
+PSLF_RECORDS = record(
+    "ggov1",
+    "R Rselect Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Flag "
+    "Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET Aset Ka Ta db Tsa Tsb Rup Rdown",
+    icons={"Rselect": 1, "Flag": 0},
+    absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+    ignored="PMWSET",
+    held={"Trate_Mbase": 1.0},
 )
 
 STATES = "PE MW DERIV INTEG VALVE TURB TEMP TEMPM LOAD ACC FSRA"

@@ -43,15 +43,13 @@ SHEET = sheet(
     ("qNL", 0.08, "pu", (0.0, 1.0), "flow at no load"),
 )
 
-RECORDS = (record("HYGOV", "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL"),)
+RECORDS = record("HYGOV", "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL")
 
-PSLF_RECORDS = (
-    record(
-        "hygov",
-        "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL",
-        spelled={"R": "rperm", "r": "rtemp"},
-        doubt=AS_IN_PSSE,
-    ),
+PSLF_RECORDS = record(
+    "hygov",
+    "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL",
+    spelled={"R": "rperm", "r": "rtemp"},
+    doubt=AS_IN_PSSE,
 )
 
 STATES = "E C G Q"

@@ -42,23 +42,19 @@ SHEET = sheet(
     ("K7", 0.0, "1", (0.0, 10.0), "share behind the fourth boiler pass"),
 )
 
-RECORDS = (
-    record(
-        "IEEEG1",
-        "K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8",
-        icons={"JBUS": 0, "M": 0},
-        absent={"K2": 0.0, "K4": 0.0, "K6": 0.0, "K8": 0.0},
-    ),
+RECORDS = record(
+    "IEEEG1",
+    "K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8",
+    icons={"JBUS": 0, "M": 0},
+    absent={"K2": 0.0, "K4": 0.0, "K6": 0.0, "K8": 0.0},
 )
 
 # a dead band and a valve's curve, which the model does not have
 NOT_MODELLED = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6"
-PSLF_RECORDS = (
-    record(
-        "ieeeg1",
-        f"K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8 {NOT_MODELLED}",
-        absent=dict.fromkeys(["K2", "K4", "K6", "K8", *NOT_MODELLED.split()], 0.0),
-    ),
+PSLF_RECORDS = record(
+    "ieeeg1",
+    f"K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8 {NOT_MODELLED}",
+    absent=dict.fromkeys(["K2", "K4", "K6", "K8", *NOT_MODELLED.split()], 0.0),
 )
 
 STATES = "V1 VALVE V4 V5 V6 V7"

@@ -34,7 +34,7 @@ SHEET = sheet(
     *limits("PMAX", 1.0, 0.0, "the power demand", WITHIN_10),
 )
 
-RECORDS = (record("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN"),)
+RECORDS = record("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN")
 
 STATES = "V1 V3 V4 V5 V6"
 

@@ -22,14 +22,9 @@ SHEET = sheet(
     ("Dt", 0.0, *UP_TO_100, "turbine damping"),
 )
 
-RECORDS = (record("TGOV1", "R T1 VMAX VMIN T2 T3 Dt"),)
+RECORDS = record("TGOV1", "R T1 VMAX VMIN T2 T3 Dt")
 
-PSLF_RECORDS = (
-    record(
-        "tgov1",
-        "R T1 VMAX VMIN T2 T3 Dt",
-    ),
-)
+PSLF_RECORDS = record("tgov1", "R T1 VMAX VMIN T2 T3 Dt")
 
 STATES = "V1 V3"
 

@@ -1,5 +1,5 @@
 """Limiters of over- and underexcitation and of the stator current, a file for each."""
 
 FAMILIES = {  # files that hold several models
-    "uel": "UEL1 UEL2C",
+    "uel": "UEL1 UEL2C"
 }

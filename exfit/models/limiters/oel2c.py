@@ -100,18 +100,16 @@ SHEET = sheet(
     *RATE_SWITCH,
 )
 
-RECORDS = (
-    record(
-        "OEL2C",
-        "TC1OEL TB1OEL TC2OEL TB2OEL KPOEL KIOEL KDOEL TDOEL VOELMAX3 VOELMIN3 VOELMAX2 VOELMIN2 "
-        "VOELMAX1 VOELMIN1 IRESET TEN TOFF ITHOFF KSCALE TROEL KACT ITFPU IINST ILIM TAOEL C1 K1 "
-        "C2 K2 VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU",
-        icons={"OELINPUT": 0},
-        held={"SW1": 0.0},
-        exchanged="FIXEDRU FIXEDRD",
-        doubt="its order is that of PowerWorld's list, not confirmed by a file; another program "
-        "reads SW1 as a second integer and a rated field current at the end",
-    ),
+RECORDS = record(
+    "OEL2C",
+    "TC1OEL TB1OEL TC2OEL TB2OEL KPOEL KIOEL KDOEL TDOEL VOELMAX3 VOELMIN3 VOELMAX2 VOELMIN2 "
+    "VOELMAX1 VOELMIN1 IRESET TEN TOFF ITHOFF KSCALE TROEL KACT ITFPU IINST ILIM TAOEL C1 K1 C2 K2 "
+    "VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU",
+    icons={"OELINPUT": 0},
+    held={"SW1": 0.0},
+    exchanged="FIXEDRU FIXEDRD",
+    doubt="its order is that of PowerWorld's list, not confirmed by a file; another program "
+    "reads SW1 as a second integer and a rated field current at the end",
 )
 
 STATES = "I T IREF IF OVER BELOW ACTIVE INTEG DERIV V2 V1"

@@ -38,13 +38,11 @@ SHEET = sheet(
     *limits("VOELMAX2", 0.0, -1.0, "the output", WITHIN_1000),
 )
 
-RECORDS = (
-    record(
-        "OEL3C",
-        "ITFPU KSCALE TF K1 KOEL TOEL KPOEL VOELMAX1 VOELMIN1 VOELMAX2 VOELMIN2",
-        icons={"OELINPUT": 0},
-        doubt="its order is that of PowerWorld's list, not confirmed by a file",
-    ),
+RECORDS = record(
+    "OEL3C",
+    "ITFPU KSCALE TF K1 KOEL TOEL KPOEL VOELMAX1 VOELMIN1 VOELMAX2 VOELMIN2",
+    icons={"OELINPUT": 0},
+    doubt="its order is that of PowerWorld's list, not confirmed by a file",
 )
 
 STATES = "I V"

@@ -95,12 +95,10 @@ UEL1 = documented(
     "V V1 V3",
     places=("takeover", "takeover-output", "summing"),
     inputs=("vt", *POWERS),
-    records=(
-        record(
-            "UEL1",
-            "KUR KUC KUF VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN",
-            absent={"KUF": 0.0},
-        ),
+    records=record(
+        "UEL1",
+        "KUR KUC KUF VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN",
+        absent={"KUF": 0.0},
     ),
 )
 
@@ -218,15 +216,13 @@ UEL2C = documented(
     "VT P QREF Q KADJ V V1 V3",
     places=("summing", "takeover", "takeover-output"),
     inputs=("vt", *POWERS),
-    records=(
-        record(
-            "UEL2C",
-            "TUP TUQ TUV VBIAS K1 K2 KUF TQREF KFIX TADJ SW1 KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 "
-            "VUELMAX1 VUELMIN1 VUELMAX2 VUELMIN2 KFB TUL XQ P0 Q0 P1 Q1 P2 Q2 P3 Q3 P4 Q4 P5 Q5 P6 "
-            "Q6 P7 Q7 P8 Q8 P9 Q9 P10 Q10",
-            absent={"KUF": 0.0, "KFB": 0.0},
-            ignored="TUL",
-            doubt="its order is that of PowerWorld's list; PSS/E 36 has another in its UEL2CU1",
-        ),
+    records=record(
+        "UEL2C",
+        "TUP TUQ TUV VBIAS K1 K2 KUF TQREF KFIX TADJ SW1 KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 "
+        "VUELMAX1 VUELMIN1 VUELMAX2 VUELMIN2 KFB TUL XQ P0 Q0 P1 Q1 P2 Q2 P3 Q3 P4 Q4 P5 Q5 P6 Q6 "
+        "P7 Q7 P8 Q8 P9 Q9 P10 Q10",
+        absent={"KUF": 0.0, "KFB": 0.0},
+        ignored="TUL",
+        doubt="its order is that of PowerWorld's list; PSS/E 36 has another in its UEL2CU1",
     ),
 )

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from exfit.engine.trace import Signal
-from exfit.models.sheet import DynamicsRecord, Row, Sheet, record
+from exfit.models.sheet import Records, Row, Sheet, record
 
 Faults = Iterable[tuple[str, str]]
 
@@ -59,9 +59,9 @@ class Machine:
     rest: Callable[..., None]
     quadrature: Callable[..., Signal]
     faults: Callable[[Mapping[str, float]], Faults]
-    records: tuple[DynamicsRecord, ...] = ()
+    records: Records = ()
     saturation: Literal["quadratic", "exponential"] = "quadratic"
-    pslf_records: tuple[DynamicsRecord, ...] = ()
+    pslf_records: Records = ()
     doubt: str = ""
 
     @property
@@ -130,7 +130,7 @@ PSLF_NAMES = {
 }
 
 
-def pslf_record(name: str, cons: str) -> DynamicsRecord:
+def pslf_record(name: str, cons: str) -> Records:
     """Return PSLF's record of a machine: what it has more is taken as none."""
     return record(
         name,

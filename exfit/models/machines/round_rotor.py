@@ -146,8 +146,8 @@ def machine(
         rest=partial(rest, form),
         quadrature=partial(quadrature, form),
         faults=partial(faults, order),
-        records=(record(name, CONS, unused={"S12": "S10"} if of_psse else None),),
-        pslf_records=(pslf_record("genrou", CONS),) if of_psse else (),
+        records=record(name, CONS, unused={"S12": "S10"} if of_psse else None),
+        pslf_records=pslf_record("genrou", CONS) if of_psse else (),
         saturation=shape,
     )
 

@@ -136,8 +136,8 @@ GENSAL = Machine(
     rest=rest,
     quadrature=unsaturated_quadrature,
     faults=gensal_faults,
-    records=(record("GENSAL", CONS),),
-    pslf_records=(pslf_record("gensal", CONS),),
+    records=record("GENSAL", CONS),
+    pslf_records=pslf_record("gensal", CONS),
 )
 
 GENSAE = Machine(
@@ -154,6 +154,6 @@ GENSAE = Machine(
     rest=rest,
     quadrature=partial(quadrature, power_curve),
     faults=gensae_faults,
-    records=(record("GENSAE", CONS),),
+    records=record("GENSAE", CONS),
     saturation="exponential",
 )

@@ -42,23 +42,19 @@ SHEET = sheet(
     *of_stabiliser(LSMAX=0.1, LSMIN=-0.1),
 )
 
-RECORDS = (
-    record(
-        "IEEEST",
-        "A1 A2 A3 A4 A5 A6 T1 T2 T3 T4 T5 T6 KS LSMAX LSMIN VCU VCL",
-        icons={"ICS": 1, "REMBUS": 0},
-        absent={"VCU": 0.0, "VCL": 0.0},
-    ),
+RECORDS = record(
+    "IEEEST",
+    "A1 A2 A3 A4 A5 A6 T1 T2 T3 T4 T5 T6 KS LSMAX LSMIN VCU VCL",
+    icons={"ICS": 1, "REMBUS": 0},
+    absent={"VCU": 0.0, "VCL": 0.0},
 )
 
-PSLF_RECORDS = (
-    record(
-        "ieeest",
-        "ICS REMBUS A1 A2 A3 A4 A5 A6 T1 T2 T3 T4 T5 T6 KS LSMAX LSMIN VCU VCL TDELAY",
-        icons={"ICS": 1, "REMBUS": 0},
-        absent={"VCU": 0.0, "VCL": 0.0, "TDELAY": 0.0},
-        spelled={"ICS": "j", "REMBUS": "k"},
-    ),
+PSLF_RECORDS = record(
+    "ieeest",
+    "ICS REMBUS A1 A2 A3 A4 A5 A6 T1 T2 T3 T4 T5 T6 KS LSMAX LSMIN VCU VCL TDELAY",
+    icons={"ICS": 1, "REMBUS": 0},
+    absent={"VCU": 0.0, "VCL": 0.0, "TDELAY": 0.0},
+    spelled={"ICS": "j", "REMBUS": "k"},
 )
 
 STATES = "V1 DV1 V2 DV2 V3 V4 V5"

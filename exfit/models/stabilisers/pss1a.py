@@ -26,14 +26,12 @@ SHEET = sheet(
     *of_stabiliser(VSTMAX=0.05, VSTMIN=-0.05),
 )
 
-RECORDS = (
-    record(
-        "PSS1A",
-        "A1 A2 T1 T2 T3 T4 T5 T6 KS VSTMAX VSTMIN VCU VCL",
-        icons={"ICS": 1, "REMBUS": 0},
-        absent={"VCU": 0.0, "VCL": 0.0},
-        doubt="whether REMBUS, VCU and VCL are in the record of PSS1A is not confirmed",
-    ),
+RECORDS = record(
+    "PSS1A",
+    "A1 A2 T1 T2 T3 T4 T5 T6 KS VSTMAX VSTMIN VCU VCL",
+    icons={"ICS": 1, "REMBUS": 0},
+    absent={"VCU": 0.0, "VCL": 0.0},
+    doubt="whether REMBUS, VCU and VCL are in the record of PSS1A is not confirmed",
 )
 
 STATES = "V1 V2 V3 DV3 V4 V5"

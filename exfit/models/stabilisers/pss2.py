@@ -1,14 +1,7 @@
 """Dual input stabilisers of speed and power: PSS2B and PSS2C."""
 
 from exfit.models.blocks import Signal, clip, lead_lag
-from exfit.models.sheet import (
-    MOST_LAGS,
-    TIME,
-    documented,
-    limits,
-    record,
-    sheet,
-)
+from exfit.models.sheet import MOST_LAGS, TIME, documented, limits, record, sheet
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
     FILTERED_SPEED_AND_POWER,
@@ -93,13 +86,13 @@ PSS2B = documented(
             "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "
             "VSI2MIN VSTMAX VSTMIN",
             icons=FILTERED_SPEED_AND_POWER,
-        ),
-        record(
+        )
+        + record(
             "PSS2A",
             "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 VSTMAX VSTMIN",
             icons=FILTERED_SPEED_AND_POWER,
             held=PSS2A_HELD,
-        ),
+        )
     ),
     pslf_records=(
         record(
@@ -109,8 +102,8 @@ PSS2B = documented(
             icons=FILTERED_SPEED_AND_POWER,
             absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
             spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
-        ),
-        record(
+        )
+        + record(
             "pss2a",
             "ICS1 REMBUS1 ICS2 REMBUS2 TW1 TW2 TW3 TW4 T6 T7 KS2 KS3 KS4 T8 T9 N M KS1 T1 T2 T3 T4 "
             "VSTMAX VSTMIN A TA TB",
@@ -118,7 +111,7 @@ PSS2B = documented(
             absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
             held=PSS2A_HELD,
             spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
-        ),
+        )
     ),
 )
 
@@ -178,13 +171,11 @@ PSS2C = documented(
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 V1 V3 V10 V12 ON",
     inputs=("speed", "p"),
-    records=(
-        record(
-            "PSS2C",
-            "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "
-            "VSI2MIN VSTMAX VSTMIN T12 T13 PPSSON PPSSOFF XCOMP TCOMP",
-            icons=FILTERED_SPEED_AND_POWER,
-            ignored="XCOMP TCOMP",
-        ),
+    records=record(
+        "PSS2C",
+        "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "
+        "VSI2MIN VSTMAX VSTMIN T12 T13 PPSSON PPSSOFF XCOMP TCOMP",
+        icons=FILTERED_SPEED_AND_POWER,
+        ignored="XCOMP TCOMP",
     ),
 )

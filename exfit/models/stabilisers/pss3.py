@@ -76,12 +76,10 @@ PSS3B = documented(
     ),
     "V1 W1 V2 W2 W3 V3 DV3 V4 DV4",
     inputs=("p", "speed"),
-    records=(
-        record(
-            "PSS3B",
-            "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN",
-            icons=POWER_AND_SPEED,
-        ),
+    records=record(
+        "PSS3B",
+        "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN",
+        icons=POWER_AND_SPEED,
     ),
 )
 
@@ -126,14 +124,12 @@ PSS3C = documented(
     (*PSS3B.sheet, *SWITCH),
     "V1 W1 V2 W2 W3 V3 DV3 V4 DV4 ON",
     inputs=PSS3B.inputs,
-    records=(
-        record(
-            "PSS3C",
-            "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN PPSSON PPSSOFF XCOMP "
-            "TCOMP TPGFILT",
-            icons=POWER_AND_SPEED,
-            absent={"TPGFILT": 0.0},
-            ignored="XCOMP TCOMP",
-        ),
+    records=record(
+        "PSS3C",
+        "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN PPSSON PPSSOFF XCOMP "
+        "TCOMP TPGFILT",
+        icons=POWER_AND_SPEED,
+        absent={"TPGFILT": 0.0},
+        ignored="XCOMP TCOMP",
     ),
 )

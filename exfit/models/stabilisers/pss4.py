@@ -182,15 +182,13 @@ PSS4B = documented(
     "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
     "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6",
     inputs=("speed", "p"),
-    records=(
-        record(
-            "PSS4B",
-            "CLI DLI ALI BLI BWLI1 WLI1 BWLI2 WLI2 TH AH BH M BWH1 WH1 BWH2 WH2 KL1 KL11 TL1 TL2 "
-            "TL3 TL4 TL5 TL6 KL2 KL17 TL7 TL8 TL9 TL10 TL11 TL12 KL VLMAX VLMIN KI1 KI11 TI1 TI2 "
-            "TI3 TI4 TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN KH1 KH11 TH1 TH2 "
-            "TH3 TH4 TH5 TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN VSTMAX VSTMIN",
-            doubt="its power has the sign of IEC 61970-302",
-        ),
+    records=record(
+        "PSS4B",
+        "CLI DLI ALI BLI BWLI1 WLI1 BWLI2 WLI2 TH AH BH M BWH1 WH1 BWH2 WH2 KL1 KL11 TL1 TL2 TL3 "
+        "TL4 TL5 TL6 KL2 KL17 TL7 TL8 TL9 TL10 TL11 TL12 KL VLMAX VLMIN KI1 KI11 TI1 TI2 TI3 TI4 "
+        "TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN KH1 KH11 TH1 TH2 TH3 TH4 TH5 "
+        "TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN VSTMAX VSTMIN",
+        doubt="its power has the sign of IEC 61970-302",
     ),
 )
 
@@ -263,11 +261,9 @@ PSS4C = documented(
     "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6 VL1 VL2 VL3 VL4 VL5 VL6",
     doubt="rests on one public diagram, that of InterPSS",
     inputs=PSS4B.inputs,
-    records=(
-        record(
-            "PSS4C",
-            " ".join((*PSS4B.records[0].cons, *(row.symbol for row in VERY_LOW))),
-            doubt="PSS/E has no PSS4C: its order is that of PowerWorld's list of parameters",
-        ),
+    records=record(
+        "PSS4C",
+        " ".join((*PSS4B.records[0].cons, *(row.symbol for row in VERY_LOW))),
+        doubt="PSS/E has no PSS4C: its order is that of PowerWorld's list of parameters",
     ),
 )

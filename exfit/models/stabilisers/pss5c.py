@@ -57,13 +57,11 @@ SHEET = sheet(
     *of_stabiliser(VSTMAX=0.15, VSTMIN=-0.15),
 )
 
-RECORDS = (
-    record(
-        "PSS5C",
-        "KVL FVL VVLMAX VVLMIN KL FL VLMAX VLMIN KI FI VIMAX VIMIN KH FH VHMAX VHMIN K1 K2 K3 "
-        "VSTMAX VSTMIN",
-        doubt="PSS/E has no PSS5C: its order is that of PowerWorld's list of parameters",
-    ),
+RECORDS = record(
+    "PSS5C",
+    "KVL FVL VVLMAX VVLMIN KL FL VLMAX VLMIN KI FI VIMAX VIMIN KH FH VHMAX VHMIN K1 K2 K3 VSTMAX "
+    "VSTMIN",
+    doubt="PSS/E has no PSS5C: its order is that of PowerWorld's list of parameters",
 )
 
 STATES = "XLI YLI PH XH YH VL1 VL2 L1 L2 I1 I2 H1 H2"

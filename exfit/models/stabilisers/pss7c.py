@@ -53,9 +53,7 @@ INPUTS = ("speed", "p")
 
 SHEET = (
     *ACCELERATING,
-    *sheet(
-        *of_stabiliser(KS1=50.0, VSTMAX=0.05, VSTMIN=-0.05),
-    ),
+    *sheet(*of_stabiliser(KS1=50.0, VSTMAX=0.05, VSTMIN=-0.05)),
     *with_typical(
         CANONICAL,
         **{"K0": 0.399, "K1": 1.8462, "K2": 0.4231, "K3": 0.2104},
@@ -65,14 +63,12 @@ SHEET = (
     *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
 )
 
-RECORDS = (
-    record(
-        "PSS7C",
-        "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 VSI1MAX "
-        "VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
-        icons=FILTERED_SPEED_AND_POWER,
-        ignored="XCOMP TCOMP",
-    ),
+RECORDS = record(
+    "PSS7C",
+    "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 VSI1MAX "
+    "VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
+    icons=FILTERED_SPEED_AND_POWER,
+    ignored="XCOMP TCOMP",
 )
 
 STATES = "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 X1 X2 X3 X4 ON"

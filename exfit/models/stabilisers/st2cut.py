@@ -36,13 +36,11 @@ SHEET = sheet(
     *of_stabiliser(LSMAX=0.1, LSMIN=-0.1),
 )
 
-RECORDS = (
-    record(
-        "ST2CUT",
-        "K1 K2 T1 T2 T3 T4 T5 T6 T7 T8 T9 T10 LSMAX LSMIN VCU VCL",
-        icons=SPEED_AND_POWER,
-        absent={"VCU": 0.0, "VCL": 0.0},
-    ),
+RECORDS = record(
+    "ST2CUT",
+    "K1 K2 T1 T2 T3 T4 T5 T6 T7 T8 T9 T10 LSMAX LSMIN VCU VCL",
+    icons=SPEED_AND_POWER,
+    absent={"VCU": 0.0, "VCL": 0.0},
 )
 
 STATES = "V1 V2 V3 V4 V5 V6"

@@ -23,7 +23,7 @@ SHEET = sheet(
     *of_stabiliser(T4=0.05, HLIM=0.05),
 )
 
-RECORDS = (record("STAB1", "K_T T T1_T3 T3 T2_T4 T4 HLIM"),)
+RECORDS = record("STAB1", "K_T T T1_T3 T3 T2_T4 T4 HLIM")
 
 STATES = "V1 V2 V3"
 

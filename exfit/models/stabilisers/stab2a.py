@@ -29,13 +29,7 @@ SHEET = sheet(
     *of_stabiliser(HLIM=0.05),
 )
 
-RECORDS = (
-    record(
-        "STAB2A",
-        "K2 T2 K3 T3 K4 K5 T5 HLIM",
-        doubt="its order is from one public source",
-    ),
-)
+RECORDS = record("STAB2A", "K2 T2 K3 T3 K4 K5 T5 HLIM", doubt="its order is from one public source")
 
 STATES = "W1 W2 W3 V3 V5 V6"
 
