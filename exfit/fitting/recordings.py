@@ -36,8 +36,7 @@ from exfit.util.sorting import median
 from exfit.util.text import show
 
 if TYPE_CHECKING:
-    from exfit.records.phasors import Phasors
-    from exfit.records.status import Status
+    from exfit.records.phasors import Phasors, Status
 
 
 Array = NDArray[np.float64]
@@ -194,7 +193,7 @@ def phasors_of(section: PhasorsSection) -> "Phasors":
 
 
 def _status_of(section: StatusSection) -> "Status":
-    from exfit.records.status import Status
+    from exfit.records.phasors import Status
 
     return Status(section.column, tuple(map(str, section.accept)))
 

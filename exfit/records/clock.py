@@ -13,11 +13,10 @@ from exfit.records.units import SECONDS, alike, bare, usual
 from exfit.util.sorting import median
 from exfit.util.text import LARGEST
 
-TIMESTAMP_NAMES = frozenset(  # date and time of day in one column
-    ("timestamp", "zeitstempel", "zeitpunkt", "datetime", "date_time", "date_&_time",
-     "date_+_time", "date+time", "time_stamp", "time_date")
-)  # fmt: skip
-DATE_NAMES = frozenset(("date", "datum", "fecha"))
+TIMESTAMP_NAME = re.compile(  # date and time of day in one column
+    r"zeitstempel|zeitpunkt|time_?stamp|datetime|date(?:_|_?\+_?|_&_)time|time_date"
+)
+DATE_NAME = re.compile(r"date|datum|fecha")
 TIME_NAME = re.compile(
     r"t|time|tout|zeit|uhrzeit|tiempo|hora|temps|tempo|tijd|tid|utc|x_value|time_of_day"
     r"|(?:rel|abs|elapsed)[a-z]*_?(?:time|zeit)"
@@ -56,22 +55,16 @@ def find_clock(
     """
     for endings in (names, [name.rpartition(".")[2] for name in names]):
         words = [WORD_SEPARATOR.sub("_", bare(ending).casefold()) for ending in endings]
-        named = _by_name(dict(zip(names, words, strict=True)))
-        if named:
-            return named
+        whole, dates, times, seconds, fractions = (
+            [name for name, word in zip(names, words, strict=True) if kind.fullmatch(word)]
+            for kind in (TIMESTAMP_NAME, DATE_NAME, TIME_NAME, SOC_NAME, FRACTION_NAME)
+        )
+        if seconds and fractions:
+            return seconds[0], fractions[0]
+        if whole or dates or times:
+            return tuple(whole[:1] or dates[:1] + times[:1])
     candidates = (tuple(columns) for columns in (stamps[:2], stamps[:1], names[:1]))
     return next((columns for columns in candidates if columns and increases(columns)), ())
-
-
-def _by_name(words: dict[str, str]) -> tuple[str, ...]:
-    """Return the columns of the time, given the plain words of each name."""
-    soc = soc_columns(words)
-    if soc:
-        return soc
-    stamps = [name for name, word in words.items() if word in TIMESTAMP_NAMES]
-    dates = [name for name, word in words.items() if word in DATE_NAMES]
-    times = [name for name, word in words.items() if TIME_NAME.fullmatch(word)]
-    return tuple(stamps[:1] or dates[:1] + times[:1])
 
 
 def in_seconds(
@@ -154,13 +147,6 @@ class EpochError(ValueError):
     def __init__(self, column: int, text: str) -> None:
         super().__init__(text)
         self.column = column
-
-
-def soc_columns(words: dict[str, str]) -> tuple[str, ...]:
-    """Return the columns of SOC and FRACSEC, given the plain words of each name, or none."""
-    seconds = [name for name, word in words.items() if SOC_NAME.fullmatch(word)]
-    fractions = [name for name, word in words.items() if FRACTION_NAME.fullmatch(word)]
-    return (seconds[0], fractions[0]) if seconds and fractions else ()
 
 
 def are_soc(columns: Sequence[str]) -> bool:

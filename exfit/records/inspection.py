@@ -13,7 +13,6 @@ from exfit.dsp.jumps import rest_end
 from exfit.dsp.quality import mains_frequency
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
-from exfit.records.angles import angle_findings, in_radians
 from exfit.records.channel_identity import identified
 from exfit.records.channel_inspection import (
     PLACES_LISTED,
@@ -33,10 +32,10 @@ from exfit.records.formats.table import (
     listed,
     refuse_uneven,
 )
+from exfit.records.phasors import Status, angle_findings, bad_rows, in_radians
 from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
-from exfit.records.status import Status, bad_rows
 from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
 from exfit.records.units import unit_in, usual
 from exfit.signals import OF_EVENT

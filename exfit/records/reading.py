@@ -1,7 +1,7 @@
 """Read a record: the columns of a recorder's file become signals per unit."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
@@ -10,13 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import (
-    Clock,
-    check_finite,
-    check_increasing,
-    check_steps,
-    why_unusable,
-)
+from exfit.records.clock import Clock, check_finite, check_increasing, check_steps, why_unusable
 from exfit.records.formats import open_table
 from exfit.records.formats.table import NONE, RecordTable, column_error, read_bytes, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
@@ -26,8 +20,7 @@ from exfit.util.text import LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from exfit.dsp.three_phase import Connection
-    from exfit.records.phasors import Phasors
-    from exfit.records.status import Status
+    from exfit.records.phasors import Phasors, Status
 
 Rows = NDArray[np.intp]
 Repeats = Literal["refuse", "first", "last"]
@@ -74,16 +67,6 @@ class ThreePhases(NamedTuple):
     cycles: int
 
 
-class _PhaseVoltage(NamedTuple):
-    """The voltage (M,) per unit of three phases, nan where it was not looked at.
-
-    ``window`` (s) is what it is averaged over, None where it is not.
-    """
-
-    samples: Array
-    window: float | None
-
-
 def read_record(
     path: Path,
     clock: Clock,
@@ -124,43 +107,60 @@ def read_record(
             any, waveforms that are none, a record that cannot be resampled, a row that its flags
             call bad where no sample may be missing, or an angle whose turns cannot be counted.
     """
-    from exfit.records.phasors import PhasorTable
-
-    file = open_table(path, sheet, memory)
-    table = file if phasors is None else PhasorTable(file, phasors)
+    table = open_table(path, sheet, memory)
     _check_units(table, channels, per_unit)
-    time = _instants(table, clock)
+    time = table.instants(clock.columns, clock.unit)
+    check_finite(time, clock.label, table.place)
+    check_increasing(time, clock.label, table.place, may_repeat=True)
+    check_steps(time, clock.label, table.place)
     names = [name for channel in channels.values() for name in _column_names(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
-    columns = table.numbers(dict.fromkeys(names), gappy)
+    if phasors is None:
+        columns = table.numbers(dict.fromkeys(names), gappy)
+    else:
+        from exfit.records.phasors import numbers_with_phasors
+
+        columns = numbers_with_phasors(table, phasors, dict.fromkeys(names), gappy)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
     rows = _rows_in_window(path, time, window)
     rows, notes = _without_repeats(table, clock, time, columns, rows, repeats)
     if status is not None:
-        _leave_out(file, status, columns, rows, missing)
+        from exfit.records.phasors import leave_out_bad
+
+        leave_out_bad(table, status, columns, rows, missing)
     voltages = {
         name: _of_phases(table, time, columns, channel, rows)
         for name, channel in channels.items()
         if isinstance(channel, ThreePhases)
     }
-    rows = _within_windows(voltages.values(), rows)
+    averaged = {name: window for name, (_, window) in voltages.items() if window is not None}
+    for name in averaged:
+        rows = rows[np.isfinite(voltages[name][0][rows])]
     signals = {
-        name: voltages[name].samples[rows]
+        name: voltages[name][0][rows]
         if isinstance(channel, ThreePhases)
         else _signal(table, channel, columns[channel.column], rows, missing)
         for name, channel in channels.items()
     }
-    time = time[rows]
     if ANGLE in signals:
-        signals[ANGLE] = _smooth_angle(table, channels[ANGLE], signals[ANGLE], rows)
+        from exfit.records.phasors import smooth_angle
+
+        column = _column_names(channels[ANGLE])[0]
+        signals[ANGLE] = smooth_angle(table, column, signals[ANGLE], rows)
+    time = time[rows]
     if rate is not None:
-        time, signals = _resampled(path, time, signals, rate)
+        from exfit.dsp.resampling import resampled
+
+        try:
+            time, signals = resampled(time, signals, rate)
+        except ValueError as fault:
+            raise RecordError(f"{path}: resample: {fault}") from None
     return Record(
         read_only(time),
         MappingProxyType({name: read_only(signal) for name, signal in signals.items()}),
         path,
         table.sha256,
-        {name: voltage.window for name, voltage in voltages.items() if voltage.window is not None},
+        averaged,
         notes,
     )
 
@@ -174,21 +174,42 @@ def _column_names(channel: ChannelLike | ThreePhases) -> tuple[str, ...]:
     return channel.columns if isinstance(channel, ThreePhases) else (channel.column,)
 
 
-def _within_windows(voltages: Iterable[_PhaseVoltage], rows: Rows) -> Rows:
-    """Select the rows in which every voltage of waveforms is known."""
-    for voltage in voltages:
-        if voltage.window is not None:
-            rows = rows[np.isfinite(voltage.samples[rows])]
+def _check_units(
+    table: RecordTable, channels: Mapping[str, ChannelLike | ThreePhases], per_unit: frozenset[str]
+) -> None:
+    """Raise a RecordError for a column that the file says to be in another unit."""
+    for signal, channel in channels.items():
+        for column in _column_names(channel):
+            unit, own = table.units.get(column), unit_of_signal(signal)
+            if unit is None:
+                continue
+            remedy = ""
+            if channel.unit is not None and not alike(unit, channel.unit):
+                remedy = f"not in {channel.unit}"
+            elif signal in per_unit and needs_base(own) and not alike(unit, own):
+                remedy = f"not in {own}: give {signal} unit: {unit}"
+            elif signal in per_unit and not needs_base(own) and unit_of(unit) and needs_base(unit):
+                scaling = (
+                    f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
+                    if usual(unit) == PERCENT
+                    else f"unit: {unit} and base: what 1 pu is in {unit}"
+                )
+                remedy = f"and not per unit: give {signal} {scaling}"
+            if remedy:
+                raise column_error(table.path, column, f"in {unit} as the file says, {remedy}")
+
+
+def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Rows:
+    """Return the rows in the window."""
+    start, end = window or (time[0], time[-1])
+    rows = np.flatnonzero((time >= start) & (time <= end))
+    if rows.size < FEWEST_SAMPLES:
+        place = f" in the window {start:g} ... {end:g} s" if window else ""
+        raise RecordError(
+            f"{path}: {rows.size} of {time.size} samples ({time[0]:g} ... {time[-1]:g} s)"
+            f"{place}; at least {FEWEST_SAMPLES} are needed"
+        )
     return rows
-
-
-def _instants(table: RecordTable, clock: Clock) -> Array:
-    """Return the time (M,) in s, which may repeat; raises RecordError where it goes back."""
-    time = table.instants(clock.columns, clock.unit)
-    check_finite(time, clock.label, table.place)
-    check_increasing(time, clock.label, table.place, may_repeat=True)
-    check_steps(time, clock.label, table.place)
-    return time
 
 
 def _without_repeats(
@@ -223,42 +244,13 @@ def _without_repeats(
     return rows[~np.isin(rows, left_out)], (text,)
 
 
-def _smooth_angle(
-    table: RecordTable, channel: ChannelLike | ThreePhases, angle: Array, rows: Rows
-) -> Array:
-    """Return the angle (M,) in the given rows without jumps by whole turns."""
-    from exfit.records.phasors import smooth_angle
-
-    label = f"column {_column_names(channel)[0]!r}"
-    return smooth_angle(lambda row: table.place(int(rows[row])), label, angle)
-
-
-def _leave_out(
-    table: RecordTable, status: "Status", columns: dict[str, Array], rows: Rows, missing: bool
-) -> None:
-    """Put nan into those of the given rows that their flags call bad.
-
-    Raises RecordError where no sample may be missing.
-    """
-    from exfit.records.status import bad_rows, status_error
-
-    considered = {*map(int, rows)}
-    bad = [row for row in bad_rows(table, status) if row.row in considered]
-    if not bad:
-        return
-    if not missing:
-        raise status_error(table, status, bad)
-    for name, column in columns.items():
-        columns[name] = np.array(column)
-        columns[name][[row.row for row in bad]] = np.nan
-
-
 def _of_phases(
     table: RecordTable, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
-) -> _PhaseVoltage:
-    """Return the voltage of three phases at the given rows.
+) -> tuple[Array, float | None]:
+    """Return the voltage (M,) per unit of three phases, nan but at the given rows.
 
-    Raises RecordError where the columns are not the three phases of one voltage.
+    With it comes the window (s) of waveforms, over which it is averaged. Raises RecordError where
+    the columns are not the three phases of one voltage.
     """
     from exfit.dsp.three_phase import vt_of_rms, vt_of_waveforms
 
@@ -272,65 +264,13 @@ def _of_phases(
     try:
         if channel.kind == "rms":
             samples[rows] = vt_of_rms(phases, *rating)
-            return _PhaseVoltage(samples, None)
+            return samples, None
         phasor = vt_of_waveforms(time[rows], phases, *rating, channel.cycles)
     except ValueError as fault:
         names = ", ".join(map(repr, channel.columns))
         raise RecordError(f"{table.path}: columns {names}: {fault}") from None
     samples[rows[phasor.rows]] = phasor.voltage
-    return _PhaseVoltage(samples, phasor.window)
-
-
-def _resampled(
-    path: Path, time: Array, signals: Mapping[str, Array], rate: float
-) -> tuple[Array, dict[str, Array]]:
-    """Return a record on a slower, even clock; raises RecordError where that cannot be."""
-    from exfit.dsp.resampling import resampled
-
-    try:
-        return resampled(time, signals, rate)
-    except ValueError as fault:
-        raise RecordError(f"{path}: resample: {fault}") from None
-
-
-def _check_units(
-    table: RecordTable, channels: Mapping[str, ChannelLike | ThreePhases], per_unit: frozenset[str]
-) -> None:
-    """Raise a RecordError for a column that the file says to be in another unit."""
-    for signal, channel in channels.items():
-        for column in _column_names(channel):
-            unit = table.units.get(column)
-            if unit is None:
-                continue
-            if channel.unit is not None and not alike(unit, channel.unit):
-                what = f"in {unit} as the file says, not in {channel.unit}"
-                raise column_error(table.path, column, what)
-            own = unit_of_signal(signal)
-            if signal in per_unit and needs_base(own):
-                if not alike(unit, own):
-                    what = f"in {unit} as the file says, not in {own}: give {signal} unit: {unit}"
-                    raise column_error(table.path, column, what)
-            elif signal in per_unit and unit_of(unit) and needs_base(unit):
-                scaling = (
-                    f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
-                    if usual(unit) == PERCENT
-                    else f"unit: {unit} and base: what 1 pu is in {unit}"
-                )
-                what = f"in {unit} as the file says, and not per unit: give {signal} {scaling}"
-                raise column_error(table.path, column, what)
-
-
-def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Rows:
-    """Return the rows in the window."""
-    start, end = window or (time[0], time[-1])
-    rows = np.flatnonzero((time >= start) & (time <= end))
-    if rows.size < FEWEST_SAMPLES:
-        place = f" in the window {start:g} ... {end:g} s" if window else ""
-        raise RecordError(
-            f"{path}: {rows.size} of {time.size} samples ({time[0]:g} ... {time[-1]:g} s)"
-            f"{place}; at least {FEWEST_SAMPLES} are needed"
-        )
-    return rows
+    return samples, phasor.window
 
 
 def _signal(

@@ -73,10 +73,23 @@ class Record:
                 f"{source}: {len(instants)} samples; at least {FEWEST_SAMPLES} are needed"
             )
         for name, values in {"time": instants, **samples}.items():
-            _check_samples(source, name, values, len(instants), missing and name in samples)
+            if len(values) != len(instants):
+                count = f"{len(values)} samples, but time has {len(instants)}"
+                raise RecordError(f"{source}: {name}: {count}")
+            gaps = np.isnan(values) & (missing and name in samples)
+            if gaps.all():
+                raise RecordError(f"{source}: {name}: every sample is missing")
+            lost = np.flatnonzero(~(np.abs(values) <= LARGEST) & ~gaps)
+            if lost.size:
+                number = values[lost[0]]
+                what = f"{name}: {number} {why_unusable(number)}"
+                raise RecordError(f"{source}: sample {lost[0]}: {what}")
         check_increasing(instants, "time", lambda row: f"{source}: sample {row}")
         check_steps(instants, "time", lambda row: f"{source}: sample {row}")
-        return cls(instants, MappingProxyType(samples), source, _content_hash(instants, samples))
+        digest = hashlib.sha256(instants.astype("<f8").tobytes())
+        for name in sorted(samples):
+            digest.update(b"\0" + name.encode() + b"\0" + samples[name].astype("<f8").tobytes())
+        return cls(instants, MappingProxyType(samples), source, digest.hexdigest())
 
 
 def read_only(values: Array) -> Array:
@@ -94,25 +107,3 @@ def _real_array(source: Path, name: str, values: ArrayLike) -> Array:
     if not np.can_cast(given.dtype, np.float64, "same_kind"):
         raise RecordError(f"{source}: {name}: {given.dtype} in place of real numbers")
     return read_only(np.array(given, np.float64))
-
-
-def _check_samples(source: Path, name: str, values: Array, count: int, missing: bool) -> None:
-    """Raise a RecordError where an array is of another length than the time or not finite."""
-    if len(values) != count:
-        raise RecordError(f"{source}: {name}: {len(values)} samples, but time has {count}")
-    gaps = np.isnan(values) & missing
-    if gaps.all():
-        raise RecordError(f"{source}: {name}: every sample is missing")
-    lost = np.flatnonzero(~(np.abs(values) <= LARGEST) & ~gaps)
-    if lost.size:
-        row = lost[0]
-        what = f"{values[row]} {why_unusable(values[row])}"
-        raise RecordError(f"{source}: sample {row}: {name}: {what}")
-
-
-def _content_hash(time: Array, signals: Mapping[str, Array]) -> str:
-    """Return the SHA-256 of a record without a file, whatever the order of its signals."""
-    digest = hashlib.sha256(time.astype("<f8").tobytes())
-    for name in sorted(signals):
-        digest.update(b"\0" + name.encode() + b"\0" + signals[name].astype("<f8").tobytes())
-    return digest.hexdigest()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.records.angles import AngleError, in_radians, unit_by_range, unwrapped
+from exfit.records.phasors import AngleError, in_radians, unit_by_range, unwrapped
 
 TIME = np.arange(0.0, 10.0, 1.0 / 30.0)
 ANGLE = 2.0 * np.pi * 0.4 * TIME + 0.2 * np.sin(TIME)  # rad

@@ -6,8 +6,8 @@ from math import sqrt
 from exfit.case.case_draft import Noted, Remark, Section, in_braces
 from exfit.case.suggestion import Base, channel_entry, record_of, rounded
 from exfit.case.yaml import QUESTION
-from exfit.records.angles import unit_by_range
 from exfit.records.inspection import Inspection
+from exfit.records.phasors import unit_by_range
 from exfit.records.pmu_recognition import InspectedPhasor, PmuContent
 from exfit.records.units import quantity_of, scale_between
 from exfit.signals import COMPARED_IN_EVENT, OF_CURRENT_PHASOR, PHASOR_COLUMNS, SIGNALS
