@@ -1,13 +1,62 @@
-"""The signal of each column by its name and unit, and how surely it is that signal."""
+"""The signal of each column by its name and unit, and how surely it is that signal.
+
+Recorders, simulators and five languages make the names of channels of words that stand here without
+accents, in small letters: läufer as laufer, tensão as tensao. What a signal is called as a whole,
+as efd or ug, stands in its row of the table of signals.
+"""
 
 import re
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 
 from exfit.records.units import OTHER_UNITS, bare, quantity_of
-from exfit.records.vocabulary import KINDS, folded, tokens, words_of
 from exfit.signals import ROWS, SIGNALS, SignalRow
+
+# kind -> its words; those of `otherwise` are of channels that are none of the signals
+WORDS: Mapping[str, str] = {
+    "filler": """
+        rel relative avg average mean mittel mittelwert rms eff meas measured ist istwert actual pv
+        filt main active real activa ativa wirk blind mag magnitude dc elec electrical el""",
+    "voltage": """
+        voltage volt volts vlt v u kv vdc vac vcc vll spannung spg tension tensao voltaje
+        voltagem""",
+    "current": """
+        current curr cur amp amps ampere amperes i ka adc strom courant corriente corrente intensite
+        intensidad""",
+    "power": "power load watt watts mw kw leistung wirkleistung puissance potencia",
+    "reactive": "reactive var vars mvar mvars kvar blindleistung reactiva reativa",
+    "stator": """
+        gen generator generatoren generador gerador generateur alternateur alternador alternator
+        stator estator statorique estatorica stander anker armature machine maschine maschinen
+        maquina terminal terminals term bornes klemmen klemme klemm trm""",
+    "field": """
+        field fld feld rotor rot rotors rotorique rotorica laufer polrad champ campo fd slip
+        schleifring bridge""",
+    "excitation": "excitation exc excit erreger erregung err excitacion excitacao",
+    "exciter": "exciter exciters excitatrice excitatriz excitadora pilot erregermaschine",
+    "grid": """
+        bus busbar grid network netz reseau red rede barra barras hv ehv sammelschiene system mains
+        infinite""",
+    "reference": """
+        ref reference referenz referencia setpoint setpt setval sp soll sollwert set consigne
+        consigna""",
+    "speed": "speed spd drehzahl vitesse velocidad velocidade rpm",
+    "output": "output out ausgang salida saida sortie",
+    "otherwise": """
+        temp temperature temperatur temperatura limit limits lim limite limiter uel oel max
+        min error deviation abweichung regelabweichung firing angle winkel freq frequency
+        frequenz frequence frecuencia frequencia hz hertz gate valve breaker position factor
+        pf cos trafo transformer transformador transformateur transformator neutral governor
+        turbine pressure vibration trigger status alarm control ctrl steuersatz apparent mva
+        scheinleistung spare""",
+}
+SHORT = frozenset("uvipq")  # letters that begin a word, as in ugen and ifeld
+LINKING = ("s", "n", "en")  # letters between the parts of a German word
+KINDS: Mapping[str, str] = {word: kind for kind, text in WORDS.items() for word in text.split()}
+CAPITAL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")  # where a word of a name begins
 
 EXCITER_FIELD = "that of the field of a brushless exciter"
 CONTROL_ERROR = "a control error"
@@ -16,6 +65,8 @@ OF_SPEED = ("rpm", "r/min", "1/min", "min-1", "U/min", "rad/s")
 RATIOS = ("%", "-")  # units that a signal of any quantity may have
 DOUBTS: Mapping[str, tuple[str, ...]] = {"ue": (EXCITER_FIELD,), "ie": (EXCITER_FIELD,)}
 POWERS = ("power", "reactive")
+OF_FIELD = frozenset(("field", "excitation"))
+OF_OTHERS = OF_FIELD | {"speed"}  # references, that are none of the voltage
 # words of other columns -> with which others they are a signal after all, and what else it may be
 EXCEPTIONS = {
     "grid": ("stator", "stator", "a voltage of the grid"),
@@ -72,135 +123,27 @@ class NameReading:
 
 def read_name(name: str, unit: str | None) -> NameReading:
     """Read the name and the unit of a column for the signal that it is."""
-    program = _of_program(name)
-    if program is not None:
-        return program
-    words = words_of(bare(name))
+    reading = _of_program(bare(name).strip())
+    if reading is not None:
+        return reading
+    whole, words = " ".join(tokens(bare(name))), words_of(bare(name))
     kinds = {KINDS[word]: word for word in reversed(words) if word in KINDS}
-    reading = _whole(" ".join(tokens(bare(name)))) or _by_words(words, kinds, unit)
+    named = (row for row in ROWS if whole in map(folded, row.words))
+    row = next(named, None)
+    if row is not None:  # an own word of a signal, though it may be joined of others
+        order = [folded(word) for word in row.words].index(whole)
+        doubts = DOUBTS.get(whole, ())
+        reading = NameReading(row.symbol, Clarity.OWN, _named(whole), doubts, order)
+    else:
+        reading = _by_words(_own(words), kinds, unit)
     row = SIGNALS.get(reading.signal or "")
     if row is not None and not _fits(unit, row):
-        return NameReading(None, Clarity.NONE, f"{unit} is no unit of {row.symbol}")
+        return _none(f"{unit} is no unit of {row.symbol}")
     return reading
 
 
-def _whole(text: str) -> NameReading | None:
-    """Return the signal of which a name is an own word, though it may be joined of others."""
-    for row in ROWS:
-        own = [folded(word) for word in row.words]
-        if text in own:
-            doubts = DOUBTS.get(text, ())
-            return NameReading(row.symbol, Clarity.OWN, _named(text), doubts, own.index(text))
-    return None
-
-
-def _by_words(words: tuple[str, ...], kinds: Mapping[str, str], unit: str | None) -> NameReading:
-    own = _own(words)
-    if own is not None and own.signal == "vs":
-        if "stator" in kinds and own.why == _named("vs"):  # vs is that of the stator then
-            return NameReading(None, Clarity.NONE, own.why, ("vt", "vs"))
-        return own
-    quantity = _quantity(kinds) or quantity_of(unit)
-    if "speed" in kinds and "reference" not in kinds:
-        return NameReading("speed", Clarity.OWN, _named(kinds["speed"]))
-    if "otherwise" in kinds:
-        return NameReading(None, Clarity.NONE, _named(kinds["otherwise"]))
-    if EXCEPTIONS.keys() & kinds.keys():
-        return _elsewhere(kinds, quantity)
-    if "reference" in kinds:
-        return _reference(kinds, quantity)
-    if "excitation" in kinds and quantity not in POWERS:
-        return _excitation(kinds, quantity, own)
-    return own or _by_place(kinds, quantity)
-
-
-def _elsewhere(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
-    """Return no signal for the grid, an exciter or an output, but for some that may be one.
-
-    A generator's bus has the terminal voltage, and an exciter's output is the field voltage.
-    """
-    for kind, (other, place, doubt) in EXCEPTIONS.items():
-        if kind in kinds:
-            row = _row(quantity or "", place) if other in kinds else None
-            why = _named(kinds[kind], *([kinds[other]] if row else []))
-            if row is None:
-                return NameReading(None, Clarity.NONE, why)
-            return NameReading(row.symbol, Clarity.VAGUE, why, (doubt,))
-    return NameReading(None, Clarity.NONE, "")
-
-
-def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
-    """Read the words for a quantity and for a place together."""
-    if quantity in POWERS:
-        return _power(kinds, quantity)
-    place = next((place for place in ("field", "stator") if place in kinds), "")
-    row = _row(quantity or "", place)
-    if row is not None and place:
-        what = _named(*(kinds[kind] for kind in (row.quantity, place) if kind in kinds))
-        return NameReading(row.symbol, Clarity.WORDS, what)
-    if place == "field":
-        return NameReading(None, Clarity.NONE, _named(kinds[place]), ("efd", "ifd"))
-    return _without_place(kinds)
-
-
-def _without_place(kinds: Mapping[str, str]) -> NameReading:
-    """Read a word for a quantity by itself."""
-    if "voltage" in kinds and "current" not in kinds:
-        return NameReading("vt", Clarity.QUANTITY, _named(kinds["voltage"]))
-    if "current" in kinds and "voltage" not in kinds:
-        return NameReading(None, Clarity.NONE, _named(kinds["current"]), ("ifd", "it"))
-    return NameReading(None, Clarity.NONE, "")
-
-
-def _excitation(
-    kinds: Mapping[str, str], quantity: str | None, own: NameReading | None
-) -> NameReading:
-    """Return the field's voltage or current, which may be that of a brushless exciter's field."""
-    row = _row(quantity or "", "field")
-    signal = row.symbol if row else own.signal if own else None
-    word = kinds["excitation"]
-    if signal is None:
-        return NameReading(None, Clarity.NONE, _named(word), ("efd", "ifd"))
-    if "field" in kinds and word not in AMBIGUOUS_EXCITATION:
-        return NameReading(signal, Clarity.WORDS, _named(word, kinds["field"]))
-    others = (CONTROL_ERROR,) if word == "err" else (EXCITER_FIELD,)
-    return NameReading(signal, Clarity.VAGUE, _named(word), others)
-
-
-def _power(kinds: Mapping[str, str], quantity: str) -> NameReading:
-    if {"field", "excitation"} & kinds.keys():
-        return NameReading(None, Clarity.NONE, _named(*kinds.values()))
-    signal = "p" if quantity == "power" else "q"
-    if quantity in kinds:
-        return NameReading(signal, Clarity.WORDS, _named(kinds[quantity]))
-    return NameReading(signal, Clarity.UNIT, "")
-
-
-def _reference(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
-    """Return the reference of the voltage; that of power or of a field current is no signal."""
-    word = kinds.get("reference", "vref")
-    if quantity not in (None, "voltage") or {"field", "excitation", "speed"} & kinds.keys():
-        return NameReading(None, Clarity.NONE, _named(word))
-    return NameReading("vref", Clarity.OWN, _named(word))
-
-
-def _own(words: tuple[str, ...]) -> NameReading | None:
-    """Return the signal whose own words a name holds, the surest words first."""
-    text = f" {' '.join(words)} "
-    readings = [
-        NameReading(row.symbol, clarity, _named(word), DOUBTS.get(word, ()), order)
-        for row in ROWS
-        for clarity, own in ((Clarity.OWN, row.words), (Clarity.VAGUE, row.vague_words))
-        for order, word in enumerate(own)
-        if f" {folded(word)} " in text
-    ]
-    longest = sorted(readings, key=lambda reading: (reading.clarity, -len(reading.why)))
-    return longest[0] if longest else None
-
-
-def _of_program(name: str) -> NameReading | None:
+def _of_program(text: str) -> NameReading | None:
     """Read the name of a channel by the names that planning programs give."""
-    text = bare(name).strip()
     channel = PSSE.fullmatch(text)
     if channel is not None:
         signal = PSSE_CHANNELS.get(channel["name"])
@@ -214,17 +157,104 @@ def _of_program(name: str) -> NameReading | None:
     return NameReading(signal, Clarity.OWN, f"PowerFactory's {variable['name']}")
 
 
+def _own(words: tuple[str, ...]) -> NameReading | None:
+    """Return the signal whose own words a name holds, the surest words first."""
+    text = f" {' '.join(words)} "
+    readings = [
+        NameReading(row.symbol, clarity, _named(word), DOUBTS.get(word, ()), order)
+        for row in ROWS
+        for clarity, own in ((Clarity.OWN, row.words), (Clarity.VAGUE, row.vague_words))
+        for order, word in enumerate(own)
+        if f" {folded(word)} " in text
+    ]
+    return min(readings, key=lambda reading: (reading.clarity, -len(reading.why)), default=None)
+
+
+def _by_words(own: NameReading | None, kinds: Mapping[str, str], unit: str | None) -> NameReading:
+    """Read a name by the ``kinds`` of its words, a word each, and by its ``own`` ones."""
+    if own is not None and own.signal == "vs":
+        of_stator = "stator" in kinds and own.why == _named("vs")
+        return _none(own.why, "vt", "vs") if of_stator else own
+    quantity = _quantity(kinds) or quantity_of(unit)
+    if "speed" in kinds and "reference" not in kinds:
+        return NameReading("speed", Clarity.OWN, _named(kinds["speed"]))
+    if "otherwise" in kinds:
+        return _none(_named(kinds["otherwise"]))
+    if EXCEPTIONS.keys() & kinds.keys():
+        return _elsewhere(kinds, quantity)
+    if "reference" in kinds:
+        why = _named(kinds["reference"])
+        of_others = quantity not in (None, "voltage") or OF_OTHERS & kinds.keys()
+        return _none(why) if of_others else NameReading("vref", Clarity.OWN, why)
+    if "excitation" in kinds and quantity not in POWERS:
+        return _excitation(kinds, quantity, own)
+    return own or _by_place(kinds, quantity)
+
+
+def _elsewhere(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
+    """Return no signal for the grid, an exciter or an output, but for some that may be one.
+
+    A generator's bus has the terminal voltage, and an exciter's output is the field voltage.
+    """
+    kind = next(kind for kind in EXCEPTIONS if kind in kinds)
+    other, place, doubt = EXCEPTIONS[kind]
+    row = _row(quantity, place) if other in kinds else None
+    if row is None:
+        return _none(_named(kinds[kind]))
+    return NameReading(row.symbol, Clarity.VAGUE, _named(kinds[kind], kinds[other]), (doubt,))
+
+
+def _excitation(
+    kinds: Mapping[str, str], quantity: str | None, own: NameReading | None
+) -> NameReading:
+    """Return the field's voltage or current, which may be that of a brushless exciter's field."""
+    row, word = _row(quantity, "field"), kinds["excitation"]
+    signal = row.symbol if row else own.signal if own else None
+    if signal is None:
+        return _none(_named(word), "efd", "ifd")
+    if "field" in kinds and word not in AMBIGUOUS_EXCITATION:
+        return NameReading(signal, Clarity.WORDS, _named(word, kinds["field"]))
+    others = (CONTROL_ERROR,) if word == "err" else (EXCITER_FIELD,)
+    return NameReading(signal, Clarity.VAGUE, _named(word), others)
+
+
+def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
+    """Read the words for a quantity and for a place together, or for one of them."""
+    if quantity in POWERS:
+        if OF_FIELD & kinds.keys():
+            return _none(_named(*kinds.values()))
+        clarity = Clarity.WORDS if quantity in kinds else Clarity.UNIT
+        why = _named(kinds[quantity]) if quantity in kinds else ""
+        return NameReading("p" if quantity == "power" else "q", clarity, why)
+    place = "field" if "field" in kinds else "stator" if "stator" in kinds else ""
+    row = _row(quantity, place)
+    if row is not None and place:
+        what = _named(*(kinds[kind] for kind in (row.quantity, place) if kind in kinds))
+        return NameReading(row.symbol, Clarity.WORDS, what)
+    if place == "field":
+        return _none(_named(kinds[place]), "efd", "ifd")
+    electric = kinds.keys() & {"voltage", "current"}
+    if electric == {"voltage"}:
+        return NameReading("vt", Clarity.QUANTITY, _named(kinds["voltage"]))
+    return _none(_named(kinds["current"]), "ifd", "it") if electric == {"current"} else _none("")
+
+
+def _none(why: str, *others: str) -> NameReading:
+    """Read no signal in a name, though it may be one of ``others``."""
+    return NameReading(None, Clarity.NONE, why, others)
+
+
 def _quantity(kinds: Mapping[str, str]) -> str | None:
     """Find the quantity that a name says to be measured; None for none, or two."""
     for quantity in reversed(POWERS):  # a reactive power is none that is active
         if quantity in kinds:
             return quantity
-    electric = [quantity for quantity in ("voltage", "current") if quantity in kinds]
-    return electric[0] if len(electric) == 1 else None
+    electric = kinds.keys() & {"voltage", "current"}
+    return str(*electric) if len(electric) == 1 else None
 
 
-def _row(quantity: str, place: str) -> SignalRow | None:
-    rows = (row for row in ROWS if (row.quantity, row.place) == (quantity, place))
+def _row(quantity: str | None, place: str) -> SignalRow | None:
+    rows = (row for row in ROWS if (row.quantity, row.place) == (quantity or "", place))
     return next(rows, None)
 
 
@@ -239,6 +269,53 @@ def _fits(unit: str | None, row: SignalRow) -> bool:
 
 def _named(*words: str) -> str:
     return f"its name: {' '.join(words)}"
+
+
+# ---- words
+
+
+def folded(text: str) -> str:
+    """Return a text in small letters without accents."""
+    if text.isascii():
+        return text.lower()
+    decomposed = unicodedata.normalize("NFKD", text.casefold())
+    return "".join(letter for letter in decomposed if not unicodedata.combining(letter))
+
+
+def tokens(name: str) -> list[str]:
+    """Return the words and numbers of a name that marks set apart, folded."""
+    return [token for token in re.split(r"[^a-z0-9]+", folded(name)) if token]
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Return the words of a name: set apart by marks or capitals, or joined as in ugen."""
+    apart = tokens(CAPITAL.sub(" ", name))
+    whole = [token for token in tokens(name) if token in KINDS and token not in apart]
+    symbols = [first + second for first, second in pairwise(apart) if first in SHORT]  # u_f is uf
+    parts: list[str] = []
+    for token in apart:  # the known words that it is joined of
+        text = token.rstrip("0123456789")
+        known = token in KINDS or len(text) < 2
+        parts += [token] if known else next(_joined(text, first=True), (text,))
+    return (*whole, *symbols, *parts)
+
+
+def _joined(text: str, first: bool) -> Iterator[tuple[str, ...]]:
+    """Yield the ways in which a text is joined of known words, the longest first word first."""
+    if text in KINDS and (first or len(text) > 1):
+        yield (text,)
+    for length in range(len(text) - 1, 0, -1):
+        word, rest = text[:length], text[length:]
+        known = word in KINDS if length > 1 else first and word in SHORT
+        if not known:
+            continue
+        for linking in ("", *LINKING):
+            if rest.startswith(linking) and len(rest) > len(linking):
+                for others in _joined(rest[len(linking) :], first=False):
+                    yield (word, *others)
+
+
+# ---- the columns of a file
 
 
 @dataclass(frozen=True)

@@ -61,8 +61,9 @@ def find_clock(
         )
         if seconds and fractions:
             return seconds[0], fractions[0]
-        if whole or dates or times:
-            return tuple(whole[:1] or dates[:1] + times[:1])
+        named = tuple(whole[:1] or dates[:1] + times[:1])
+        if named:
+            return named
     candidates = (tuple(columns) for columns in (stamps[:2], stamps[:1], names[:1]))
     return next((columns for columns in candidates if columns and increases(columns)), ())
 
@@ -93,13 +94,36 @@ def in_seconds(
 def soc_in_seconds(path: Path, columns: Sequence[str], numbers: Mapping[str, Array]) -> Array:
     """Return the time (M,) in s since the first sample, of the columns SOC and FRACSEC.
 
-    Raises RecordError where they are no such counts.
+    A FRACSEC is a fraction of a second or counts of a time base, which is the one with which the
+    clock runs evenly. Raises RecordError where none does.
     """
-    second, fraction = columns
-    try:
-        return of_soc(numbers[second], numbers[fraction])
-    except EpochError as fault:
-        raise column_error(path, columns[fault.column], str(fault)) from None
+    seconds, fractions = (numbers[name] for name in columns)
+    if np.any(seconds != np.floor(seconds)):
+        raise column_error(path, columns[0], "SOC must be whole seconds")
+    whole = seconds - seconds[0]
+    if np.all((fractions >= 0.0) & (fractions < 1.0)):
+        time = whole + fractions
+        return np.asarray(time - time[0])
+    if np.any(fractions < 0.0) or np.any(fractions != np.floor(fractions)):
+        what = "FRACSEC must be below 1 s, or whole counts of a time base"
+        raise column_error(path, columns[1], what)
+    counts = fractions % COUNT_BITS
+    for base in TIME_BASES:
+        if np.max(counts) < base and _runs_evenly(time := whole + counts / base):
+            return np.asarray(time - time[0])
+    bases = ", ".join(f"{base:.0f}" for base in TIME_BASES)
+    what = f"with none of the time bases {bases} does the clock run evenly"
+    raise column_error(path, columns[1], what)
+
+
+def _runs_evenly(time: Array) -> bool:
+    """Check whether most steps over a full second are like those within one."""
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    over = steps[np.flatnonzero(np.diff(np.floor(time)) > 0.0)]
+    return step > 0.0 and (
+        not len(over) or bool(np.median(np.abs(over - step)) <= MOST_UNEVEN * step)
+    )
 
 
 def check_finite(time: Array, label: str, place: Callable[[int], str]) -> None:
@@ -141,14 +165,6 @@ def check_increasing(
         raise RecordError(f"{place(int(back[0]) + 1)}: {label}: time {fault}")
 
 
-class EpochError(ValueError):
-    """A fault of a time that counts from 1970, in a column of several, counted from 0."""
-
-    def __init__(self, column: int, text: str) -> None:
-        super().__init__(text)
-        self.column = column
-
-
 def are_soc(columns: Sequence[str]) -> bool:
     """Check two columns for the names SOC and FRACSEC."""
     words = [re.sub(r"[\W_]+", "_", name.strip().casefold()) for name in columns]
@@ -173,35 +189,3 @@ def from_first(numbers: Array) -> Array:
         if is_epoch(numbers[:1] / ticks):
             return np.asarray((numbers - numbers[0]) / ticks)
     return numbers
-
-
-def of_soc(seconds: Array, fractions: Array) -> Array:
-    """Return the time (M,) in s since the first sample, of SOC and FRACSEC.
-
-    A FRACSEC is a fraction of a second or counts of a time base, which is the one with which the
-    clock runs evenly. Raises EpochError where none does.
-    """
-    if np.any(seconds != np.floor(seconds)):
-        raise EpochError(0, "SOC must be whole seconds")
-    whole = seconds - seconds[0]
-    if np.all((fractions >= 0.0) & (fractions < 1.0)):
-        time = whole + fractions
-        return np.asarray(time - time[0])
-    if np.any(fractions < 0.0) or np.any(fractions != np.floor(fractions)):
-        raise EpochError(1, "FRACSEC must be below 1 s, or whole counts of a time base")
-    counts = fractions % COUNT_BITS
-    for base in TIME_BASES:
-        if np.max(counts) < base and _runs_evenly(time := whole + counts / base):
-            return np.asarray(time - time[0])
-    bases = ", ".join(f"{base:.0f}" for base in TIME_BASES)
-    raise EpochError(1, f"with none of the time bases {bases} does the clock run evenly")
-
-
-def _runs_evenly(time: Array) -> bool:
-    """Check whether most steps over a full second are like those within one."""
-    steps = np.diff(time)
-    step = float(np.median(steps))
-    over = steps[np.flatnonzero(np.diff(np.floor(time)) > 0.0)]
-    return step > 0.0 and (
-        not len(over) or bool(np.median(np.abs(over - step)) <= MOST_UNEVEN * step)
-    )

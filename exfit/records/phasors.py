@@ -303,14 +303,7 @@ def bad_rows(table: RecordTable, status: Status) -> tuple[BadRow, ...]:
     Raises RecordError for a column that is not there, and for flags 0 and 1, which may mean either,
     without ``accept``.
     """
-    column = status.column
-    try:
-        flags = [f"{flag:.0f}" for flag in table.numbers([column])[column]]
-    except RecordError:
-        if column not in table.names or not isinstance(table, TextTable):
-            raise
-        at = table.names.index(column)
-        flags = [cells[at] for _, cells in table.rows() if at < len(cells)]
+    flags = _flags(table, status.column)
     kinds = {flag: _plain(flag) for flag in {*flags}}
     if status.accept:
         good = {_plain(entry) for entry in status.accept}
@@ -318,10 +311,21 @@ def bad_rows(table: RecordTable, status: Status) -> tuple[BadRow, ...]:
         why = {flag: "" if kinds[flag] in good else refused for flag in kinds}
     elif {*kinds.values()} in ({0, 1}, {1}):
         what = "holds 0 and 1, of which either may be good: record.status.accept says which"
-        raise column_error(table.path, column, what)
+        raise column_error(table.path, status.column, what)
     else:
         why = {flag: _fault(kind) for flag, kind in kinds.items()}
     return tuple(BadRow(row, flag, why[flag]) for row, flag in enumerate(flags) if why[flag])
+
+
+def _flags(table: RecordTable, column: str) -> list[str]:
+    """Return the entries of a column as texts."""
+    try:
+        return [f"{flag:.0f}" for flag in table.numbers([column])[column]]
+    except RecordError:
+        if column not in table.names or not isinstance(table, TextTable):
+            raise
+    at = table.names.index(column)
+    return [cells[at] for _, cells in table.rows() if at < len(cells)]
 
 
 def _plain(flag: str) -> int | str:

@@ -8,10 +8,9 @@ from itertools import pairwise, takewhile
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.records.channel_names import triples
+from exfit.records.channel_names import KINDS, folded, triples, words_of
 from exfit.records.phasors import unit_by_range, wraps
 from exfit.records.units import WORDS, bare, quantity_of, usual
-from exfit.records.vocabulary import KINDS, folded, words_of
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Read a record: the columns of a recorder's file become signals per unit."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
@@ -115,12 +115,7 @@ def read_record(
     check_steps(time, clock.label, table.place)
     names = [name for channel in channels.values() for name in _column_names(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
-    if phasors is None:
-        columns = table.numbers(dict.fromkeys(names), gappy)
-    else:
-        from exfit.records.phasors import numbers_with_phasors
-
-        columns = numbers_with_phasors(table, phasors, dict.fromkeys(names), gappy)
+    columns = _numbers(table, phasors, names, gappy)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
     rows = _rows_in_window(path, time, window)
     rows, notes = _without_repeats(table, clock, time, columns, rows, repeats)
@@ -149,12 +144,7 @@ def read_record(
         signals[ANGLE] = smooth_angle(table, column, signals[ANGLE], rows)
     time = time[rows]
     if rate is not None:
-        from exfit.dsp.resampling import resampled
-
-        try:
-            time, signals = resampled(time, signals, rate)
-        except ValueError as fault:
-            raise RecordError(f"{path}: resample: {fault}") from None
+        time, signals = _resampled(path, time, signals, rate)
     return Record(
         read_only(time),
         MappingProxyType({name: read_only(signal) for name, signal in signals.items()}),
@@ -163,6 +153,27 @@ def read_record(
         averaged,
         notes,
     )
+
+
+def _numbers(
+    table: RecordTable, phasors: "Phasors | None", names: Sequence[str], gappy: frozenset[str]
+) -> dict[str, Array]:
+    if phasors is None:
+        return table.numbers(dict.fromkeys(names), gappy)
+    from exfit.records.phasors import numbers_with_phasors
+
+    return numbers_with_phasors(table, phasors, dict.fromkeys(names), gappy)
+
+
+def _resampled(
+    path: Path, time: Array, signals: Mapping[str, Array], rate: float
+) -> tuple[Array, dict[str, Array]]:
+    from exfit.dsp.resampling import resampled
+
+    try:
+        return resampled(time, signals, rate)
+    except ValueError as fault:
+        raise RecordError(f"{path}: resample: {fault}") from None
 
 
 def file_hash(path: Path) -> str:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from math import pi
+from typing import NamedTuple
 
 # body of a unit, folded -> its usual spelling, and the quantity that it measures
 BODIES: Mapping[str, tuple[str, str]] = {
@@ -11,15 +12,14 @@ BODIES: Mapping[str, tuple[str, str]] = {
     "ohm": ("Ω", "resistance"), "ω": ("Ω", "resistance"), "nm": ("Nm", "torque"),
     "pa": ("Pa", "pressure"),
 }  # fmt: skip
-WORDS: Mapping[str, str] = {
-    "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A",
-    "watt": "W", "watts": "W", "hertz": "Hz", "ohm": "Ω", "ohms": "Ω",
-    "second": "s", "seconds": "s", "sec": "s", "sek": "s", "seg": "s",
-    "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "microseconds": "us",
-    "pu": "pu", "p.u.": "pu", "p.u": "pu", "p. u.": "pu", "per unit": "pu",
-    "percent": "%", "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "grad": "deg",
-    "radian": "rad", "radians": "rad", "min": "min", "h": "h",
+SPELLINGS: Mapping[str, str] = {
+    "V": "volt, volts", "A": "amp, amps, ampere, amperes", "W": "watt, watts", "Hz": "hertz",
+    "Ω": "ohm, ohms", "s": "second, seconds, sec, sek, seg",
+    "ms": "msec, millisecond, milliseconds", "us": "usec, microseconds",
+    "pu": "pu, p.u., p.u, p. u., per unit", "%": "percent",
+    "deg": "deg, degree, degrees, °, grad", "rad": "radian, radians", "min": "min", "h": "h",
 }  # fmt: skip
+WORDS = {word: unit for unit, words in SPELLINGS.items() for word in words.split(", ")}
 OTHER_UNITS = frozenset(
     ("%", "‰", "-", "rad", "rad/s", "el.deg", "°C", "K", "rpm", "r/min", "1/min", "min-1", "U/min",
      "1/s", "m/s", "bar", "dB")
@@ -37,7 +37,9 @@ _PREFIXED = re.compile(
 _MEGA = re.compile(r"mw|mva|m(?i:var)")  # no generator makes milliwatts in small letters, or mvar
 _ALONE = re.compile(r"[kKMG](?:V|A|W|(?i:var))|mvar|mw")  # a unit in place of a name
 _PREFIXES: Mapping[str, str] = {"K": "k", "µ": "u", "μ": "u"}
-FACTORS: Mapping[str, float] = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+FACTORS: Mapping[str, float] = {
+    "": 1.0, "n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9
+}  # fmt: skip
 _BARE = re.compile(r"[\[({<]\s*(.*?)\s*[\])}>]")
 _TIME = re.compile(r"t|time|zeit|tiempo|temps|tempo", re.IGNORECASE)
 _OF_PHASES = re.compile(r"[uve]\w{0,4}|.*(?:volt|spannung|phase|tensi)\w*", re.IGNORECASE)
@@ -55,7 +57,8 @@ def usual(unit: str) -> str:
     """Return the usual spelling of a unit: V of Volts and Vrms, kV of KV, Mvar of mvar."""
     unit = unit.strip()
     word = WORDS.get(unit.casefold())
-    return word or (_prefixed(unit) or (unit, ""))[0]
+    parts = _prefixed(unit)
+    return word or (parts.symbol if parts else unit)
 
 
 def alike(unit: str, other: str) -> bool:
@@ -75,7 +78,7 @@ def quantity_of(unit: str | None) -> str | None:
     if symbol in ANGLES:
         return "angle"
     prefixed = _prefixed(symbol)
-    return prefixed[1] if prefixed else None
+    return prefixed.quantity if prefixed else None
 
 
 def needs_base(unit: str) -> bool:
@@ -145,28 +148,15 @@ FORMS: tuple[tuple[re.Pattern[str], Callable[[str, str], bool]], ...] = (
 )
 
 
-def _prefixed(unit: str) -> tuple[str, str] | None:
-    """Return the usual spelling of a prefix and a unit, and the quantity; None for other texts."""
-    parts = _PREFIXED.fullmatch(unit)
-    if parts is None:
-        return None
-    prefix = parts["prefix"] or parts["small"] or (parts["milli"] or "").casefold()
-    body = parts["body"] or parts["ampere"] or parts["second"]
-    symbol, quantity = BODIES[body.casefold()]
-    if _MEGA.fullmatch(prefix + body):
-        prefix = "M"
-    return _PREFIXES.get(prefix, prefix) + symbol, quantity
-
-
 def scale_between(unit: str, other: str) -> float | None:
     """Number of another unit that makes one of a unit: 1000 V for a kV; None for no such pair."""
     symbol, wanted = usual(unit), usual(other)
     if symbol in ANGLES and wanted in ANGLES:
         return ANGLES[symbol] / ANGLES[wanted]
     first, second = _prefixed(symbol), _prefixed(wanted)
-    if first is None or second is None or first[1] != second[1]:
+    if first is None or second is None or first.quantity != second.quantity:
         return None
-    return _factor(symbol, first[1]) / _factor(wanted, second[1])
+    return first.factor / second.factor
 
 
 def base_of_own(unit: str, own: str, rated: float = 1.0) -> float | None:
@@ -179,7 +169,20 @@ def base_of_own(unit: str, own: str, rated: float = 1.0) -> float | None:
     return scale_between(own, unit)
 
 
-def _factor(symbol: str, quantity: str) -> float:
-    """Return the factor of the prefix of a unit in its usual spelling."""
-    bodies = {body for body, of in BODIES.values() if of == quantity}
-    return 1.0 if symbol in bodies else FACTORS[symbol[0]]
+class _Prefixed(NamedTuple):
+    """A prefix and a unit in their usual spelling, the quantity, and the factor of the prefix."""
+
+    symbol: str
+    quantity: str
+    factor: float
+
+
+def _prefixed(unit: str) -> _Prefixed | None:
+    parts = _PREFIXED.fullmatch(unit)
+    if parts is None:
+        return None
+    prefix = parts["prefix"] or parts["small"] or (parts["milli"] or "").casefold()
+    body = parts["body"] or parts["ampere"] or parts["second"]
+    symbol, quantity = BODIES[body.casefold()]
+    prefix = "M" if _MEGA.fullmatch(prefix + body) else _PREFIXES.get(prefix, prefix)
+    return _Prefixed(prefix + symbol, quantity, FACTORS[prefix])

@@ -144,17 +144,7 @@ def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
     Raises RecordError where there are no rows of numbers, where their names do not fit them,
     and where two separators are possible.
     """
-    layouts: list[_Layout] = []
-    for separator in SEPARATORS:
-        if separator is not None and not any(separator in line for line in head):
-            continue
-        if separator is None and layouts:  # spaces may separate what no tabs do
-            tabs = any(layout.dialect.separator == "\t" for layout in layouts)
-            if tabs or not any(len(line.split(maxsplit=1)) > 1 or '"' in line for line in head):
-                continue
-        layout = _layout(path, head, separator)
-        if layout is not None and (layout.dialect.cells > 1 or separator is None):
-            layouts.append(layout)
+    layouts = _layouts(path, head)
     if not layouts:
         raise _no_numbers(path, head)
     best = max(layouts, key=lambda layout: layout.rank)
@@ -171,6 +161,22 @@ def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
     return best.dialect
 
 
+def _layouts(path: Path, head: Sequence[str]) -> list[_Layout]:
+    """Return the readings of the head with each separator that it has; spaces only without tabs."""
+    layouts: list[_Layout] = []
+    for separator in SEPARATORS:
+        if separator is not None and not any(separator in line for line in head):
+            continue
+        if separator is None and layouts:
+            tabs = any(layout.dialect.separator == "\t" for layout in layouts)
+            if tabs or not any(len(line.split(maxsplit=1)) > 1 or '"' in line for line in head):
+                continue
+        layout = _layout(path, head, separator)
+        if layout is not None and (layout.dialect.cells > 1 or separator is None):
+            layouts.append(layout)
+    return layouts
+
+
 def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
     """Return the error of a file without rows of numbers."""
     filled = [line for line in head if line.strip()]
@@ -184,17 +190,12 @@ def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
 
 def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout | None:
     """Return the reading of the head with a separator, None where it has no row of numbers."""
-    split = split_rows(path, head, separator, 1)
-    rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
-    rows = [row for row in rows if any(row.cells)]
+    rows = _filled_rows(path, head, separator)
     plain = [row for row in rows if not row.comment]
     if not plain:
         return None
     cells = _width(plain)
-    complete = [row for row in plain if len(row.cells) == cells]
-    later = complete[len(complete) // 2 :]
-    counts = [sum(row.values[at] for row in later) for at in range(cells)]
-    columns = [at for at, count in enumerate(counts) if count and 2 * count >= len(later)]
+    columns = _value_columns(plain, cells)
     first = next((at for at, row in enumerate(rows) if _is_full(row, cells, columns)), None)
     if first is None:
         return None
@@ -214,6 +215,13 @@ def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout |
         first_line,
     )
     return _Layout(dialect, sum(known) / len(known), bool(heading.names), heading.fault)
+
+
+def _filled_rows(path: Path, head: Sequence[str], separator: str | None) -> list[TextRow]:
+    """Return the lines of the head that hold something."""
+    split = split_rows(path, head, separator, 1)
+    rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
+    return [row for row in rows if any(row.cells)]
 
 
 def _row(line: int, cells: list[str], text: str, separator: str | None) -> TextRow:
@@ -240,6 +248,14 @@ def _width(rows: Sequence[TextRow]) -> int:
             break
     counts = Counter(widths)
     return max(counts, key=lambda width: (counts[width], width == len(rows[-1].cells)))
+
+
+def _value_columns(rows: Sequence[TextRow], cells: int) -> list[int]:
+    """Return the columns in which at least half of the later rows have a value."""
+    complete = [row for row in rows if len(row.cells) == cells]
+    later = complete[len(complete) // 2 :]
+    counts = [sum(row.values[at] for row in later) for at in range(cells)]
+    return [at for at, count in enumerate(counts) if count and 2 * count >= len(later)]
 
 
 def _is_full(row: TextRow, cells: int, columns: Sequence[int]) -> bool:

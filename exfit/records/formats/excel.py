@@ -125,10 +125,8 @@ def _table_in(rows: Sequence[Row]) -> tuple[Row, Row, dict[int, Row]] | None:
     """
     filled = [at for at, row in enumerate(rows) if row.count("") < len(row)]
     for place, at in enumerate(filled):
-        texts = sum(isinstance(cell, str) and cell != "" for cell in rows[at])
-        numbers = sum(not isinstance(cell, str) for cell in rows[at])
         above = [rows[number] for number in filled[max(place - 2, 0) : place]]
-        if not (above and FEWEST_CELLS <= numbers > texts):
+        if not above or not _is_sample(rows[at]):
             continue
         units: Row = ()
         if len(above) > 1 and _are_texts(above[-1]) and is_units(above[-1]):
@@ -138,6 +136,13 @@ def _table_in(rows: Sequence[Row]) -> tuple[Row, Row, dict[int, Row]] | None:
         if _are_texts(head) and sum(map(bool, named)) >= FEWEST_CELLS:
             return head, units, {number + 1: rows[number] for number in filled[place:]}
     return None
+
+
+def _is_sample(row: Row) -> bool:
+    """Check for a row of a sample: numbers and timestamps, more of them than of texts."""
+    texts = sum(isinstance(cell, str) and cell != "" for cell in row)
+    numbers = sum(not isinstance(cell, str) for cell in row)
+    return FEWEST_CELLS <= numbers > texts
 
 
 def _are_texts(row: Row) -> bool:

@@ -101,13 +101,7 @@ def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
             signals = fields.pop("signals", None) if "time" in fields else None
             for field, inner in fields.items():
                 yield from _vectors(f"{own}.{field}", inner, depth + 1)
-            if isinstance(signals, np.ndarray) and signals.dtype.names:
-                for numbered, signal in _structs(f"{own}.signals", signals):
-                    label = _text(signal.get("label"))
-                    called = f"{own}.{label}" if label else f"{numbered}.values"
-                    yield from _vectors(called, signal.get("values"), depth + 1)
-            else:
-                yield from _vectors(f"{own}.signals", signals, depth + 1)
+            yield from _signals(f"{own}.signals", signals, depth + 1)
     elif value.ndim == 2 and value.size > 1 and value.dtype.kind != "O":
         if 1 in value.shape:
             yield name, value.ravel()
@@ -117,15 +111,22 @@ def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
         yield name, value.ravel()
 
 
+def _signals(name: str, signals: Any, depth: int) -> Iterator[NamedVector]:
+    """Yield the signals of a structure with time, by their labels where they have one."""
+    if not isinstance(signals, np.ndarray) or not signals.dtype.names:
+        yield from _vectors(name, signals, depth)
+        return
+    for own, signal in _structs(name, signals):
+        label: Any = signal.get("label")
+        is_text = isinstance(label, np.ndarray) and label.dtype.kind == "U" and label.size == 1
+        text = str(label.ravel()[0]).strip() if is_text else ""
+        called = f"{name.removesuffix('signals')}{text}" if text else f"{own}.values"
+        yield from _vectors(called, signal.get("values"), depth)
+
+
 def _structs(name: str, value: NDArray[Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the structs in an array, each with its name and its fields."""
     structs = value.ravel()
     for at, one in enumerate(structs):
         own = name if structs.size == 1 else f"{name}({at + 1})"
         yield own, {field: one[field] for field in value.dtype.names or ()}
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.size == 1:
-        return str(value.ravel()[0]).strip()
-    return ""
