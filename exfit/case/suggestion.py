@@ -10,11 +10,12 @@ from typing import Any
 
 from exfit.case.case_draft import Noted, Remark, Section, in_braces
 from exfit.case.yaml import QUESTION
+from exfit.dsp.quality import SPIKE_LIMIT
 from exfit.errors import ExfitError
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
-from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
+from exfit.records.channel_inspection import InspectedChannel, InspectedPhases
 from exfit.records.channel_names import connection_of
-from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
+from exfit.records.contradictions import FIELD, ScaleRange, is_on_load, scale_to_find
 from exfit.records.formats import open_table
 from exfit.records.inspection import Inspection, inspect
 from exfit.records.rejection import POWERS, BreakerOpening

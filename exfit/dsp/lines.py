@@ -1,9 +1,12 @@
 """The largest line in the spectrum of errors, and whether white noise has one as large.
 
+At rest it is a ripple of the mains, or a sway of the grid.
+
 Sources: Fisher 1929 (the distribution of the largest share that one frequency has of the power);
 Percival & Walden 1993, section 10.9.
 """
 
+from dataclasses import dataclass
 from math import inf, pi
 from typing import NamedTuple
 
@@ -11,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.sampling import even_step
+from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -19,6 +23,19 @@ Range = tuple[float, float]
 FEWEST_PERIODS = 3  # in a record: with fewer a line is like the response, or a drift
 FEWEST_FREQUENCIES = 5
 FINE = 20  # frequencies between two neighbours of the periodogram
+
+# of a ripple
+FEWEST_AT_REST = 64  # at rest: fewer show no line
+MOST_AT_REST = 20_000  # of a rest, the last ones
+MOST_FILLED_IN = 4  # times its samples: a rest with longer gaps shows no line
+FEWEST_PERIODS_AT_REST = 8.0  # in the rest: with fewer a line is like a drift
+BY_CHANCE = 1e-5  # probability that white noise has a line as large: a likelier one is none
+LEAST_SHARE = 0.4  # of the standard deviation at rest: a smaller amplitude does no harm
+SLOW = 5.0  # Hz: what sways more slowly is the grid or the unit, and no ripple
+MAINS = (50.0, 60.0)  # Hz
+HARMONICS = (1, 2, 3, 6, 12)  # of the mains that bridges and recorders leave
+PASSED = 0.4  # of the frequency of a ripple: a low pass that removes it
+FOLDED_WITHIN = 0.01  # of the rate of sampling: a line so near to a folded harmonic may be one
 
 
 class Line(NamedTuple):
@@ -64,7 +81,11 @@ def largest_line(
         raise ValueError(f"{len(time)} samples show no line there")
     nearest = int(np.argmax(np.where(inside, power, 0.0)))
     about = 0.5 * float(time[0] + time[-1])
-    basis = np.zeros((len(errors), 0)) if slopes is None else _orthonormal(slopes)
+    basis = np.zeros((len(errors), 0))
+    if slopes is not None:
+        scaled = slopes / np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
+        left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+        basis = np.asarray(left[:, singular > len(left) * np.finfo(float).eps])
     near = np.clip(spacing * (nearest + np.linspace(-1.0, 1.0, 2 * FINE + 1)), *within)
     fits = [_regression(errors, cosine_and_sine(f, time[kept] - about), basis) for f in near]
     best = int(np.argmin([rest for _, rest in fits]))
@@ -90,16 +111,76 @@ def share_by_chance(share: float, count: int, tested: int) -> float:
     return min(1.0, tested * (1.0 - share) ** (count - 1))
 
 
-def _orthonormal(slopes: Array) -> Array:
-    """Return an orthonormal basis of the columns of slopes (M, N)."""
-    scaled = slopes / np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(left[:, singular > len(left) * np.finfo(float).eps])
-
-
 def _regression(errors: Array, pair: Array, basis: Array) -> tuple[Array, float]:
     """Return the amplitudes (2,) of a pair (M, 2) in errors (M,), and the square of the rest."""
     own = pair - basis @ (basis.T @ pair)
     others = errors - basis @ (basis.T @ errors)
     amplitudes = np.asarray(np.linalg.lstsq(own, others, rcond=None)[0], dtype=float)
     return amplitudes, float(np.sum((others - own @ amplitudes) ** 2))
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """A line at rest: its ``frequency`` (Hz) at a sampling ``rate`` (Hz), ``amplitude`` as read."""
+
+    frequency: float
+    amplitude: float
+    rate: float
+
+    @property
+    def folded_from(self) -> float | None:
+        """The harmonic of the mains (Hz) that the sampling may show as this line, else None."""
+        near = FOLDED_WITHIN * self.rate
+        sources = [harmonic * mains for harmonic in HARMONICS for mains in MAINS]
+        if any(abs(source - self.frequency) <= near for source in sources):
+            return None
+        folded = {abs(each - self.rate * round(each / self.rate)): each for each in sources[::-1]}
+        alike = [each for line, each in folded.items() if abs(line - self.frequency) <= near]
+        return min(alike, default=None)
+
+    @property
+    def in_words(self) -> str:
+        """What it is."""
+        kind = "a sway" if self.frequency < SLOW else "a ripple"
+        text = f"{kind} of {self.frequency:.3g} Hz, amplitude {self.amplitude:.2g}, at rest"
+        if self.folded_from is None:
+            return text
+        return (
+            f"{text}; it may be {self.folded_from:g} Hz, folded by sampling at {self.rate:.4g} Hz"
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it."""
+        sine = "sine: {frequency: {start: auto}} on the channel lets the fit find it"
+        if self.folded_from is not None:
+            return f"record faster or through an anti-alias filter, or {sine}"
+        if self.frequency < SLOW:
+            return sine
+        lowpass = float(f"{PASSED * self.frequency:.2g}")
+        return f"{sine}, or filter: {{lowpass: {lowpass:g}}} if the response is slower"
+
+
+def ripple_at_rest(time: Array, samples: Array, rests: list[tuple[float, float]]) -> Ripple | None:
+    """Return the line of a channel (M,) in the longest of its ``rests`` (s), None without one."""
+    begin, end = max(rests, key=lambda rest: rest[1] - rest[0], default=(0.0, 0.0))
+    rest = slice(*np.searchsorted(time, [begin, end]))
+    t, y = time[rest][-MOST_AT_REST:], samples[rest][-MOST_AT_REST:]
+    if len(t) < FEWEST_AT_REST:
+        return None
+    spacing = float(median(np.diff(t)))
+    count = int((t[-1] - t[0]) / spacing)
+    if count > MOST_FILLED_IN * len(t):
+        return None
+    even = t[0] + spacing * np.arange(count)
+    way = np.linspace(-1.0, 1.0, len(even))
+    level = np.interp(even, t, y)
+    level = level - np.polyval(np.polyfit(way, level, 2), way)
+    within = (FEWEST_PERIODS_AT_REST / (spacing * len(even)), 0.5 / spacing)
+    try:
+        line = largest_line(even, level, np.ones(len(even), bool), within=within)
+    except ValueError:
+        return None
+    if line.p_value > BY_CHANCE or line.amplitude < LEAST_SHARE * float(np.std(level)):
+        return None
+    return Ripple(line.frequency, line.amplitude, 1.0 / spacing)

@@ -17,6 +17,7 @@ EXCERPT, EXCERPT_PARTS = 200_000, 20  # samples that are enough to estimate nois
 JUMP_SHARE = 0.75  # of a spike's least size: it begins or ends with such a jump
 FEW_SPIKES, SPIKE_SHARE = 3, 0.005  # samples, or of all: more are the signal's own
 LONGEST_SPIKE = 2  # samples
+SPIKE_LIMIT = 6.0  # times the noise: a sample farther off the line through its neighbours is one
 LEVEL_SAMPLES = 3  # on each side of a spike, whose median is the level: it stays
 NEARLY, MOST_NEARLY = 2.0 / 3.0, 0.5  # of the limit; of the spikes: so many come near it at most
 MOST_MULTIPLES = 1e12  # of a step between numbers: doubles show no grid that is finer

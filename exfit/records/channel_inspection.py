@@ -1,22 +1,26 @@
-"""What the samples of one channel show: its level, its noise, and what the recorder did to it."""
+"""What a channel shows: its level, its noise, what the recorder did to it, which signal it is.
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+Of the signal some is sure, some a guess with its reasons, and some must be asked.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.lines import Ripple, ripple_at_rest
 from exfit.dsp.noise import UNIFORM_SPREAD, drift_at_rest
-from exfit.dsp.quality import quantum, spikes, stuck
+from exfit.dsp.quality import SPIKE_LIMIT, quantum, spikes, stuck
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import DetectedStep
-from exfit.records.ripple import Ripple, ripple_at_rest
+from exfit.records.channel_names import CONTROL_ERROR, Clarity, Guess, guess_signals, read_name
 from exfit.records.steps import ChannelSteps, RecordedStep
-from exfit.signals import POSITIVE_AT_REST
+from exfit.records.units import quantity_of
+from exfit.signals import OF_BUMP_TEST, POSITIVE_AT_REST, SIGNALS
 
 Array = NDArray[np.float64]
 
-SPIKE_LIMIT = 6.0  # times the noise: a sample farther off the line through its neighbours is one
 PLACES_LISTED = 5  # of spikes and of other faults, the first ones
 NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still, as simulated ones
 OWN_NOISE = 1.01  # times what rounding leaves: the noise of a channel that is not rounded coarsely
@@ -24,6 +28,10 @@ NEGATIVE = 5.0  # times the noise below zero: what is positive is inverted
 LEAST_DRIFT = 0.01  # of all that a channel changes: with less it is at rest
 LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
 AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a step
+PERCENT = 100.0
+RESPONDING = (*OF_BUMP_TEST, "vref")  # signals that move for good with a step of the reference
+LARGEST_DEVIATION = 0.5  # pu: where a speed rests nearer to zero, it is a deviation
+LARGEST_ERROR = 0.5  # of all that a control error moves: how far from zero it rests
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,7 @@ class InspectedChannel:
             yield f"{count}, at {instants}{more} s"
         for start, end in self.stuck[:PLACES_LISTED]:
             yield f"does not change from {start:.6g} to {end:.6g} s"
-        if self._is_implausible_voltage():
+        if self._is_implausible_voltage:
             yield f"{self.level:.5g} at rest cannot be a voltage in pu: what is its unit?"
         if self.inverted:
             yield (
@@ -128,6 +136,7 @@ class InspectedChannel:
         """Whether it is negative at rest although its signal is positive there."""
         return self.signal in POSITIVE_AT_REST and self.level < -NEGATIVE * self.noise
 
+    @property
     def _is_implausible_voltage(self) -> bool:
         low, high = AT_REST_PU
         per_unit = self.signal == "vt" and self.unit in (None, "pu")
@@ -177,14 +186,18 @@ def inspect_channel(
     missing = len(samples) - len(y)
     if not len(y):
         return InspectedChannel(name, *unit, missing=missing, remark=own_steps.remark)
-    noise = own_steps.noise
+    noise, rounding = own_steps.noise, quantum(y)
     outlying = spikes(t, y, noise, SPIKE_LIMIT) if noise else np.zeros(0, np.intp)
-    rounding = quantum(y)
     # what is rounded more coarsely than its noise stands still most of the time
-    noisy = noise > max(
-        NOISELESS * float(np.ptp(y)), OWN_NOISE * UNIFORM_SPREAD * (rounding or 0.0)
-    )
-    still = stuck(y) if noisy else ()
+    least = max(NOISELESS * float(np.ptp(y)), OWN_NOISE * UNIFORM_SPREAD * (rounding or 0.0))
+    still = stuck(y) if noise > least else ()
+    first, last = float(t[0]), float(t[-1])
+    rests, drift = [(first, last)], 0.0
+    if steps:
+        rests = [(first, steps[0].at - steps[0].error), (0.5 * (steps[-1].at + last), last)]
+    if noise and steps and not steps[0].from_start:
+        drift = drift_at_rest(y[t < rests[0][1]])
+    lasting = abs(drift) > LEAST_DRIFT * float(np.ptp(y))
     return InspectedChannel(
         name,
         *unit,
@@ -196,37 +209,140 @@ def inspect_channel(
         missing=missing,
         spikes=len(outlying),
         spikes_at=tuple(float(t[row]) for row in outlying[:PLACES_LISTED]),
-        stuck=tuple((float(t[first]), float(t[last])) for first, last in still),
+        stuck=tuple((float(t[begin]), float(t[end])) for begin, end in still),
         frequency=own_steps.frequency,
         steps=own_steps.changes,
         remark=own_steps.remark,
-        drift=_drift(t, y, steps) if noise else 0.0,
-        ripple=ripple_at_rest(t, y, _rests(t, steps)) if noise else None,
+        drift=drift if lasting else 0.0,
+        ripple=ripple_at_rest(t, y, rests) if noise else None,
     )
-
-
-def _drift(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:
-    """Measure the drift of a channel before the first step, 0 by chance or where it is little."""
-    if not steps or steps[0].from_start:
-        return 0.0
-    drift = drift_at_rest(samples[time < _rests(time, steps)[0][1]])
-    return drift if abs(drift) > LEAST_DRIFT * float(np.ptp(samples)) else 0.0
-
-
-def _rests(time: Array, steps: Sequence[RecordedStep]) -> list[tuple[float, float]]:
-    first, last = float(time[0]), float(time[-1])
-    if not steps:
-        return [(first, last)]
-    return [
-        (first, steps[0].at - steps[0].error),
-        (0.5 * (steps[-1].at + last), last),
-    ]
 
 
 def _level_at_rest(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:
     """Return the median before the first step; of all samples where none is before it."""
     if steps and steps[0].from_start:
         return float(samples[0])
-    first = steps[0].at if steps else time[-1]
-    before = samples[time < first]
+    before = samples[time < (steps[0].at if steps else time[-1])]
     return float(np.median(before if len(before) else samples))
+
+
+def identified(
+    channels: Sequence[InspectedChannel],
+    steps: Sequence[RecordedStep],
+    groups: Sequence[InspectedPhases] = (),
+    of_pmu: Collection[str] = (),
+) -> tuple[InspectedChannel, ...]:
+    """Return the channels with the signals that they are by name, unit, level and steps.
+
+    Those of ``groups`` are phases, and no signal by themselves; nor are those ``of_pmu``, the
+    phasors of a measurement unit.
+    """
+    phases = {name for group in groups for name in group.columns}
+    candidates = _candidates(channels, phases.union(of_pmu))
+    units = {name: channel.unit for name, channel in candidates.items() if channel.unit}
+    moving = {name for step in steps for name in step.sizes}
+    guesses = guess_signals([*candidates], units, moving)
+    taken = {guess.signal for guess in guesses.values()}
+    if groups or of_pmu:
+        taken.add("vt")
+    known = {}
+    for name, channel in candidates.items():
+        if name in guesses:
+            known[name] = _as_guessed(channel, guesses[name], name in moving, bool(steps))
+        elif name in moving or not steps:
+            question = _open_question(channel, taken, candidates)
+            known[name] = replace(channel, question=question)
+    return tuple(known.get(channel.name, channel) for channel in channels)
+
+
+def _candidates(
+    channels: Sequence[InspectedChannel], excluded: Collection[str]
+) -> dict[str, InspectedChannel]:
+    """Return the channels that may be a signal, by name; a control error rests at zero."""
+    candidates = {}
+    for channel in channels:
+        at_zero = abs(channel.level) < LARGEST_ERROR * (channel.high - channel.low)
+        error = at_zero and CONTROL_ERROR in read_name(channel.name, channel.unit).others
+        if not (channel.name in excluded or channel.constant or error):
+            candidates[channel.name] = channel
+    return candidates
+
+
+def _as_guessed(
+    channel: InspectedChannel, guess: Guess, moves: bool, tested: bool
+) -> InspectedChannel:
+    """Return a channel with its signal; ``tested`` says whether the record shows any step."""
+    reading, signal = guess.reading, guess.signal
+    still = tested and not moves and signal in RESPONDING
+    low, high = AT_REST_PU
+    reasons = [reading.why]
+    if quantity_of(channel.unit):
+        reasons.append(
+            f"its unit: {channel.unit}{' alone' if reading.clarity is Clarity.UNIT else ''}"
+        )
+    if signal == "vt" and channel.seems_per_unit and low <= channel.level <= high:
+        reasons.append(f"its level: {channel.level:.4g} pu at rest")
+    if moves:
+        reasons.append("its shape: it moves with the step")
+    return replace(
+        channel,
+        signal=signal,
+        sure=reading.clarity <= Clarity.WORDS and not (reading.others or guess.rivals or still),
+        why="; ".join(filter(None, reasons)),
+        question="; ".join(_questions(channel, guess, still)),
+        system_base=reading.system_base,
+    )
+
+
+def _questions(channel: InspectedChannel, guess: Guess, still: bool) -> Iterator[str]:
+    reading, signal = guess.reading, guess.signal
+    what = SIGNALS[signal].name
+    for other in reading.others:
+        yield f"is it the {what}, or {other}? It is taken for {signal}, by {reading.why}"
+    if reading.clarity is Clarity.QUANTITY and not _looks_terminal(channel):
+        yield f"is it the {what}? {reading.why} does not say of what"
+    if guess.rivals:
+        rivals = " or ".join(guess.rivals)
+        yield f"is it the {what}, or is {rivals}? The first is taken for {signal}"
+    if still:
+        yield f"is it the {what}? It does not move with the step"
+    if signal == "speed" and abs(channel.level) < LARGEST_DEVIATION:
+        yield f"is it the speed's deviation? It rests at {channel.level:.2g}: then offset: 1"
+    if reading.system_base:
+        yield (
+            f"1 pu of {reading.why} is that of the grid, mostly 100 MVA: its base is the rated MVA "
+            "over it"
+        )
+
+
+def _looks_terminal(channel: InspectedChannel) -> bool:
+    """Check unit and level of a voltage for those of a generator's terminals."""
+    low, high = AT_REST_PU
+    level = channel.level / PERCENT if channel.unit == "%" else channel.level
+    return channel.unit == "kV" or (channel.unit in ("%", "pu", None) and low <= level <= high)
+
+
+def _open_question(
+    channel: InspectedChannel, taken: Collection[str], candidates: Mapping[str, InspectedChannel]
+) -> str:
+    """Question about a channel that is taken for no signal, "" for none."""
+    reading = read_name(channel.name, channel.unit)
+    if reading.others and not {*reading.others} & {*taken}:
+        return f"is it {' or '.join(reading.others)}? {reading.why} fits either"
+    signal = reading.signal
+    if signal is not None and signal not in taken:
+        rivals = [
+            name
+            for name, other in candidates.items()
+            if other is not channel and read_name(name, other.unit).signal == signal
+        ]
+        return f"is it {signal}, the {SIGNALS[signal].name}, or is {' or '.join(rivals)}?"
+    quantity = quantity_of(channel.unit)
+    missing = [
+        signal
+        for signal in OF_BUMP_TEST
+        if signal not in taken and quantity in (None, SIGNALS[signal].quantity)
+    ]
+    if reading.why or not missing:
+        return ""
+    return f"is it {' or '.join(missing)}? It moves with the step"

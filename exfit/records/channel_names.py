@@ -66,7 +66,7 @@ RATIOS = ("%", "-")  # units that a signal of any quantity may have
 DOUBTS: Mapping[str, tuple[str, ...]] = {"ue": (EXCITER_FIELD,), "ie": (EXCITER_FIELD,)}
 POWERS = ("power", "reactive")
 OF_FIELD = frozenset(("field", "excitation"))
-OF_OTHERS = OF_FIELD | {"speed"}  # references, that are none of the voltage
+OF_OTHERS = OF_FIELD | {"speed"}  # references to others than the voltage
 # words of other columns -> with which others they are a signal after all, and what else it may be
 EXCEPTIONS = {
     "grid": ("stator", "stator", "a voltage of the grid"),
@@ -183,9 +183,7 @@ def _by_words(own: NameReading | None, kinds: Mapping[str, str], unit: str | Non
     if EXCEPTIONS.keys() & kinds.keys():
         return _elsewhere(kinds, quantity)
     if "reference" in kinds:
-        why = _named(kinds["reference"])
-        of_others = quantity not in (None, "voltage") or OF_OTHERS & kinds.keys()
-        return _none(why) if of_others else NameReading("vref", Clarity.OWN, why)
+        return _reference(kinds, quantity)
     if "excitation" in kinds and quantity not in POWERS:
         return _excitation(kinds, quantity, own)
     return own or _by_place(kinds, quantity)
@@ -202,6 +200,13 @@ def _elsewhere(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
     if row is None:
         return _none(_named(kinds[kind]))
     return NameReading(row.symbol, Clarity.VAGUE, _named(kinds[kind], kinds[other]), (doubt,))
+
+
+def _reference(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
+    """Return the reference of the voltage; that of power or of a field current is no signal."""
+    why = _named(kinds["reference"])
+    of_others = quantity not in (None, "voltage") or OF_OTHERS & kinds.keys()
+    return _none(why) if of_others else NameReading("vref", Clarity.OWN, why)
 
 
 def _excitation(

@@ -13,17 +13,16 @@ from exfit.dsp.jumps import rest_end
 from exfit.dsp.quality import mains_frequency
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
-from exfit.records.channel_identity import identified
 from exfit.records.channel_inspection import (
     PLACES_LISTED,
     InspectedChannel,
     InspectedPhases,
+    identified,
     inspect_channel,
 )
 from exfit.records.channel_names import guess_signals, three_phases
 from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
-from exfit.records.contradictions import contradictions
-from exfit.records.field_base import base_findings
+from exfit.records.contradictions import base_findings, contradictions
 from exfit.records.formats import PLAY_IN
 from exfit.records.formats.table import (
     RecordTable,

@@ -10,7 +10,7 @@ import numpy as np
 
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
-from exfit.dsp.quality import noise_of, spikes
+from exfit.dsp.quality import SPIKE_LIMIT, noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.experiment import ExperimentSetup
@@ -20,7 +20,6 @@ from exfit.fitting.program import Program, by_program
 from exfit.fitting.shown_instants import instants_of
 from exfit.fitting.system import values_of
 from exfit.fitting.validation_steps import GivenSteps, SetupOfRecord, with_steps_of_record
-from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep

@@ -6,8 +6,8 @@ from columns import Columns
 from step_records import step_record
 from tiers import few_of
 
+from exfit.dsp.lines import ripple_at_rest
 from exfit.records.inspection import inspect
-from exfit.records.ripple import ripple_at_rest
 
 RECORD = step_record(1, with_reference=True, length=6.0)
 CHANNELS = dict(RECORD.table.content)

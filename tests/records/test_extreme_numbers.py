@@ -6,13 +6,13 @@ import re
 import numpy as np
 import pytest
 
+from exfit.dsp.lines import ripple_at_rest
 from exfit.errors import RecordError
 from exfit.records.clock import Clock
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
-from exfit.records.ripple import ripple_at_rest
 
 COUNT = 200
 TIME = np.arange(COUNT) * 0.01

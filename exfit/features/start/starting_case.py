@@ -29,7 +29,7 @@ from exfit.models.machines import Machine
 from exfit.models.sheet import Model
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.open_circuit import OPEN_CIRCUIT
-from exfit.records.field_base import shows_power
+from exfit.records.contradictions import shows_power
 from exfit.records.inspection import Inspection
 from exfit.util.sources import TYPICAL
 from exfit.util.text import first_texts

@@ -174,7 +174,7 @@ def _farthest(moves: Array) -> float:
 
 def _ripples(recording: Recording, setup: ExperimentSetup) -> Iterator[str]:
     """Yield the lines of channels at rest that the case does nothing about."""
-    from exfit.records.ripple import ripple_at_rest
+    from exfit.dsp.lines import ripple_at_rest
 
     time, instants = setup.record.time, setup.test.instants
     if not instants:

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.lines import MAINS, Ripple
 from exfit.dsp.noise import NEIGHBOURS, noise
+from exfit.dsp.quality import SPIKE_LIMIT
 from exfit.dsp.step_detection import first_step
 from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.experiment import Channel
 from exfit.fitting.nuisances import Nuisance
-from exfit.records.channel_inspection import SPIKE_LIMIT
-from exfit.records.ripple import MAINS, Ripple
 from exfit.results.verdict import Cause
 from exfit.util.sorting import median
 from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, suspected
