@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from exfit.results.model import FitResult, Iteration
     from exfit.results.validation_result import ValidationResult
     from exfit.workflows.given_values import ValuesOrResult
-    from exfit.workflows.iteration_responses import LiveResponse
     from exfit.workflows.model_check import Check
     from exfit.workflows.profiles import Profiles
+    from exfit.workflows.responses import LiveResponse
     from exfit.workflows.simulation import SimulationResult
 
 

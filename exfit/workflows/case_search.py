@@ -3,7 +3,7 @@
 They are read from top to bottom, in `SEARCH` and `STAGES`; why each is there stands in it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
+from exfit.errors import SimulationError
 from exfit.fitting.channel_weights import (
     MOST_SEARCHES,
     as_fitted,
@@ -25,10 +26,14 @@ from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
-from exfit.fitting.residuals import SimulationCounter
+from exfit.fitting.residuals import LEAST_NOISE, SimulationCounter, noise_of
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.uncertainty import not_served_by_linear_theory
+from exfit.inference.noise import LEAST_P, SURPRISING, whiteness
+from exfit.inference.wording import digits
 from exfit.registry import parts
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.comparisons import Comparison
 from exfit.results.intervals.determination import (
     NEEDS_PROFILE,
     Determination,
@@ -38,11 +43,13 @@ from exfit.results.intervals.determination import (
 )
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
 from exfit.util.strategies import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
-from exfit.workflows.choice_by_validation import judge_of
+from exfit.workflows.responses import aligned, validation_of
 
 Array = NDArray[np.float64]
+Values = Mapping[str, float]
 
 UNKNOWN = Determination(None)
+MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
 
 
@@ -160,6 +167,73 @@ def descents(state: SearchState) -> SearchState:
     settings = state.counter, state.options, judge, state.program
     found = search(case, problem, state.method, state.on_line, state.watch, *settings)
     return replace(state, searched=found)
+
+
+def judge_of(
+    case: Case,
+    problem: FitProblem,
+    setups: Sequence[ExperimentSetup],
+    unseen: Sequence[ExperimentSetup],
+) -> Judge:
+    """Make the judge of the ends of a search.
+
+    ``setups`` are the tests of the fit, ``unseen`` those of the validations. An end is refused
+    where one of these is not accepted. It is in doubt there, where the search did not converge, and
+    where its errors are not white or larger than the noise (or larger than good_enough, where the
+    case gives that).
+    """
+    residuals, good_enough = problem.residuals, case.estimate.good_enough
+
+    def fitted(end: estimate.Result) -> tuple[Values, list[Comparison]]:
+        values = residuals.values(end.x)
+        fine = (setup.with_enough_substeps(values) for setup in setups)
+        return values, [compare_with_record(setup, setup.name, values) for setup in fine]
+
+    def refusals(values: Values, matches: Sequence[Comparison]) -> Iterator[str]:
+        for setup in unseen:
+            yield validation_of(case, matches, *aligned(case, setup, values)).reason
+
+    def doubts(end: estimate.Result) -> Iterator[str]:
+        if not end.success:
+            yield f"the search had not converged: {end.message}"
+        values, matches = fitted(end)
+        if good_enough is None:
+            for setup, match in zip(setups, matches, strict=True):
+                yield from _beyond_noise(setup, match)
+        else:
+            rmse = float(np.sqrt(2.0 * end.cost / (residuals.count + len(residuals.priors))))
+            if rmse > good_enough.rmse:
+                yield f"the error, {rmse:.3e} pu, exceeded good_enough, {good_enough.rmse:g} pu"
+        yield from refusals(values, matches)
+
+    def refused(end: estimate.Result) -> str:
+        try:
+            return next(filter(None, refusals(*fitted(end))), "")
+        except SimulationError as fault:
+            return str(fault)
+
+    def doubt(end: estimate.Result) -> str:
+        try:
+            return next(filter(None, doubts(end)), "")
+        except SimulationError as fault:
+            return str(fault)
+
+    return Judge(refused, doubt)
+
+
+def _beyond_noise(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
+    """Yield the signals whose error is larger than the noise of their record, or not white."""
+    for channel in setup.channels:
+        overlay = comparison.overlays[channel.signal]
+        if overlay.rmse <= LEAST_NOISE:
+            continue
+        times = overlay.rmse / noise_of(channel)
+        if times > MISFIT:
+            yield f"the error of {channel.signal} was {times:.2g} times the noise of its record"
+        p_value = whiteness(overlay.error[np.isfinite(overlay.error)])
+        if p_value is not None and p_value < SURPRISING:
+            p = digits(p_value) if p_value > LEAST_P else f"below {LEAST_P:.0e}"
+            yield f"the residuals of {channel.signal} were not white (Ljung-Box p {p})"
 
 
 def weights_of_minimum(state: SearchState) -> SearchState:

@@ -1,47 +1,79 @@
 """A fit from its case to its result: what `exfit.fit` and the command do."""
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from exfit import estimate
 from exfit.case.case import Case
-from exfit.case.schema import Estimate
+from exfit.case.parts import MEANINGS
+from exfit.case.schema import SINGLE, Estimate
 from exfit.fitting.build import build_experiment
+from exfit.fitting.channel_weights import weight_notes
+from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.parameters import scaled_values
 from exfit.fitting.program import Program
-from exfit.fitting.search import fitted
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import fitted, names_of_records
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.inference.confidence import Uncertainty
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
+from exfit.results.description import Behaviour
+from exfit.results.influences import RecorderAverages, TypicalValue, WindowSpread, by_weight
+from exfit.results.intervals.averages import allowing_for_averages, recorder_averages
 from exfit.results.intervals.minima import minima_notes, minima_of
-from exfit.results.model import FitResult, Iteration
+from exfit.results.intervals.value_errors import (
+    allowing_for,
+    allowing_for_bias,
+    errors_of_values,
+    given_error_notes,
+    influence_of_typical_values,
+)
+from exfit.results.intervals.windows import spread_over_windows, with_spread
+from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.util.versions import versions
-from exfit.verdict.causes import Pace
+from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.causes.evidence import time_for_causes
+from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tolerance_notes
 from exfit.verdict.rule import verdict_of
+from exfit.verdict.run_quality import speed_notes, switching_notes
 from exfit.workflows.case_description import (
     criteria_of,
     fixed_values,
     identified_values,
     input_hashes,
     input_names,
-    of_limiters,
     other_program_of,
     parts_of,
     tests_of,
     text_of,
-    values_by_part,
 )
 from exfit.workflows.case_search import STAGES, SearchState, in_turn
-from exfit.workflows.given_values import given_values
-from exfit.workflows.iteration_responses import LiveResponse, live_response
-from exfit.workflows.solution import (
-    analysed,
-    comparisons_of,
-    evidence_of,
-    fit_notes,
-    fitted_parameters,
-    iteration_of,
-    without_intervals,
+from exfit.workflows.given_values import given_value_notes, given_values
+from exfit.workflows.responses import (
+    LiveResponse,
+    aligned,
+    as_found_of,
+    behaviour_of,
+    live_response,
+    phase_ends,
+    skipped_response_notes,
+    validation_of,
+    with_iteration_responses,
 )
 
+Values = Mapping[str, float]
+
 LINEAR_ALONE = "no twin: intervals are those of linear theory, by quotients at the result"
+INTERRUPTED_AFTERWARDS = (
+    "interrupted after the search: intervals, or comparisons with records that were not fitted, "
+    "are missing"
+)
+NOTHING_TO_ACCEPT = (
+    "accept: this case has no record under validate to judge; `exfit validate CASE --record FILE` "
+    "judges one"
+)
 
 
 def fit_result(
@@ -73,32 +105,58 @@ def fit_result(
             response = live_response(state.setups[0], residuals, line.x)
             if response is not None:
                 live(response)
-        progress(iteration_of(line, residuals))
+        progress(_iteration(line, residuals))
 
     began_with = case, setups, unseen, problem, method, options, program
     state = in_turn(STAGES, SearchState(*began_with, announce, search_progress))
-    problem, setups, unseen, found = state.problem, state.fitted, state.unseen, state.found
-    residuals = problem.residuals
-    best = found.best
-    history = [iteration_of(line, residuals) for line in found.history]
-    values = residuals.values(best.x)
-    fine = [setup.with_enough_substeps(values) for setup in setups]
-    comparisons = comparisons_of(fine, residuals, values, history)
-    analysis = analysed(
-        case, problem, best, state.determined, fine, comparisons, unseen, program, history
+    problem, found, best = state.problem, state.found, state.found.best
+    residuals, values = problem.residuals, problem.residuals.values(best.x)
+    history = [_iteration(line, residuals) for line in found.history]
+    fine = [setup.with_enough_substeps(values) for setup in state.fitted]
+    begin = residuals.values(residuals.start)
+    moves = residuals.moves(scaled_values(residuals.free, values))
+    comparisons = tuple(
+        with_iteration_responses(
+            compare_with_record(setup, setup.name, values, begin, moves=moves),
+            setup,
+            residuals,
+            history,
+        )
+        for setup in fine
     )
+    analysis = _analysed(state, values, fine, comparisons, history)
+    uncertainty = analysis.uncertainty
     walked = problem.compressed if program is None else None
-    minima = minima_of(residuals, found, analysis.uncertainty, walked)
+    minima = minima_of(residuals, found, uncertainty, walked)
     interrupted = analysis.interrupted or found.interrupted
     pace = Pace(time_for_causes(options.causes, timer() - search_began), search_progress, timer)
-    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted, pace)
+    tests = zip(case.recordings, fine, comparisons, strict=True)
+    evidence = Evidence(
+        case=case,
+        residuals=residuals,
+        solution=best,
+        records=tuple(FittedRecord(each.test, setup, match) for each, setup, match in tests),
+        uncertainty=uncertainty,
+        validation=analysis.validation,
+        typical_values=by_weight(analysis.typical_values),
+        averages=analysis.averages,
+        interrupted=interrupted,
+        pace=pace,
+    )
     verdict = verdict_of(evidence)
-    noted = [*minima_notes(residuals, found, minima, analysis.uncertainty)]
-    analysis = without_intervals(analysis, verdict.no_interval)
-    own_values = values_by_part(case, values)
+    noted = [*minima_notes(residuals, found, minima, uncertainty)]
+    if uncertainty is not None and verdict.no_interval:
+        uncertainty = analysis.uncertainty = uncertainty.without_intervals(verdict.no_interval)
+    own_values = {
+        part.kind: {symbol: values[part.prefix + symbol] for symbol in part.symbols}
+        for part in case.parts.all
+    }
     models = {part.kind: part.name for part in case.parts.all}
-    parameters = fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why)
+    limiters = [limiter.kind for limiter in case.parts.limiters]
+    why = "the search was interrupted" if analysis.interrupted else "no finite derivatives"
+    parameters = _parameters(case, residuals, values, uncertainty, why)
     identified = identified_values(parameters, analysis.validation)
+    simulated = [*state.fitted, *state.unseen]
     return FitResult(
         case=case.path,
         about=case.about,
@@ -116,17 +174,17 @@ def fit_result(
         stabiliser_model=models.get("stabiliser"),
         governor=own_values.get("governor", {}),
         governor_model=models.get("governor"),
-        limiters=of_limiters(case, own_values),
-        limiter_models=of_limiters(case, models),
+        limiters={kind: own_values[kind] for kind in limiters},
+        limiter_models={kind: models[kind] for kind in limiters},
         cost=best.cost,
         comparisons=comparisons,
-        knowledge=analysis.uncertainty,
+        knowledge=uncertainty,
         minima=minima,
         status=best.status,
         message=best.message,
         success=best.success,
         interrupted=interrupted or pace.interrupted,
-        phase_ends=analysis.phase_ends,
+        phase_ends=tuple(analysis.phase_ends),
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
@@ -137,12 +195,12 @@ def fit_result(
             *found.notes,
             *state.line_notes,
             *noted,
-            *fit_notes(case, residuals, best, setups, comparisons, analysis),
-            *([] if program is None else program.notes([*setups, *unseen])),
+            *_notes(state, comparisons, analysis),
+            *([] if program is None else program.notes(simulated)),
             *([LINEAR_ALONE] if case.has_no_equations else []),
             *filter(None, [pace.sentence]),
         ),
-        validation=analysis.validation,
+        validation=tuple(analysis.validation),
         versions=versions(),
         inputs=hashes,
         verdict=verdict,
@@ -158,5 +216,150 @@ def fit_result(
         case_text=case_text,
         as_found=analysis.as_found,
         criteria=criteria_of(case),
-        other_program=other_program_of(case, program, [*setups, *unseen]),
+        other_program=other_program_of(case, program, simulated),
     )
+
+
+@dataclass
+class Analysis:
+    """What follows from a solution, as far as no interruption ended it.
+
+    ``interrupted`` where it, or the search before, is not whole; ``unfinished`` where the
+    interruption came after the search: what was done by then is valid.
+    """
+
+    uncertainty: UncertaintyAnalysis | None
+    interrupted: bool
+    unfinished: bool
+    validation: list[Comparison] = field(default_factory=list)
+    behaviour: Behaviour | None = None
+    phase_ends: list[PhaseEnd] = field(default_factory=list)
+    typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
+    as_found: AsFound | None = None
+    windows: WindowSpread | None = None
+    averages: RecorderAverages | None = None
+
+
+def _analysed(
+    state: SearchState,
+    values: Values,
+    fine: Sequence[ExperimentSetup],
+    fitted: Sequence[Comparison],
+    history: Sequence[Iteration],
+) -> Analysis:
+    """Analyse the best point: its uncertainty, its response to unseen records, and more.
+
+    ``fine`` are the tests with sub-steps enough, ``fitted`` the comparisons with their records.
+    """
+    case, problem, best = state.case, state.problem, state.found.best
+    uncertainty, unfinished = state.determined.uncertainty, state.determined.interrupted
+    interrupted = unfinished or best.stop is estimate.Stop.INTERRUPTED
+    analysis = Analysis(uncertainty, interrupted, unfinished)
+    try:
+        analysis.phase_ends.extend(phase_ends(case, fine, problem.residuals, history))
+        validated = [aligned(case, setup, values) for setup in state.unseen]
+        analysis.validation = [validation_of(case, fitted, *pair) for pair in validated]
+        tests = [(setup, values) for setup in fine]
+        if not case.has_no_equations:
+            analysis.behaviour = behaviour_of(tests, validated)
+        analysis.as_found = as_found_of(case, [*tests, *validated], state.program)
+        if uncertainty is not None:
+            at = problem, best.x, names_of_records(fine)
+            uncertainty = allowing_for_bias(uncertainty, *at)
+            errors = errors_of_values(case, problem, best.x)
+            wider = allowing_for(errors, uncertainty, *at)
+            analysis.typical_values = influence_of_typical_values(
+                case, problem.compressed, best.x, wider
+            )
+            windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
+            analysis.windows = windows
+            uncertainty = allowing_for(errors, with_spread(uncertainty, windows), *at)
+            averages = recorder_averages(case, problem.residuals, best.x, uncertainty)
+            analysis.averages = averages
+            uncertainty = allowing_for_averages(uncertainty, problem.residuals, averages)
+    except KeyboardInterrupt:  # what the search came to stays
+        analysis.interrupted = analysis.unfinished = True
+    analysis.uncertainty = uncertainty
+    return analysis
+
+
+def _parameters(
+    case: Case,
+    residuals: Residuals,
+    values: Values,
+    uncertainty: UncertaintyAnalysis | None,
+    why: str,
+) -> dict[str, FittedParameter]:
+    """Return the free parameters with their fitted values, in the parameters' own units.
+
+    ``why`` is the reason where there is no ``uncertainty``.
+    """
+    rows, fitted = case.rows(), dict[str, FittedParameter]()
+    of_records = {
+        nuisance.name: (nuisance.unit, nuisance.meaning)
+        for experiment in residuals.experiments
+        for nuisance in experiment.nuisances
+    }
+    described = of_records | {name: (row.unit, row.meaning) for name, row in rows.items()}
+    for parameter in residuals.free:
+        name, value = parameter.name, values[parameter.name]
+        unit, meaning = described.get(name, ("", MEANINGS.get(name, "used by ties")))
+        own = Uncertainty(None, None, None, why)
+        if uncertainty is not None:
+            own = uncertainty.confidence.parameters[name]
+        fitted[name] = FittedParameter(
+            value=value,
+            start=parameter.start,
+            min=parameter.low,
+            max=parameter.high,
+            at_bound=parameter.bound(value),
+            of_record=name in of_records,
+            std_error=own.std_error,
+            interval=own.interval,
+            interval_method=own.method,
+            why=own.why,
+            unit=unit,
+            meaning=meaning,
+            physical=name not in rows or rows[name].is_physical(value),
+        )
+    return fitted
+
+
+def _iteration(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
+    """Return a line of the log with the parameters' own values for the scaled ones."""
+    values = residuals.values(line.x)
+    figures = {name: value for name, value in vars(line).items() if name != "x"}
+    free = {parameter.name: values[parameter.name] for parameter in residuals.free}
+    return Iteration(**figures, values=free)
+
+
+def _notes(
+    state: SearchState, comparisons: Sequence[Comparison], analysis: Analysis
+) -> Iterator[str]:
+    """Yield notes beside the numbers of a fit."""
+    case, residuals, best = state.case, state.problem.residuals, state.found.best
+    if case.accept is not None and not case.validations:
+        yield NOTHING_TO_ACCEPT
+    if not best.success:
+        yield "the search did not end at a minimum: the errors and intervals assume that it did"
+    yield from given_value_notes(case)
+    yield from tolerance_notes(residuals, best)
+    yield from weight_notes(residuals)
+    yield from notes(case, residuals, best, comparisons)
+    for recording, setup in zip(case.recordings, state.fitted, strict=True):
+        yield from setup.record.notes
+        yield from outlier_notes(setup.record.source.name, setup.channels)
+        yield from switching_notes(setup)
+        yield from reference_notes(recording.test, setup)
+        at = setup.experiment.parameters(residuals.values(best.x))
+        yield from speed_notes(setup.experiment.simulator.inputs, at)
+    if analysis.uncertainty is not None:
+        yield from given_error_notes(analysis.uncertainty, names_of_records(state.fitted))
+    if analysis.windows is not None:
+        yield analysis.windows.sentence
+    for match in comparisons:
+        where = "" if match.name == SINGLE else f"{match.name}: "
+        yield from (f"{where}{action.sentence}" for action in match.limiters)
+    yield from skipped_response_notes(comparisons)
+    if analysis.unfinished:
+        yield INTERRUPTED_AFTERWARDS

@@ -18,7 +18,7 @@ from exfit.signals import OF_FLAT_RUN
 from exfit.verdict.causes.before_fit import case_warnings, event_warnings, record_warnings
 from exfit.verdict.diagnostics import diagram_notes, search_range_notes
 from exfit.verdict.run_quality import typical_notes, unstable_rest_notes
-from exfit.workflows.behaviour import FLAT_DRIFT, flat_drift
+from exfit.workflows.responses import FLAT_DRIFT, flat_drift
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

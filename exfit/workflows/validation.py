@@ -35,7 +35,6 @@ from exfit.verdict.run_quality import (
     unsteady_signals,
     voltage_notes,
 )
-from exfit.workflows.behaviour import behaviour_of
 from exfit.workflows.case_description import (
     criteria_of,
     identified_values,
@@ -47,8 +46,14 @@ from exfit.workflows.case_description import (
     text_of,
 )
 from exfit.workflows.given_values import ValuesOrResult, changes_of
-from exfit.workflows.other_values import as_found_of, model_as_found
-from exfit.workflows.solution import aligned, fitted_to_record, validation_of
+from exfit.workflows.responses import (
+    aligned,
+    as_found_of,
+    behaviour_of,
+    fitted_to_record,
+    model_as_found,
+    validation_of,
+)
 
 Values = Mapping[str, float]
 

@@ -17,7 +17,7 @@ from exfit.results.model import Iteration
 from exfit.show import terminal
 from exfit.show.terminal import progress
 from exfit.show.terminal import sketch as drawing
-from exfit.workflows.iteration_responses import LiveResponse
+from exfit.workflows.responses import LiveResponse
 
 TIME = np.linspace(0.0, 10.0, 1001)
 RISE = np.where(TIME < 1.0, 1.0, 1.05 - 0.05 * np.exp(1.0 - TIME))

@@ -11,7 +11,7 @@ from exfit import estimate
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import fitted
-from exfit.workflows.choice_by_validation import judge_of
+from exfit.workflows.case_search import judge_of
 
 RNG = np.random.default_rng(3)
 NOISE = 1e-3 * RNG.standard_normal((2, len(TIME)))

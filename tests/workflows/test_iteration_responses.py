@@ -14,7 +14,7 @@ from exfit.fitting.experiment import Experiment
 from exfit.results.tables import DIGITS
 from exfit.show import figures as plots
 from exfit.show import run_folder
-from exfit.workflows import iteration_responses, solution
+from exfit.workflows import fit_run, responses
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +86,8 @@ def test_what_is_found_about_a_record_moves_with_the_iterations(tmp_path):
 
 @pytest.mark.parametrize("count", [1, 2, 40, 41, 1000])
 def test_of_many_iterations_some_are_kept_evenly_with_the_first_and_the_last(count):
-    kept = iteration_responses.chosen(count)
-    assert len(kept) == min(count, iteration_responses.MOST_RESPONSES)
+    kept = responses.chosen(count)
+    assert len(kept) == min(count, responses.MOST_RESPONSES)
     assert (kept[0], kept[-1]) == (0, count - 1)
     steps = np.diff(kept)
     assert not len(steps) or 1 <= np.max(steps) <= np.min(steps) + 1
@@ -103,13 +103,13 @@ def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_pa
         samples[[values["k"] == lost for values in sets]] = np.nan  # as where there is no rest
         return samples, parts
 
-    result_of = solution.with_iteration_responses
+    result_of = fit_run.with_iteration_responses
 
     def failing(*given):
         monkeypatch.setattr(Experiment, "samples_of_many", samples_of_many)
         return result_of(*given)
 
-    monkeypatch.setattr(solution, "with_iteration_responses", failing)
+    monkeypatch.setattr(fit_run, "with_iteration_responses", failing)
     result = workflows.fit(local_case("first_order"))
     assert 1 not in result.comparison.iteration_responses.numbers
     assert len(result.comparison.iteration_responses.numbers) == len(result.history) - 1
@@ -130,7 +130,7 @@ def test_an_interruption_keeps_the_iterations_until_then():
 @pytest.mark.long
 def test_a_large_record_leaves_no_responses_and_says_so(fitted, monkeypatch, tmp_path):
     run_folder.write_fit(fitted, tmp_path / "run").draw()
-    monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)
+    monkeypatch.setattr(responses, "MOST_SAMPLES", 100)
     result = workflows.fit(local_case("first_order"))
     assert result.comparison.iteration_responses is None
     assert any("up to 100" in note for note in result.notes)
@@ -150,10 +150,10 @@ def test_without_figures_the_table_is_written_on_the_record_s_clock(fitted, tmp_
 def test_a_line_is_drawn_for_every_response_and_the_bar_names_first_and_last(fitted, count):
     figure = plots.iterations(with_many(fitted, count))
     assert plots.png(figure)
-    responses, errors, *bar = figure.axes
-    assert len(responses.lines) == count + 1  # and the record
+    lines, errors, *bar = figure.axes
+    assert len(lines.lines) == count + 1  # and the record
     assert len(errors.lines) == count + 1  # and zero
-    colours = [line.get_color() for line in responses.lines[1:]]
+    colours = [line.get_color() for line in lines.lines[1:]]
     assert len(set(colours)) == count
     assert errors.get_xlabel() == "time (s)"
     if count == 1:

@@ -7,7 +7,7 @@ from tables import read_columns
 from exfit.fitting.build import build_experiment
 from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit
-from exfit.workflows.solution import aligned, validation_of
+from exfit.workflows.responses import aligned, validation_of
 
 
 @pytest.mark.long

@@ -17,7 +17,7 @@ from exfit.results.model import Iteration
 from exfit.results.tables import yes_or_no
 from exfit.show.terminal.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
 from exfit.show.terminal.terminal import paragraph
-from exfit.workflows.iteration_responses import LiveResponse
+from exfit.workflows.responses import LiveResponse
 
 MOST_ITERATIONS = 12  # shown at a time
 FEWEST_ITERATIONS = 4  # beside a plot

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.text import Text
 
-from exfit.workflows.iteration_responses import LiveResponse
+from exfit.workflows.responses import LiveResponse
 
 Array = NDArray[np.float64]
 Dots = NDArray[np.bool_]

@@ -24,7 +24,7 @@ from exfit.results.intervals.determination import (
     with_profile_intervals,
     without_limits_of_others,
 )
-from exfit.workflows.solution import INTERRUPTED_AFTERWARDS
+from exfit.workflows.fit_run import INTERRUPTED_AFTERWARDS
 
 RISE, BOUND, FLAT = ProfileEnd.RISE, ProfileEnd.BOUND, ProfileEnd.FLAT
 KNOWN = ProfileEnd.KNOWN
