@@ -4,7 +4,7 @@ Nothing here knows a terminal, a page or a picture: `exfit.show.terminal.render`
 a terminal, the report writes the same ones as HTML.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -67,27 +67,40 @@ class TableColumn:
 
 
 class Cell(NamedTuple):
-    """The text of a cell, and how it stands out."""
+    """The text of a cell, and how it stands out.
+
+    ``see`` is the key of a section of its page, whose number follows; ``shade`` (-5 to 5) colours
+    it by a value between two extremes.
+    """
 
     text: str
     mark: Mark = ""
+    see: str = ""
+    shade: int | None = None
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells; of a wide one that is shown in parts each begins with ``leading`` columns."""
+    """Rows of cells; of a wide one that is shown in parts each begins with ``leading`` columns.
+
+    A page has its ``style``, the name of one in its style sheet; with a ``summary`` it can be
+    folded behind that.
+    """
 
     columns: tuple[TableColumn, ...]
     rows: tuple[tuple[Cell, ...], ...]
     title: str = ""
     leading: int = 1
+    style: str = ""
+    summary: str = ""
 
 
 @dataclass(frozen=True)
 class Note:
     """A sentence of some kind behind its ``label``, such as "cause:"; ``mark`` is the label's.
 
-    ``indent`` counts the levels that it stands further in.
+    ``indent`` counts the levels that it stands further in; ``see`` is the key of a section of its
+    page, whose number follows.
     """
 
     text: str
@@ -95,6 +108,7 @@ class Note:
     label: str = ""
     mark: Mark = ""
     indent: int = 0
+    see: str = ""
 
 
 @dataclass(frozen=True)
@@ -140,8 +154,9 @@ class Panel:
 class Chart:
     """Panels above each other on one x axis; ``text`` says what a reader would see there.
 
-    ``key`` begins the ids of the drawing; it must be its alone on a page. Of a ``live`` chart a
-    page has the samples, and says where its axes begin and end, so that it can be zoomed.
+    ``key`` begins the ids of the drawing; it must be its alone on a page. Charts of one ``group``
+    that follow each other are a figure of that title. Of a ``live`` chart a page has the samples,
+    and says where its axes begin and end, so that it can be zoomed.
     """
 
     key: str
@@ -153,7 +168,8 @@ class Chart:
     width: float = WIDE
     x_range: Range | None = None
     whole: bool = False
-    live: bool = False
+    group: str = ""
+    live: "LiveSamples | None" = None
 
     @property
     def legend(self) -> tuple[Series, ...]:
@@ -164,15 +180,27 @@ class Chart:
         return tuple(kinds.values()) if len(kinds) > 1 else ()
 
 
+@dataclass(frozen=True, eq=False)
+class LiveSamples:
+    """The samples (M,) of a chart's lines by their names, at ``time`` (M,) in s.
+
+    The charts of one ``record`` are zoomed together.
+    """
+
+    record: str
+    time: Array
+    lines: Mapping[str, Array]
+
+
 @dataclass(frozen=True)
-class NamedPicture:
-    """A picture that has a name: the block diagram of a model."""
+class Diagram:
+    """A drawing that is SVG already: the block diagram of a model."""
 
-    name: str
-    text: str = ""
+    title: str
+    svg: str
 
 
-Block = Heading | Facts | Table | Note | Verbatim | Chart | NamedPicture
+Block = Heading | Facts | Table | Note | Verbatim | Chart | Diagram
 
 
 def columns(*titles: str, numbers: Iterable[str] = ()) -> tuple[TableColumn, ...]:

@@ -4,32 +4,51 @@ from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from itertools import groupby
 
-from exfit.show.blocks import Block, Cell, Chart, Facts, Heading, Note, Table, TableColumn, Verbatim
+from exfit.show.blocks import (
+    Block,
+    Cell,
+    Chart,
+    Diagram,
+    Facts,
+    Heading,
+    Note,
+    Table,
+    TableColumn,
+    Verbatim,
+)
 
 CLASSES = {"ok": "good", "bad": "bad", "doubt": "why", "faint": "missing"}  # of the style sheet
 LONG_WORD = 16  # letters: a longer one may be broken
 MANY = 8  # columns that are set smaller on paper
 FEW = 6  # rows that stay on one page
+LONG = 12  # rows of a folded table that a reader sees without asking for more
 
 
 def html(blocks: Iterable[Block], draw: Callable[[Chart], str] = lambda _: "") -> str:
     """Write blocks as HTML; ``draw`` writes a chart.
 
     What stands between backquotes is code. Warnings and remedies that follow each other are a list.
-    Of a cell the lines below the first one are small.
+    Of a cell the lines below the first one are small. What another section has is an empty link to
+    that section, for the page to number.
     """
-    return "\n".join(_pieces(blocks, draw))
 
+    def kind(block: Block) -> str:
+        if isinstance(block, Chart):
+            return block.group
+        return "list" if isinstance(block, Note) and block.kind in ("warning", "remedy") else ""
 
-def _pieces(blocks: Iterable[Block], draw: Callable[[Chart], str]) -> Iterator[str]:
-    for is_list, group in groupby(
-        blocks, lambda block: isinstance(block, Note) and block.kind in ("warning", "remedy")
-    ):
-        if is_list:
-            notes = (block for block in group if isinstance(block, Note))
-            yield "\n".join(["<ul>", *(f"<li>{_sentence(note)}</li>" for note in notes), "</ul>"])
+    pieces: list[str] = []
+    for group, members in groupby(blocks, kind):
+        if group == "list":
+            notes = (block for block in members if isinstance(block, Note))
+            pieces += ["<ul>", *(f"<li>{_note(note)}</li>" for note in notes), "</ul>"]
+        elif group:
+            pieces += ["<figure>", '<div class="grid">', *(_piece(each, draw) for each in members)]
+            pieces += ["</div>", f"<figcaption><strong>{escape(group)}</strong></figcaption>"]
+            pieces.append("</figure>")
         else:
-            yield from filter(None, (_piece(block, draw) for block in group))
+            pieces += filter(None, (_piece(block, draw) for block in members))
+    return "\n".join(pieces)
 
 
 def _piece(block: Block, draw: Callable[[Chart], str]) -> str:
@@ -41,24 +60,35 @@ def _piece(block: Block, draw: Callable[[Chart], str]) -> str:
             return "\n".join(['<dl class="about">', *rows, "</dl>"])
         case Note():
             style = ' class="missing"' if block.mark == "faint" else ""
-            return f"<p{style}>{_sentence(block)}</p>"
-        case Table():
+            return f"<p{style}>{_note(block)}</p>"
+        case Table(summary=""):
             return _wide(block.title or "Table", _table(block))
+        case Table():
+            length = "long" if len(block.rows) > LONG else "short"
+            head = f'<details open class="{length}">\n<summary>{escape(block.summary)}</summary>'
+            return f"{head}\n{_wide(block.title, _table(block))}\n</details>"
         case Verbatim(text):
             return _wide("Text", f"<pre>{escape(text)}</pre>")
+        case Diagram(title, svg):
+            caption = f"<figcaption><strong>{escape(title)}</strong></figcaption>"
+            return f'<figure class="block-diagram">\n{_wide(title, svg)}\n{caption}\n</figure>'
         case Chart():
             return draw(block)
-    return ""
 
 
-def _sentence(note: Note) -> str:
+def _note(note: Note) -> str:
+    see = f", see section {_link(note.see)}." if note.see else ""
     if not note.label:
-        return _text(note.text)
-    return f"{_marked(Cell(note.label, note.mark))} {_text(note.text)}"
+        return sentence(note.text) + see
+    return f"{_marked(Cell(note.label, note.mark))} {sentence(note.text)}{see}"
 
 
-def _text(text: str) -> str:
-    """Escape a text, in which what is between backquotes is to be typed."""
+def _link(section: str) -> str:
+    return f'<a href="#{section}"></a>'
+
+
+def sentence(text: str) -> str:
+    """Escape a text, in which what is between backquotes is code, to be typed."""
     pieces = (escape(piece) for piece in text.split("`"))
     return "".join(f"<code>{each}</code>" if k % 2 else each for k, each in enumerate(pieces))
 
@@ -72,15 +102,16 @@ def _table(table: Table) -> str:
     many = "many" if len(table.columns) >= MANY else ""
     few = "few" if len(table.rows) <= FEW else ""
     heads = (
-        f'<th scope="col"{_class("n" if column.number else "")}>{_heading(column)}</th>'
+        f'<th scope="col"{_class(*_of_column(column))}>'
+        f"{escape(column.heading.replace(chr(10), ' '))}</th>"
         if column.heading
         else "<td></td>"
         for column in table.columns
     )
     title = table.title[:1].upper() + table.title[1:]
     lines = [
-        f"<table{_class(many, few)}>",
-        *([f"<caption>{_text(title)}</caption>"] if title else []),
+        f"<table{_class(table.style, many, few)}>",
+        *([f"<caption>{sentence(title)}</caption>"] if title else []),
         f"<thead><tr>{''.join(heads)}</tr></thead>",
         "<tbody>",
         *(_row(table, cells) for cells in table.rows),
@@ -89,8 +120,10 @@ def _table(table: Table) -> str:
     return "\n".join(lines)
 
 
-def _heading(column: TableColumn) -> str:
-    return escape(column.heading.replace("\n", " "))
+def _of_column(column: TableColumn) -> Iterator[str]:
+    """Yield the classes of a column; one that is expendable is not printed."""
+    yield "n" if column.number else ""
+    yield "aside" if column.expendable else ""
 
 
 def _row(table: Table, cells: tuple[Cell, ...]) -> str:
@@ -99,15 +132,20 @@ def _row(table: Table, cells: tuple[Cell, ...]) -> str:
     shown = []
     for k, (column, cell) in enumerate(zip(table.columns, cells, strict=True)):
         if k < table.leading:
-            style = _class("n" if column.number else "")
+            style = _class(*_of_column(column))
             shown.append(f'<th scope="row"{style}>{_lines(cell.text)}</th>')
             continue
-        doubt = cell.mark == "doubt" and not whole
-        long = any(len(word) > LONG_WORD for word in cell.text.split())
-        number = "why" if doubt else "n" if column.number else ""
-        text = "text" if column.folds else ""
-        style = _class(number, text, "break" if column.folds and long else "")
-        shown.append(f"<td{style}>{_marked(cell)}</td>")
+        styles = [*_of_column(column), "text" if column.folds else ""]
+        if cell.mark == "doubt" and not whole:
+            styles[0] = "why"
+        if column.folds and any(len(word) > LONG_WORD for word in cell.text.split()):
+            styles.append("break")
+        if cell.mark == "faint":
+            styles.append(CLASSES[cell.mark])
+        if cell.shade is not None:
+            styles.append(f"{'plus' if cell.shade >= 0 else 'minus'}{abs(cell.shade)}")
+        see = _link(cell.see) if cell.see else ""
+        shown.append(f"<td{_class(*styles)}>{_marked(cell)}{see}</td>")
     return f"<tr{_class('vague' if cells[0].mark == 'doubt' else '')}>{''.join(shown)}</tr>"
 
 
@@ -116,15 +154,15 @@ def _marked(cell: Cell) -> str:
         return f"<strong>{_lines(cell.text)}</strong>"
     if cell.mark in ("ok", "bad"):
         first, *rest = cell.text.split(": ", 1)
-        return f'<strong class="{CLASSES[cell.mark]}">{_text(first)}</strong>' + "".join(
-            f": {_text(each)}" for each in rest
+        return f'<strong class="{CLASSES[cell.mark]}">{sentence(first)}</strong>' + "".join(
+            f": {sentence(each)}" for each in rest
         )
     return _lines(cell.text)
 
 
 def _lines(text: str) -> str:
     first, *others = text.split("\n")
-    return " ".join([_text(first), *(f"<small>{_text(line)}</small>" for line in others)])
+    return " ".join([sentence(first), *(f"<small>{sentence(line)}</small>" for line in others)])
 
 
 def _class(*names: str) -> str:

@@ -16,7 +16,7 @@ from exfit.errors import CaseError
 from exfit.features.planner.export import export
 from exfit.features.planner.fields import Field
 from exfit.features.planner.records import alternatives, read_values, record_fields
-from exfit.features.report.sections.model import saturation
+from exfit.features.report.model import saturation
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.workflows import check, fit, simulate

@@ -4,7 +4,7 @@ matplotlib would take two seconds to be imported and to draw those of a report, 
 one; and their text follows the style sheet of the page, so that it can be read on a telephone.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, floor, log10
 
@@ -15,6 +15,12 @@ from exfit.show.blocks import Chart, Panel, Range, Rule, Series
 
 Array = NDArray[np.float64]
 
+MILLI = 1e3
+TALL, HALF, LOW = 170.0, 120.0, 72.0  # of panels: of signals, of gain and phase, of errors
+BINS = 600  # segments of a line: about as many as a print or a screen shows
+TIME = "time (s)"
+LEVEL = Rule(0.0, style="level")
+COLOURS, DASHES = 7, 3  # of lines in the style sheet
 LEFT, RIGHT, TOP, BOTTOM = 74.0, 16.0, 30.0, 48.0  # room around the panels for their labels
 SMALL = 300.0  # units of a drawing: a chart beside another one
 ROOM = 0.06  # of the range, above and below the lines
@@ -25,6 +31,11 @@ LEAST_SPAN = 1e-250  # of a smaller range no tick could be computed
 LEAST_LEVEL = 0.1  # pu: the level of a signal that rests at zero
 PER_TICK = (80.0, 22.0)  # of an axis, across and upward: closer labels would touch
 UNIT_STEPS = (1.0, 2.0, 5.0, 10.0)  # of ticks, times a power of ten
+
+
+def line_style(k: int) -> str:
+    """Return the class of the style sheet for the k-th line of a panel."""
+    return f"p{k % COLOURS} dash{k // COLOURS % DASHES}"
 
 
 @dataclass(frozen=True)
@@ -120,9 +131,14 @@ def drawing(chart: Chart) -> Drawing:
 def ticks(axis: Axis, most: int, whole: bool = False) -> tuple[Tick, ...]:
     """Place marks at round values, about so many; on a logarithmic axis at powers of ten."""
     if axis.logarithmic:
-        return tuple(_decades(axis, most))
+        first, last = ceil(axis.low - 1e-9), floor(axis.high + 1e-9)
+        powers = range(first, last + 1, max(1, ceil((last - first + 1) / most)))
+        labels = {k: f"{10.0**k:g}" if -3 <= k <= 3 else f"1e{k}" for k in powers}
+        return tuple(Tick(axis.place(10.0**k), label) for k, label in labels.items())
     for finer in (1, 2):  # one mark alone would give no scale
-        step = _round_step((axis.high - axis.low) / (finer * most))
+        least = (axis.high - axis.low) / (finer * most)
+        power = 10.0 ** floor(log10(least))
+        step = power * next(each for each in UNIT_STEPS if each * power >= least * (1.0 - 1e-9))
         step = max(step, 1.0) if whole else step
         first, last = ceil(axis.low / step - 1e-9), floor(axis.high / step + 1e-9)
         values = [k * step for k in range(first, last + 1)]
@@ -138,6 +154,21 @@ def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
     room = ROOM * (high - low)
     upward = Axis(low - room, high + room, panel.height, panel.logarithmic)
     y_ticks = ticks(upward, max(3, int(panel.height // PER_TICK[1])))
+    rules, labels = [], []
+    for rule in panel.rules:
+        if rule.upright:  # its label is at its foot, that of a level above it
+            x = across.place(rule.at)
+            end = x > 0.5 * across.length
+            path, place = (
+                f"M{x:.1f} 0v{panel.height:.1f}",
+                (x - 5.0 if end else x + 5.0, panel.height - 7.0),
+            )
+        else:
+            y, end = panel.height - upward.place(rule.at), True
+            path, place = f"M0 {y:.1f}h{across.length:.1f}", (across.length - 4.0, y - 4.0)
+        rules.append(Mark(path, rule.style))
+        if rule.label:
+            labels.append(Label(*place, rule.label, end))
     return Drawn(
         panel.title,
         top,
@@ -146,44 +177,20 @@ def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
         upward.high,
         tuple(Tick(panel.height - tick.at, tick.label) for tick in y_ticks),
         tuple(_mark(series, across, upward) for series in panel.series),
-        tuple(_rule(rule, across, upward) for rule in panel.rules),
-        tuple(_label(rule, across, upward) for rule in panel.rules if rule.label),
+        tuple(rules),
+        tuple(labels),
     )
 
 
 def _mark(series: Series, across: Axis, upward: Axis) -> Mark:
+    """Draw dots, or the strokes of a line: a gap in the values is one on the drawing."""
     x, y = across.places(series.x), upward.length - upward.places(series.y)
-    finite = np.isfinite(x) & np.isfinite(y)
-    if series.dots:
-        path = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x[finite], y[finite], strict=True))
-    else:
-        path = "".join(_strokes(x, y, finite))
-    return Mark(path, series.style + (" dots" if series.dots else ""))
-
-
-def _strokes(x: Array, y: Array, finite: NDArray[np.bool_]) -> Iterator[str]:
-    """Yield the strokes of a line: a gap in the values is one on the drawing."""
-    pen = "M"
-    for a, b, drawn in zip(x.tolist(), y.tolist(), finite.tolist(), strict=True):
+    seen, path, pen = np.isfinite(x) & np.isfinite(y), list[str](), "M"
+    for a, b, drawn in zip(x.tolist(), y.tolist(), seen.tolist(), strict=True):
         if drawn:
-            yield f"{pen}{a:.1f} {b:.1f}"
+            path.append(f"M{a:.1f} {b:.1f}h0" if series.dots else f"{pen}{a:.1f} {b:.1f}")
         pen = "L" if drawn else "M"
-
-
-def _rule(rule: Rule, across: Axis, upward: Axis) -> Mark:
-    if rule.upright:
-        return Mark(f"M{across.place(rule.at):.1f} 0v{upward.length:.1f}", rule.style)
-    return Mark(f"M0 {upward.length - upward.place(rule.at):.1f}h{across.length:.1f}", rule.style)
-
-
-def _label(rule: Rule, across: Axis, upward: Axis) -> Label:
-    """Place the label of a rule: above a level, at the foot of an upright one."""
-    if not rule.upright:
-        level = upward.length - upward.place(rule.at)
-        return Label(across.length - 4.0, level - 4.0, rule.label, True)
-    x = across.place(rule.at)
-    end = x > 0.5 * across.length
-    return Label(x - 5.0 if end else x + 5.0, upward.length - 7.0, rule.label, end)
+    return Mark("".join(path), series.style + (" dots" if series.dots else ""))
 
 
 def _span(lines: Iterable[Array], logarithmic: bool) -> Range:
@@ -206,20 +213,6 @@ def _span(lines: Iterable[Array], logarithmic: bool) -> Range:
 def _log(values: Array) -> Array:
     """Return log10; what has none, as a vanished gradient, is a gap."""
     return np.log10(np.where(values > 0.0, values, np.nan))
-
-
-def _decades(axis: Axis, most: int) -> Iterator[Tick]:
-    first, last = ceil(axis.low - 1e-9), floor(axis.high + 1e-9)
-    every = max(1, ceil((last - first + 1) / most))
-    for power in range(first, last + 1, every):
-        label = f"{10.0**power:g}" if -3 <= power <= 3 else f"1e{power}"
-        yield Tick(axis.place(10.0**power), label)
-
-
-def _round_step(least: float) -> float:
-    """Return the smallest round number that is no less."""
-    power = 10.0 ** floor(log10(least))
-    return power * next(step for step in UNIT_STEPS if step * power >= least * (1.0 - 1e-9))
 
 
 def _number(value: float, step: float) -> str:

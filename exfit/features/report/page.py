@@ -1,55 +1,83 @@
 """The page of a report: one HTML file that needs nothing beside it."""
 
 import re
-import shlex
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from exfit import __version__
-from exfit.dsp.features import LABELS
+from exfit.features.report.behaviour import limits, small_signal, usability_table
 from exfit.features.report.charts import drawing
-from exfit.features.report.sections import AGAINST, OF_VALIDATION, SECTIONS, ReportSection
-from exfit.features.report.sections.against import against
-from exfit.features.report.sections.matches import MatchView, OverlayChart, live_data
-from exfit.features.report.sections.texts import number
-from exfit.features.report.verdict import Headline, headline, headline_of_validation
+from exfit.features.report.form import form, form_table, reproduction, signatures, unit_and_test
+from exfit.features.report.matches import (
+    against,
+    as_found,
+    differs_from_found,
+    fitted_matches,
+    live_data,
+    validation_matches,
+)
+from exfit.features.report.model import criteria, dynamics, findings, model, parameters
+from exfit.features.report.search import identifiability, search
+from exfit.features.report.words import number
+from exfit.results.comparisons import Comparison
+from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
+from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.validation_result import Reported, ValidationResult
-from exfit.show.blocks import Block
+from exfit.results.verdict import GOOD, MATCHES
+from exfit.show.blocks import Block, Chart
 from exfit.show.html import html as blocks_html
-from exfit.util.text import percentage, rounded
+from exfit.show.html import sentence
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
 CHART_STYLE = TEMPLATES / "chart.css"
+FORM = "The form of a verification report"
 CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of caption counts
 CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
-LONG = 12  # lines of a history that a reader sees without asking for more
-MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
+SECTION_LINK = re.compile(r'<a href="#([\w-]+)"></a>')  # to be numbered
 GENERATOR = '<meta name="generator" content="exfit '
-NO_BEHAVIOUR = "The result does not hold this: the fit was interrupted."
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
 
 @dataclass(frozen=True)
-class Page:
-    """What a page shows: its title, what it comes to, its sections with their content.
+class Headline:
+    """What the fit comes to: a word, a sentence, whether it is good, and the causes.
 
-    ``folder`` is where the results lie, for the commands on the page.
+    ``good`` is None where it is neither good nor bad. ``criteria`` says whether the responses meet
+    the limits of the report, ``passed`` as `CriteriaVerdict` has it.
     """
+
+    word: str
+    sentence: str
+    good: bool | None
+    causes: tuple[str, ...]
+    criteria: str = ""
+    passed: bool | None = None
+
+
+class ReportSection(NamedTuple):
+    """A section of a report: its id, its heading, what it shows."""
+
+    key: str
+    heading: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page shows: its title, what it comes to, its sections."""
 
     title: str
     headline: Headline
-    sections: Sequence[tuple[ReportSection, Any]]
-    folder: Path
+    sections: tuple[ReportSection, ...]
 
 
 def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str:
@@ -62,78 +90,159 @@ def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str
 
 def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) -> Page:
     """Build the page of a fit, beside an ``other`` fit where there is one."""
-    sections = [(section, _content(section, result)) for section in SECTIONS]
-    if other is not None:
-        sections.insert(len(sections) - 1, (AGAINST, against(result, other)))
-    return Page(f"{result.model}: {result.name}", headline(result), sections, folder)
+    unseen = "Validation on records that were not fitted"
+    beside = [] if other is None else [("against", "Beside another fit", against(result, other))]
+    sections: list[tuple[str, str, Iterable[Block]]] = [
+        *_first_sections(result),
+        ("as-found", "As found and verified", as_found(result)),
+        ("findings", "Notes and unresolved findings", findings(result)),
+        ("fit", "Fitted records", fitted_matches(result)),
+        ("validation", unseen, validation_matches(result)),
+        ("flat", "Usability", usability_table(result)),
+        ("search", "Search", search(result)),
+        ("identifiability", "Identifiability", identifiability(result)),
+        ("small", "Small-signal view", small_signal(result)),
+        ("limits", "Limits that were hit", limits(result)),
+        ("dyr", "PSS/E dynamics records", dynamics(result)),
+        ("reproduction", "Reproduction", reproduction(result, folder)),
+        *beside,
+        ("signatures", "Revision and signatures", signatures(result)),
+    ]
+    return _page(result, headline(result), sections)
 
 
 def validation_page(result: ValidationResult, folder: Path) -> Page:
     """Build the page of a validation: nothing of a search."""
-    every = ((section, _content(section, result)) for section in OF_VALIDATION)
-    sections = [(section, content) for section, content in every if content]
-    title = f"{result.model}: {result.name}"
-    return Page(title, headline_of_validation(result), sections, folder)
+    found = as_found(result) if differs_from_found(result) else ()
+    unseen = validation_matches(result) if result.validation else ()
+    sections: list[tuple[str, str, Iterable[Block]]] = [
+        *_first_sections(result),
+        ("as-found", "As found and compared", found),
+        ("findings", "Notes", findings(result)),
+        ("fit", "Records that the values were fitted to", fitted_matches(result)),
+        ("validation", "Recorded and simulated", unseen),
+        ("flat", "Usability", usability_table(result)),
+        ("small", "Small-signal view", small_signal(result)),
+        ("limits", "Limits that were hit", limits(result)),
+        ("reproduction", "Reproduction", reproduction(result, folder)),
+        ("signatures", "Revision and signatures", signatures(result)),
+    ]
+    return _page(result, headline_of_validation(result), sections)
 
 
-def _content(section: ReportSection, result: Reported) -> Any:
-    content = section.content(result)
-    return tuple(content) if isinstance(content, Iterator) else content
+def _first_sections(result: Reported) -> Iterator[tuple[str, str, Iterable[Block]]]:
+    yield "form", FORM, form_table(form(result))
+    yield "criteria", "Criteria", criteria(result)
+    yield "test", "Unit and test", unit_and_test(result)
+    yield "model", "Model", model(result)
+    yield "parameters", "Parameters", parameters(result)
+
+
+def _page(
+    result: Reported, headline: Headline, sections: Iterable[tuple[str, str, Iterable[Block]]]
+) -> Page:
+    """Make a page of the sections that have something to show."""
+    every = [ReportSection(key, heading, tuple(blocks)) for key, heading, blocks in sections]
+    shown = tuple(section for section in every if section.blocks)
+    return Page(f"{result.model}: {result.name}", headline, shown)
+
+
+def headline(result: FitResult) -> Headline:
+    """Word the outcome of a fit."""
+    outcome, judged = outcome_of(result), judged_by_criteria(result)
+    sentence = "; ".join([*filter(None, [explanation_of(result)]), *_validated(result)])
+    rmse = _rmse((*result.comparisons, *result.validation))
+    return Headline(
+        word=f"{outcome[:1].upper()}{outcome[1:]}",
+        sentence=f"{sentence[:1].upper()}{sentence[1:]}; {rmse}.",
+        good={GOOD: True, MATCHES: None}.get(outcome, False),
+        causes=tuple(cause.sentence for cause in result.verdict.causes),
+        criteria=judged.sentence,
+        passed=judged.passed,
+    )
+
+
+def headline_of_validation(result: ValidationResult) -> Headline:
+    """Word the outcome of a comparison of given values with records.
+
+    It is neither good nor bad where nothing limits an error: the criteria then judge alone.
+    """
+    judged = judged_by_criteria(result)
+    reasons = [match.reason for match in result.validation if match.reason]
+    limited = all(match.limit is not None for match in result.validation)
+    word, good = ("Accepted", True) if limited else ("Compared", None)
+    if reasons:
+        word, good = "Not accepted", False
+    sentence = "; ".join([f"Simulated with {result.origin}", *reasons, *_validated(result)])
+    sentence = f"{sentence}; {_rmse(result.matches)}."
+    return Headline(word, sentence, good, (), judged.sentence, judged.passed)
+
+
+def _rmse(matches: Iterable[Comparison]) -> str:
+    """List the rms of the errors that records are judged by: of an event those of P and Q."""
+    errors = []
+    for match in matches:
+        for signal in match.judging:
+            of = f"{match.name}, {signal}" if len(match.judging) > 1 else match.name
+            errors.append(f"{match.channels[signal].rmse:.2e} pu ({of})")
+    return f"rmse {', '.join(errors)}"
+
+
+def _validated(result: Reported) -> Iterator[str]:
+    """Yield the limits that accepted validations keep."""
+    if not result.validation:
+        yield "no record was kept for a validation"
+    elif result.accepted:
+        limits = [
+            f"{match.limit:.2e} pu ({match.name})"
+            for match in result.validation
+            if match.limit is not None
+        ]
+        if len(limits) < len(result.validation):
+            yield "nothing limits the error of its validations"
+        else:
+            yield f"every validation is within its limit of {', '.join(limits)}"
 
 
 def page_html(page: Page, interactive: bool = True) -> str:
-    """Return a page as HTML; without scripts, for a print, where it is not ``interactive``."""
-    style = CHART_STYLE.read_text(encoding="utf-8") + _text("report.css")
-    overlays = _overlays(content for _, content in page.sections) if interactive else []
-    text: str = (
-        environment()
-        .get_template("report.html.jinja")
-        .render(
-            title=page.title,
-            headline=page.headline,
-            sections=page.sections,
-            numbers={part.key: k for k, (part, _) in enumerate(page.sections, start=1)},
-            folder=str(page.folder),
-            data=list(live_data(overlays)),
-            css=style,
-            script=_text("report.js") if interactive else "",
-        )
+    """Return a page as HTML; without scripts, for a print, where it is not ``interactive``.
+
+    Its figures, tables and sections are numbered in the order in which they stand.
+    """
+    blocks = [block for section in page.sections for block in section.blocks]
+    live = [block for block in blocks if isinstance(block, Chart) and block.live is not None]
+    shared = environment()
+    chart: Any = shared.get_template("chart.jinja").module
+    text: str = shared.get_template("report.html.jinja").render(
+        title=page.title,
+        headline=page.headline,
+        sections=[(each, blocks_html(each.blocks, chart.chart)) for each in page.sections],
+        data=list(live_data(live)),
+        css=CHART_STYLE.read_text(encoding="utf-8") + _text("report.css"),
+        script=_text("report.js") if interactive else "",
     )
-    return _numbered(text)
-
-
-def _text(name: str) -> str:
-    return (TEMPLATES / name).read_text(encoding="utf-8")
-
-
-def _numbered(page: str) -> str:
-    """Return a page whose figures and tables are numbered, in the order in which they stand."""
-    counts = Counter[str]()
+    counts, numbers = Counter[str](), {each.key: k for k, each in enumerate(page.sections, 1)}
 
     def with_number(caption: re.Match[str]) -> str:
         kind = CAPTIONS[caption[1]]
         counts[kind] += 1
         return f'{caption[0]}<span class="number">{kind} {counts[kind]}.</span> '
 
-    return CAPTION.sub(with_number, page)
+    def link(section: re.Match[str]) -> str:
+        key = section[1]
+        return f'<a href="#{key}">{numbers[key]}</a>' if key in numbers else ""
+
+    return SECTION_LINK.sub(link, CAPTION.sub(with_number, text))
+
+
+def _text(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def is_page(path: Path) -> bool:
     """Tell by its head a page that this module made from other files."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return GENERATOR in file.read(HEAD)
-
-
-def _overlays(contents: Iterable[Any]) -> list[OverlayChart]:
-    """Return the overlays of all sections that have some."""
-    return [
-        overlay
-        for content in contents
-        if isinstance(content, tuple)
-        for view in content
-        if isinstance(view, MatchView)
-        for overlay in view.overlays
-    ]
 
 
 @cache
@@ -148,26 +257,7 @@ def environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    shared.filters |= {
-        "number": number,
-        "blocks": _blocks,
-        "rounded": rounded,
-        "percentage": percentage,
-    }
-    shared.filters |= {"drawing": drawing, "command": shlex.join}
-    shared.tests |= {"finite": _is_finite}
-    shared.globals |= {"version": __version__, "features": LABELS, "long": LONG}
-    shared.globals |= {"most_printed": MOST_PRINTED}
+    shared.filters |= {"drawing": drawing, "number": number, "sentence": sentence}
+    shared.tests |= {"finite": lambda value: value is not None and isfinite(value)}
+    shared.globals |= {"version": __version__}
     return shared
-
-
-def _is_finite(value: float | None) -> bool:
-    return value is not None and isfinite(value)
-
-
-def _blocks(blocks: Iterable[Block]) -> "Markup":
-    """Write the blocks of a section; their charts by the template of charts."""
-    from markupsafe import Markup
-
-    template: Any = environment().get_template("chart.jinja").module
-    return Markup(blocks_html(blocks, template.chart))

@@ -26,9 +26,8 @@ from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.planner.export import export
 from exfit.features.report.charts import Axis, drawing, ticks
-from exfit.features.report.page import html
-from exfit.features.report.sections.matches import fitted_matches, live_data
-from exfit.features.report.verdict import headline
+from exfit.features.report.matches import fitted_matches, live_data
+from exfit.features.report.page import headline, html
 from exfit.features.report.writing import write_report
 from exfit.models import from_file
 from exfit.results.comparisons import AsFound
@@ -232,7 +231,7 @@ def test_every_signal_of_every_record_is_drawn_with_its_error(fits, pages, name)
             measured = one["features"]["measured"]
             error = measured["errors"].get("final_value")
             told = rounded(measured["final_value"], error)
-            rows = page.tables[f"{one['name']}: features of the first step of the reference, in vt"]
+            rows = page.tables[f"Features of the first step of the reference, in vt: {one['name']}"]
             assert ["final value", told] in [row[:2] for row in rows]
     data = json.loads(page.scripts[0])
     assert [one["key"] for one in data] == drawn
@@ -341,7 +340,7 @@ def test_the_dynamics_record_is_at_the_place_where_the_unit_was_found(fits, page
 
 def test_a_playback_shows_what_was_played_in_and_no_features_of_a_step(pages):
     page = pages("playback")
-    title = "fit: simulated less recorded, and the largest departures of both from rest"
+    title = "Simulated less recorded, and the largest departures of both from rest: fit"
     heads, *rows = page.tables[title]
     assert [row[:2] for row in rows] == [
         ["vt", "played in"], ["ifd", "played in"], ["efd", "compared"]
@@ -576,12 +575,12 @@ def test_a_clock_that_began_long_ago_is_drawn_as_finely(tmp_path):
     record = {"file": "../ago.csv", "time": "t", "channels": {"vt": "v"}}
     test = {"vt0": 0.0, "vref": [{"at": ago + 0.5, "step": 1.0}]}
     run = first_order(tmp_path / "case", record=record, test=test, validate=None)
-    (match,) = fitted_matches(load_result(run))
-    shown = match.comparison.time
+    (chart,) = [each for each in fitted_matches(load_result(run)) if isinstance(each, Chart)]
+    shown = chart.live.time
     np.testing.assert_allclose(np.diff(shown), np.diff(TIME), atol=1e-6)  # a double is that fine
-    (sent,) = live_data(match.overlays)
+    (sent,) = live_data([chart])
     np.testing.assert_allclose(np.diff(sent["time"]), np.diff(TIME), atol=1e-6)
-    labels = [tick.label for tick in drawing(match.overlays[0].chart).x_ticks]
+    labels = [tick.label for tick in drawing(chart).x_ticks]
     assert len(set(labels)) == len(labels) > 2
 
 

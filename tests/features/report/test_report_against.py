@@ -6,9 +6,10 @@ from pages import Page
 from records import TEST, TIME, case_of, one, synthetic
 
 from exfit import cli, workflows
+from exfit.features.report.matches import against
 from exfit.features.report.page import html
-from exfit.features.report.sections.against import against
 from exfit.show import run_folder
+from exfit.show.blocks import Chart
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +32,18 @@ def fits(folders):
     return [load_result(folder) for folder in folders]
 
 
+def charts(this, other):
+    """Return the only chart of two fits beside each other."""
+    (chart,) = [each for each in against(this, other) if isinstance(each, Chart)]
+    return chart
+
+
 def test_both_fits_are_named_with_their_facts_and_parameters(fits):
     older, newer = fits
     page = Page(html(newer, "run", older))
     facts = {
         row[0]: row[1:]
-        for row in page.tables["Höllental, revision 2 and Höllental, revision 1"][1:]
+        for row in page.tables["Facts of Höllental, revision 2 and Höllental, revision 1"][1:]
     }
     assert facts["model"] == ["AC1A", "AC1A"]
     assert facts["rmse of fit (pu)"][0].startswith(f"{newer.rmse:.3g} ")
@@ -50,7 +57,7 @@ def test_both_fits_are_named_with_their_facts_and_parameters(fits):
 
 def test_responses_to_one_record_are_drawn_over_it(fits):
     older, newer = fits
-    (chart,) = against(newer, older).charts
+    chart = charts(newer, older)
     (panel,) = chart.panels
     assert [line.label for line in panel.series] == [
         "measured",
@@ -62,7 +69,7 @@ def test_responses_to_one_record_are_drawn_over_it(fits):
 def test_responses_to_two_records_are_drawn_above_each_other(fits, tmp_path):
     synthetic(tmp_path, TEST, TIME, seed=7)
     unit = workflows.fit(case_of(one(TEST, free=["KA"]), tmp_path))
-    (chart,) = against(fits[0], unit).charts
+    chart = charts(fits[0], unit)
     assert [panel.title.rpartition(", ")[2] for panel in chart.panels] == ["revision 1", "case"]
 
 

@@ -9,13 +9,12 @@ from records import TEST, TIME, case_of, config, one, synthetic
 import exfit
 from exfit import workflows
 from exfit.features.programme.show.programme_page import programme_page
-from exfit.features.report.page import html
-from exfit.features.report.sections import SECTIONS
-from exfit.features.report.sections.as_found import as_found
-from exfit.features.report.sections.form import form, rated
-from exfit.features.report.sections.signatures import signatures
-from exfit.features.report.sections.usability import usability
+from exfit.features.report.behaviour import usability
+from exfit.features.report.form import form, form_without_bumps, rated, signatures
+from exfit.features.report.matches import as_found
+from exfit.features.report.page import fit_page, html
 from exfit.results import facts
+from exfit.show.blocks import Chart, Note, Table
 
 QUICK = ("first_order", "machine_playback")  # the others are fitted in the long run
 SAMPLES = [
@@ -62,7 +61,7 @@ def test_every_row_of_the_form_is_filled_or_not_stated(name, tmp_path):
     rows = form(result)
     assert len(rows) == 32 + (2 if name == "grid_event" else 0)  # disturbances and their size
     assert all(row.answer.strip() and "nan" not in row.answer for row in rows)
-    sections = {section.key for section in SECTIONS}
+    sections = {section.key for section in fit_page(result, tmp_path).sections}
     assert all(row.section in sections for row in rows if row.section)
     assert {"R2.1.1", "R2.1.2", "R2.1.3", "R2.1.4", "R2.1.5", "R2.1.6", "R6"} <= {
         row.cf for row in rows
@@ -118,10 +117,11 @@ def test_every_fact_that_a_report_asks_for_is_in_the_documentation():
 
 
 def test_a_role_without_a_name_may_be_signed_and_says_that_it_is_not_stated(unit):
-    block = signatures(unit)
-    assert (block.revision, block.date) == ("3", "not stated")
-    assert [row.name for row in block.rows] == ["N. N.", "M. M.", "not stated", "not stated"]
-    assert block.rows[0].date == "2026-05-03"
+    facts, block = signatures(unit)
+    assert facts.pairs[:2] == (("Revision", "3"), ("Report date", "not stated"))
+    rows = [[cell.text for cell in row] for row in block.rows]
+    assert [row[1] for row in rows] == ["N. N.", "M. M.", "not stated", "not stated"]
+    assert rows[0] == ["Tested by", "N. N.", "2026-05-03", ""]
 
 
 def test_a_stable_unit_passes_the_checks_of_usability(unit):
@@ -131,16 +131,22 @@ def test_a_stable_unit_passes_the_checks_of_usability(unit):
 
 
 def test_what_was_found_and_what_was_verified_stand_beside_each_other(unit):
-    view = as_found(unit)
-    rows = {row.name: row for row in view.parameters}
-    fitted = unit.parameters["KA"].value
-    assert (rows["KA"].before, rows["KA"].verified) == (200.0, fitted)
-    assert rows["KA"].change == f"{fitted - 200.0:+.3g} ({100.0 * (fitted / 200.0 - 1.0):+.3g} %)"
-    assert rows.keys() == {"KA"}
-    assert {"TE", "machine.Xd"} <= set(view.same)
-    (match,) = view.matches
-    assert match.verified == unit.rmse < match.before
-    assert len(view.charts) == 1
+    blocks = [*as_found(unit)]
+    changed, errors = (block for block in blocks if isinstance(block, Table))
+    ((name, *cells),) = [[cell.text for cell in row] for row in changed.rows]
+    fitted = unit.parameters["KA"]
+    share = 100.0 * (fitted.value / 200.0 - 1.0)
+    assert (name, *cells[:2]) == ("KA", "200", fitted.rounded(fitted.value))
+    assert cells[2] == f"{fitted.value - 200.0:+.3g} ({share:+.3g} %)"
+    (same,) = [
+        block.text for block in blocks
+        if isinstance(block, Note) and block.text.startswith("Unchanged: ")
+    ]  # fmt: skip
+    assert {"TE", "machine.Xd"} <= set(same.removeprefix("Unchanged: ").rstrip(".").split(", "))
+    ((_, _, before, verified),) = [[cell.text for cell in row] for row in errors.rows]
+    assert verified == f"{unit.rmse:.3g}"
+    assert unit.rmse < float(before)
+    assert sum(isinstance(block, Chart) for block in blocks) == 1
     assert answers(unit)["Model in the planner's base"].answer == "AC1A, unit.dyr, bus 101"
 
 
@@ -157,9 +163,11 @@ def test_the_form_of_a_programme_without_bump_tests_says_so_and_has_what_it_meas
     content["tests"] = content["tests"][:1]
     result = exfit.run(written(content, tmp_path))
     page = programme_page(result, tmp_path)
-    keys = [section.key for section, _ in page.sections]
+    keys = [section.key for section in page.sections]
     assert keys == ["form", "programme", "test-1", "test", "signatures"]
-    rows = {row.asked: row for row in page.sections[0][1]}
+    rows = {row.asked: row for row in form_without_bumps(result)}
+    shown = [row[2].text for row in page.sections[0].blocks[0].rows]
+    assert shown == [row.answer for row in rows.values()]
     assert rows["Model response beside a recorded response"].answer == (
         "not stated: no bump test in this programme"
     )

@@ -9,8 +9,8 @@ from records import config, found_in
 
 from exfit import Record
 from exfit.case.case import Case
+from exfit.features.report.model import parameters
 from exfit.features.report.page import html
-from exfit.features.report.sections.parameters import parameters
 from exfit.fitting.search import fitted
 from exfit.fitting.system import typical_values_used
 from exfit.fitting.uncertainty import uncertainty_at

@@ -6,7 +6,7 @@ from exfit.features.programme.steady.saturation_result import (
     SaturationResult,
 )
 from exfit.features.programme.steady.v_curve_result import FieldReading, VCurve
-from exfit.features.report.layout import COLOURS, TALL
+from exfit.features.report.charts import COLOURS, TALL
 from exfit.show.blocks import Chart, Panel, Series
 
 HIGHEST_LINE = 1.05  # pu: as far as the air-gap line is drawn

@@ -1,12 +1,12 @@
-"""How sections write numbers, and what they say where the result holds nothing."""
+"""How a report writes numbers, and what it says of the program that simulated."""
 
 from math import isfinite
 
-from exfit.features.report.sections.other_program import NO_TWIN, has_no_equations
 from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported
 
 DASH = "–"
+NO_TWIN = "not stated: it needs the equations of a twin, and the case has none"
 
 
 def number(value: float | None, digits: int = 5) -> str:
@@ -17,6 +17,11 @@ def number(value: float | None, digits: int = 5) -> str:
 def values_of(result: Reported) -> str:
     """Name the values that are shown: those that were fitted, or given."""
     return "the fitted values" if isinstance(result, FitResult) else "the values compared"
+
+
+def has_no_equations(result: Reported) -> bool:
+    """Tell whether a program without a twin simulated the records."""
+    return result.other_program is not None and result.other_program.twin is None
 
 
 def no_behaviour(result: Reported) -> str:
