@@ -334,8 +334,7 @@ def reproduction(result: Reported, folder: Path) -> Iterator[Block]:
         versions["exfit that made this report"] = __version__
     yield Note(f"Made with {', '.join(f'{name} {each}' for name, each in versions.items())}.")
     hashes = (
-        row(label, result.files.get(label, DASH), sha256)
-        for label, sha256 in result.inputs.items()
+        row(label, result.files.get(label, DASH), sha256) for label, sha256 in result.inputs.items()
     )
     heads = columns("input", "file", "SHA-256")
     yield Table(heads, tuple(hashes), "SHA-256 of the inputs", style="hashes")
