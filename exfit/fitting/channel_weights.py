@@ -17,7 +17,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.fitting.descents import minimum_near
+from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, Residuals, SimulationCounter
@@ -54,7 +54,7 @@ def balanced(
     before = _movements(problem.residuals) if deviations is None else deviations
     problem = with_deviations(problem, before, of_residuals=deviations is not None)
     for _ in range(MOST_REWEIGHTINGS):
-        theta = minimum_near(problem.compressed.counted_by(counter), theta)
+        theta = descent_near(problem.compressed.counted_by(counter), theta).x
         after = residual_deviations(problem.compressed, theta)
         problem = with_deviations(problem, after)
         if _agree(before, after, WEIGHT_TOLERANCE):

@@ -1,48 +1,145 @@
-"""The coarse form of residuals: the same ones, simulated in steps several times as long."""
+"""The further starts of a search, and the legs of a descent from each of them.
 
-from collections.abc import Mapping
+These are the linear phase, a coarse grid, the case's own grid. Each only has to come near enough
+for the next one: docs/methods.md has what was measured.
+"""
+
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from exfit.errors import SimulationError
-from exfit.estimate import Descent
+from exfit.estimate import Descent, spread
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.problem import compressed
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.global_search import Way
+from exfit.fitting.problem import FitProblem, compressed
+from exfit.fitting.residuals import Residuals, SideBySide, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.simulation.simulator import Simulator
+from exfit.util.strategies import DEFAULT_STRATEGY
 
+Array = NDArray[np.float64]
+
+DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
+MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did
+LINEAR_ITERATIONS = 40  # with 25 of them one start in fifty ends elsewhere
 COARSENESS = 5  # times the step: it moves minima by 0.2 standard errors at most in sample cases
+COARSE_ITERATIONS = 50  # where limits make the cost creep from kink to kink
+NEAR = 1e-3  # of the cost: what the next leg gains in an iteration or two
+NEAR_STEP = 1e-6  # units
+MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
+TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
+SWITCHED = {"R": "resistance", "X": "reactance"}  # a share of a switching is none
+
+
+@dataclass(frozen=True)
+class FurtherStarts:
+    """The points (S, N) from which a search goes, and the legs that the descents from them take.
+
+    ``ways`` says what each descent begins with: "linear" the linear phase, "direct" the model
+    itself. ``why_direct`` is the reason where the linear phase has no meaning.
+    """
+
+    points: Array
+    legs: tuple[Descent, ...]
+    ways: tuple[Way, ...]
+    why_direct: str
+
+    @property
+    def merged(self) -> float | None:
+        """Within how many standard errors the ends of linear phases go on as one."""
+        return None if self.why_direct else MERGED
+
+    @property
+    def first_legs(self) -> tuple[int, ...]:
+        """The leg that each descent begins with."""
+        linear = not self.why_direct
+        return tuple(int(linear and way == "direct") for way in self.ways)
+
+
+def further_starts(
+    problem: FitProblem, count: int, counter: SimulationCounter | None
+) -> FurtherStarts:
+    """Return ``count`` starts: that of the case by way of the linear phase, others over the bounds.
+
+    ``counter`` counts the simulations of their descents.
+    """
+    residuals = problem.residuals.counted_by(counter)
+    legs, why_direct = legs_of(residuals, last_leg(problem, counter))
+    linear, direct = tuple[Way, ...](("linear",)), tuple[Way, ...](("direct",))
+    if why_direct:
+        points = spread(residuals.bounds, count)
+        return FurtherStarts(points, legs, direct * count, why_direct)
+    ways = (linear * (DIRECT - 1) + direct) * count
+    points = spread(residuals.bounds, count, residuals.start)
+    return FurtherStarts(points, legs, ways[:count], "")
+
+
+def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> Descent:
+    """Return the descent of a further start on the case's own grid."""
+    return Descent(
+        functions=SideBySide(problem.compressed.counted_by(counter)),
+        bounds=problem.residuals.bounds,
+        method=DEFAULT_STRATEGY,
+        max_iterations=MOST_ITERATIONS,
+        ftol=TO_DISTINGUISH,
+        x_scale=problem.residuals.units,
+    )
+
+
+def legs_of(residuals: Residuals, own: Descent) -> tuple[tuple[Descent, ...], str]:
+    """Return the legs that end with the ``own`` descent of a case, whose residuals these are.
+
+    The first is the linear phase, left out where it has no meaning; then the reason follows. Only
+    the bounds and units of the last leg are those of the others: they do not depend on the case's
+    methods and tolerances.
+    """
+
+    def leg(form: Residuals, method: str, iterations: int) -> Descent:
+        return Descent(
+            functions=SideBySide(compressed(form)),
+            bounds=own.bounds,
+            method=method,
+            max_iterations=iterations,
+            ftol=NEAR,
+            xtol=NEAR_STEP,
+            x_scale=own.x_scale,
+        )
+
+    coarse = coarse_form(residuals)
+    linear = linear_form(coarse)
+    legs = (leg(coarse, "lm-then-dgn", COARSE_ITERATIONS), own)
+    if isinstance(linear, str):
+        return legs, linear
+    return (leg(linear, "lm", LINEAR_ITERATIONS), *legs), ""
 
 
 def coarse_form(residuals: Residuals) -> Residuals:
     """Return the residuals on a grid of steps that are ``COARSENESS`` times as long.
 
     The rule of sub-steps holds as it does for the case's own grid: along the response to the start
-    values, too. So a model that is fast for its step gains less.
+    values, too. So a model that is fast for its step gains less. A test stays on its own grid where
+    the coarse one gives no response.
     """
-    values = residuals.values(residuals.start)
-    experiments = [_on_coarse_grid(experiment, values) for experiment in residuals.experiments]
+    values, experiments = residuals.values(residuals.start), list[Experiment]()
+    for experiment in residuals.experiments:
+        own = experiment.simulator
+        step = COARSENESS * own.step
+        coarse = Simulator(own.system, own.inputs, own.times, step, delay=own.delay)
+        try:
+            experiments.append(replace(experiment, simulator=coarse).with_enough_substeps(values))
+        except SimulationError:
+            experiments.append(experiment)
     return replace(residuals, experiments=experiments)
-
-
-def _on_coarse_grid(experiment: Experiment, values: dict[str, float]) -> Experiment:
-    """Return the same test on the coarse grid; on its own one where that gives no response."""
-    own = experiment.simulator
-    coarse = Simulator(own.system, own.inputs, own.times, COARSENESS * own.step, delay=own.delay)
-    try:
-        return replace(experiment, simulator=coarse).with_enough_substeps(values)
-    except SimulationError:
-        return experiment
-
-
-Values = Mapping[str, float]
-
-SWITCHED = {"R": "resistance", "X": "reactance"}  # a share of a switching is none
 
 
 def linear_form(residuals: Residuals) -> Residuals | str:
     """Return the residuals of the small-signal response, or why that has no meaning.
+
+    Far from a minimum it is the better guide. It has few minima, as no limit is met and saturation
+    stays where it is at rest, and it leads near those of the model itself.
 
     Each response is that to a small share of what moves the unit, enlarged about its rest to full
     size (`Simulator.small_signal`). Records, weights, priors and ties are the same, and so is all
@@ -50,8 +147,19 @@ def linear_form(residuals: Residuals) -> Residuals | str:
     """
     values = residuals.values(residuals.start)
     for experiment in residuals.experiments:
-        reason = _no_meaning(experiment, values)
-        if reason is not None:
+        inputs, reason = experiment.simulator.inputs, ""
+        changed = [step.signal for step in inputs.steps]
+        switched = [SWITCHED[signal] for signal in changed if signal in SWITCHED]
+        driving = [signal for signal in inputs.recorded if signal not in REFERENCES]
+        if switched:
+            reason = f"the test switches the {switched[0]} of the network"
+        elif BREAKER in changed:
+            reason = "the test opens the breaker"
+        elif driving:
+            reason = f"recorded signals drive the simulation: {', '.join(driving)}"
+        elif limits := limits_at_rest(experiment.simulator.system, experiment.parameters(values)):
+            reason = f"before the test the unit rests on a limit: {', '.join(limits)}"
+        if reason:
             several = len(residuals.experiments) > 1
             return f"record {experiment.name}: {reason}" if several else reason
     experiments = [
@@ -59,65 +167,3 @@ def linear_form(residuals: Residuals) -> Residuals | str:
         for experiment in residuals.experiments
     ]
     return replace(residuals, experiments=experiments)
-
-
-def _no_meaning(experiment: Experiment, values: Values) -> str | None:
-    """Reason against a small-signal response of a test, None where it has one."""
-    inputs = experiment.simulator.inputs
-    switched = [SWITCHED[step.signal] for step in inputs.steps if step.signal in SWITCHED]
-    if switched:
-        return f"the test switches the {switched[0]} of the network"
-    if any(step.signal == BREAKER for step in inputs.steps):
-        return "the test opens the breaker"
-    driving = [signal for signal in inputs.recorded if signal not in REFERENCES]
-    if driving:
-        return f"recorded signals drive the simulation: {', '.join(driving)}"
-    limits = limits_at_rest(experiment.simulator.system, experiment.parameters(values))
-    if limits:
-        return f"before the test the unit rests on a limit: {', '.join(limits)}"
-    return None
-
-
-LINEAR_ITERATIONS = 40  # with 25 of them one start in fifty ends elsewhere
-COARSE_ITERATIONS = 50  # where limits make the cost creep from kink to kink
-NEAR = 1e-3  # of the cost: what the next leg gains in an iteration or two
-NEAR_STEP = 1e-6  # units
-
-
-@dataclass(frozen=True)
-class Legs:
-    """The descents of a further start, one after the other.
-
-    ``direct`` leave out the linear phase; ``no_linear_phase`` says why it has no meaning, "" where
-    it has one: then ``linear`` begin with it.
-    """
-
-    direct: tuple[Descent, ...]
-    linear: tuple[Descent, ...]
-    no_linear_phase: str = ""
-
-
-def legs_of(residuals: Residuals, own: Descent) -> Legs:
-    """Return the legs that end with the ``own`` descent of a case, whose residuals these are.
-
-    Only its bounds and units are those of the others: they do not depend on the case's methods and
-    tolerances.
-    """
-    coarse = coarse_form(residuals)
-    linear = linear_form(coarse)
-    direct = (_leg(coarse, own, "lm-then-dgn", COARSE_ITERATIONS), own)
-    if isinstance(linear, str):
-        return Legs(direct, direct, linear)
-    return Legs(direct, (_leg(linear, own, "lm", LINEAR_ITERATIONS), *direct))
-
-
-def _leg(residuals: Residuals, own: Descent, method: str, iterations: int) -> Descent:
-    return Descent(
-        functions=SideBySide(compressed(residuals)),
-        bounds=own.bounds,
-        method=method,
-        max_iterations=iterations,
-        ftol=NEAR,
-        xtol=NEAR_STEP,
-        x_scale=own.x_scale,
-    )

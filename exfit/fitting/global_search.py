@@ -1,110 +1,80 @@
-"""The global search: the descent from the start of a case, then others from further starts."""
+"""The search for the best point: descents from the start of a case, then from further starts.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+Of ends that the records do not tell apart it is one on which the validations hold. Strategy auto
+asks more of an end. What speaks against one is passed as a judge, which knows the records, their
+noise and the validations.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from math import nan
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from exfit.estimate import (
-    Descent,
-    LocalMinimum,
-    MultistartResult,
-    Result,
-    SolverIteration,
-    Stop,
-    spread,
-)
-from exfit.fitting.descents import (
-    Announce,
-    Descents,
-    Judge,
-    SearchMethods,
-    chosen,
-    confirmed,
-    count_like,
-    counted,
-    following,
-    from_start,
-    notes_of,
-    stopped,
-    taken_for_validation,
-)
-from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import SideBySide, SimulationCounter
-from exfit.util.strategies import DEFAULT_STRATEGY, FROM_FURTHER_STARTS
+from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
+from exfit.fitting.descents import Announce, following, stopped
+from exfit.util.strategies import FROM_FURTHER_STARTS
 
 Array = NDArray[np.float64]
 Way = Literal["strategy", "linear", "direct"]
+Doubt = Callable[[Result], str]  # what speaks against an end; "" where nothing does
 
-DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
-MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did
-MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
-TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
+METHODS_OF_AUTO = ("dgn", "lm-then-dgn")
+CONFIRMED = 2  # descents that must lead to a minimum which is in doubt
+PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
+AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
 
 
-@dataclass(frozen=True)
-class FurtherStarts:
-    """The points (S, N) from which a search goes, and the legs that the descents from them take.
+class Judge(NamedTuple):
+    """What speaks against an end: ``refused`` why a validation does not hold on it.
 
-    ``ways`` says what each descent begins with: "linear" the linear phase, "direct" the model
-    itself. ``why_direct`` is the reason where the linear phase has no meaning.
+    ``doubt`` says why else it may not be the one looked for: strategy auto goes on then.
     """
 
-    points: Array
-    legs: tuple[Descent, ...]
+    refused: Doubt
+    doubt: Doubt
+
+
+def no_doubt(_: Result) -> str:
+    """Doubt no end."""
+    return ""
+
+
+NO_JUDGE = Judge(no_doubt, no_doubt)
+
+
+class FurtherDescents(NamedTuple):
+    """The minima from further starts and of earlier descents.
+
+    ``ways`` says what the descent from each further start began with; ``why_direct`` is the reason
+    where there was no linear phase.
+    """
+
+    minima: MultistartResult
     ways: tuple[Way, ...]
     why_direct: str
 
-    @property
-    def merged(self) -> float | None:
-        """Within how many standard errors the ends of linear phases go on as one."""
-        return None if self.why_direct else MERGED
+
+class SearchMethods(Protocol):
+    """The searches of a case."""
 
     @property
-    def first_legs(self) -> tuple[int, ...]:
-        """The leg that each descent begins with."""
-        linear = not self.why_direct
-        return tuple(int(linear and way == "direct") for way in self.ways)
+    def unbounded(self) -> tuple[str, ...]:
+        """The parameters without finite bounds: there no starts can be distributed."""
 
+    def one(self, method: str, announce: Announce) -> Result:
+        """Descend from the start of the case."""
 
-def further_starts(
-    problem: FitProblem, count: int, counter: SimulationCounter | None
-) -> FurtherStarts:
-    """Return ``count`` starts: that of the case by way of the linear phase, others over the bounds.
+    def further(self, earlier: Sequence[Result]) -> FurtherDescents:
+        """Find the minima from further starts, beside earlier descents."""
 
-    ``counter`` counts the simulations of their descents.
-    """
-    from exfit.fitting.further_starts import legs_of  # which a local search does not need
+    def refined(self, end: Result, announce: Announce) -> Result:
+        """Descend from an end with the full tolerances of the case."""
 
-    residuals = problem.residuals.counted_by(counter)
-    legs = legs_of(residuals, last_leg(problem, counter))
-    direct: tuple[Way, ...] = ("direct",)
-    if legs.no_linear_phase:
-        points = spread(residuals.bounds, count)
-        return FurtherStarts(points, legs.direct, direct * count, legs.no_linear_phase)
-    by_linear: tuple[Way, ...] = ("linear",)
-    ways = (by_linear * (DIRECT - 1) + direct) * count
-    points = spread(residuals.bounds, count, residuals.start)
-    return FurtherStarts(points, legs.linear, ways[:count], "")
-
-
-def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> Descent:
-    """Return the descent of a further start on the case's own grid."""
-    return Descent(
-        functions=SideBySide(problem.compressed.counted_by(counter)),
-        bounds=problem.residuals.bounds,
-        method=DEFAULT_STRATEGY,
-        max_iterations=MOST_ITERATIONS,
-        ftol=TO_DISTINGUISH,
-        x_scale=problem.residuals.units,
-    )
-
-
-PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
-AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
+    def margin(self, lowest: Result) -> float:
+        """Excess of a cost over the lowest up to which the records do not tell the two apart."""
 
 
 class SearchResult(NamedTuple):
@@ -138,110 +108,73 @@ class SearchResult(NamedTuple):
         return any(line.phase == FROM_FURTHER_STARTS for line in self.history)
 
 
-class FurtherDescents(NamedTuple):
-    """The minima from further starts and of earlier descents.
+class _Descents(NamedTuple):
+    """The descents from the start of a case: their ends, why each was in doubt, the best of them.
 
-    ``ways`` says what the descent from each further start began with; ``why_direct`` is the reason
-    where there was no linear phase.
+    ``best`` has Stop.INTERRUPTED where an interruption ended them.
     """
 
-    minima: MultistartResult
-    ways: tuple[Way, ...]
-    why_direct: str
+    ends: tuple[Result, ...]
+    doubts: tuple[str, ...]
+    best: Result
 
-
-class GlobalSearchMethods(SearchMethods, Protocol):
-    """The searches of a case, those from further starts among them."""
-
-    @property
-    def unbounded(self) -> tuple[str, ...]:
-        """The parameters without finite bounds: there no starts can be distributed."""
-
-    def further(self, earlier: Sequence[Result]) -> FurtherDescents:
-        """Return the minima from further starts and of earlier descents."""
-
-    def refined(self, end: Result, announce: Announce) -> Result:
-        """Return the descent from an end with the full tolerances of the case."""
+    def joined(self, best: Result) -> tuple[tuple[SolverIteration, ...], Result]:
+        """Join their iterations, those of the best last; that one gets the calls of all of them."""
+        lines = list[SolverIteration]()
+        others = [end for end in self.ends if end.history is not best.history]
+        for history in (*(end.history for end in others), best.history):
+            lines += [following(lines[-1], line) if lines else line for line in history]
+        nfev, njev = sum(end.nfev for end in others), sum(end.njev for end in others)
+        return tuple(lines), replace(best, nfev=best.nfev + nfev, njev=best.njev + njev)
 
 
 def local_search(
     searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
 ) -> SearchResult:
-    """Return the best point of the descents from the start of a case."""
-    return best_of(searches, from_start(searches, methods, judge, announce))
+    """Find the best point of the descents from the start of a case."""
+    return _best_of(searches, _from_start(searches, methods, judge, announce))
 
 
 def global_search(
-    searches: GlobalSearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
+    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
 ) -> SearchResult:
-    """Return the best point of the descents from the start of a case and from further starts.
+    """Find the best point of the descents from the start of a case and from further starts.
 
     Of minima that the records do not tell apart it is one on which the validations hold, if there
     is one. Where the descents of the case came to the same minimum, theirs is the result; else a
     last descent from the end found. An interruption keeps the best point so far.
     """
-    descents = from_start(searches, methods, judge, announce)
-    if descents.interrupted:
-        return best_of(searches, descents)
-    reason = why_local(searches, descents.best)
-    if reason:
-        alone = best_of(searches, descents)
-        return alone._replace(notes=(*alone.notes, f"no search from further starts: {reason}"))
-    return beyond(searches, descents, searches.further(descents.ends), judge, announce)
-
-
-def why_local(searches: GlobalSearchMethods, own: Result) -> str:
-    """Reason against a search from further starts, "" where there is none."""
-    if own.stop in AT_TOLERANCE:
-        return "a tolerance that the case gives ended the descent from its start"
-    if searches.unbounded:
+    descents = _from_start(searches, methods, judge, announce)
+    if descents.best.stop is Stop.INTERRUPTED:
+        return _best_of(searches, descents)
+    why_local = ""
+    if descents.best.stop in AT_TOLERANCE:
+        why_local = "a tolerance that the case gives ended the descent from its start"
+    elif searches.unbounded:
         names = ", ".join(searches.unbounded)
-        return f"they are distributed between bounds, and {names} has no min or no max"
-    return ""
-
-
-def best_of(searches: SearchMethods, descents: Descents) -> SearchResult:
-    """Return the best of the descents from the start of a case."""
-    best, notes = descents.best, tuple[str, ...]()
-    if not descents.interrupted:
-        costs = [end.cost for end in descents.ends]
-        lowest = min(descents.ends, key=lambda end: end.cost)
-        reason = descents.doubts[-1]
-        like = count_like(lowest, costs, searches) if reason else len(costs)
-        best = confirmed(best, reason, like)
-        notes = tuple(notes_of(descents.doubts, best, like, costs))
-        if best.cost > lowest.cost:
-            notes = (*notes, taken_for_validation(best.cost / lowest.cost))
-    best = counted(best, descents.ends)
-    return SearchResult(best, None, descents.history, best, notes=notes)
-
-
-def beyond(
-    searches: GlobalSearchMethods,
-    descents: Descents,
-    further: FurtherDescents,
-    judge: Judge,
-    announce: Announce,
-) -> SearchResult:
-    """Return the best of the descents from the start of a case and of the minima found with it."""
-    minima, ways = further.minima, ways_of(further, descents)
+        why_local = f"they are distributed between bounds, and {names} has no min or no max"
+    if why_local:
+        alone = _best_of(searches, descents)
+        return alone._replace(notes=(*alone.notes, f"no search from further starts: {why_local}"))
+    further = searches.further(descents.ends)
+    own_ways: tuple[Way, ...] = ("strategy",)
+    minima, ways = further.minima, own_ways * len(descents.ends) + further.ways
     ends = [minimum.result for minimum in minima.minima]
     try:
         if minima.interrupted:
             raise KeyboardInterrupt
-        best = chosen(searches, judge, ends)
-        reason = judge.doubt(best)
+        best = _chosen(searches, judge, ends)
+        doubt = judge.doubt(best)
     except KeyboardInterrupt:
-        best = min([*descents.ends, *filter(None, [minima.best])], key=lambda end: end.cost)
-        return interrupted(descents, minima, ways, best, announce)
-    like = count_like(ends[0], minima.end_costs, searches) if reason else len(ends)
-    own = own_end(descents, best)
+        return _interrupted(descents, minima, ways, announce)
+    like = _count_like(ends[0], minima.end_costs, searches) if doubt else len(ends)
+    own = _own_end(descents, best)
     if own is None:
-        path, last = refined(searches, descents.history, best, announce)
+        path, last = _refined(searches, descents.joined(descents.best)[0], best, announce)
     else:
-        path, last = descents._replace(best=own).history, counted(own, descents.ends)
-    last = confirmed(last, reason, like)
-    notes = [*notes_of((*descents.doubts, reason), last, like, minima.end_costs)]
+        path, last = descents.joined(own)
+    last = _confirmed(last, doubt, like)
+    notes = [*_notes((*descents.doubts, doubt), like, minima.end_costs)]
     if further.why_direct:
         notes.append(f"the search goes without its linear phase: {further.why_direct}")
     place = next(k for k, end in enumerate(ends) if end is best)
@@ -249,17 +182,13 @@ def beyond(
 
 
 def continued(
-    searches: GlobalSearchMethods,
-    found: SearchResult,
-    point: Array,
-    announce: Announce,
-    phase: str = FROM_FURTHER_STARTS,
+    searches: SearchMethods, found: SearchResult, point: Array, announce: Announce, phase: str
 ) -> SearchResult:
     """Return a search that goes on from a point (N,) with a lower cost than its best.
 
     ``phase`` says in its history how that point was found.
     """
-    path, last = refined(searches, found.history, replace(found.best, x=point), announce, phase)
+    path, last = _refined(searches, found.history, replace(found.best, x=point), announce, phase)
     if found.minima is None:
         return found._replace(best=last, history=path)
     alike, others = list[LocalMinimum](), list[LocalMinimum]()
@@ -272,25 +201,16 @@ def continued(
 
 
 def judged_again(
-    searches: GlobalSearchMethods, found: SearchResult, judge: Judge, announce: Announce
+    searches: SearchMethods, found: SearchResult, judge: Judge, announce: Announce
 ) -> SearchResult:
     """Return a search whose best minimum is a new one, or one like it if validations hold there."""
     ends = [] if found.minima is None else [local.result for local in found.minima.minima]
-    best = chosen(searches, judge, ends) if ends else found.best
+    best = _chosen(searches, judge, ends) if ends else found.best
     if not ends or best is ends[0]:
         return found._replace(for_validation=False)
-    path, last = refined(searches, found.history, best, announce)
+    path, last = _refined(searches, found.history, best, announce)
     place = next(k for k, end in enumerate(ends) if end is best)
     return found._replace(best=last, history=path, place=place, for_validation=True)
-
-
-def own_end(descents: Descents, best: Result) -> Result | None:
-    """Return the end of the descents from the start of a case in a minimum, None where none is."""
-    for end in descents.ends:
-        if end.history is best.history:
-            return end
-    ends = [end for end in descents.ends if end.success and is_same(best, end)]
-    return min(ends, key=lambda end: end.cost, default=None)
 
 
 def is_same(best: Result, other: Result) -> bool:
@@ -302,56 +222,149 @@ def is_same(best: Result, other: Result) -> bool:
     return other.cost >= best.cost and same(lowest, higher, nothing=nothing)
 
 
-def refined(
-    searches: GlobalSearchMethods,
+def taken_for_validation(times: float) -> str:
+    """Explain a minimum so many times as high as the lowest one, taken for its validation."""
+    return (
+        f"the cost is {times:.4g} times the lowest one found: the records do not tell the two "
+        "minima apart, and this one was taken because the validation holds on it; it is no "
+        "independent test then"
+    )
+
+
+# ---- the descents from the start
+
+
+def _from_start(
+    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
+) -> _Descents:
+    """Descend by one method after the other, until one ends without doubt.
+
+    An interruption ends them with the best point so far.
+    """
+    ends, doubts = list[Result](), list[str]()
+    try:
+        for method in methods:
+            ends.append(searches.one(method, announce))
+            if ends[-1].stop is Stop.INTERRUPTED:
+                raise KeyboardInterrupt
+            best = _chosen(searches, judge, ends)
+            doubts.append(judge.doubt(best))
+            if not doubts[-1]:
+                break
+    except KeyboardInterrupt:
+        if not ends:
+            raise
+        best = stopped(min(ends, key=_cost), Stop.INTERRUPTED)
+    return _Descents(tuple(ends), tuple(doubts), best)
+
+
+def _best_of(searches: SearchMethods, descents: _Descents) -> SearchResult:
+    best, notes = descents.best, tuple[str, ...]()
+    if best.stop is not Stop.INTERRUPTED:
+        costs = [end.cost for end in descents.ends]
+        lowest = min(descents.ends, key=_cost)
+        doubt = descents.doubts[-1]
+        like = _count_like(lowest, costs, searches) if doubt else len(costs)
+        best = _confirmed(best, doubt, like)
+        notes = tuple(_notes(descents.doubts, like, costs))
+        if best.cost > lowest.cost:
+            notes = (*notes, taken_for_validation(best.cost / lowest.cost))
+    history, best = descents.joined(best)
+    return SearchResult(best, None, history, best, notes=notes)
+
+
+def _own_end(descents: _Descents, best: Result) -> Result | None:
+    """Find the end of the descents from the start of a case in a minimum, None where none is."""
+    for end in descents.ends:
+        if end.history is best.history:
+            return end
+    ends = [end for end in descents.ends if end.success and is_same(best, end)]
+    return min(ends, key=_cost, default=None)
+
+
+def _interrupted(
+    descents: _Descents, minima: MultistartResult, ways: tuple[Way, ...], announce: Announce
+) -> SearchResult:
+    """Return the best point of a search that an interruption ended."""
+    best = min([*descents.ends, *filter(None, [minima.best])], key=_cost)
+    minima, own = replace(minima, interrupted=True), _own_end(descents, best)
+    if own is not None:
+        path, last = descents.joined(own)
+        ends = enumerate(minima.minima)
+        place = next((k for k, end in ends if is_same(end.result, own)), None)
+        return SearchResult(last, minima, path, own, place, ways)
+    path, _ = descents.joined(descents.best)
+    line = _after_search(path[-1], replace(best.history[-1], nfev=0, njev=0), FROM_FURTHER_STARTS)
+    announce(line)
+    best = replace(stopped(best, Stop.INTERRUPTED), nfev=path[-1].nfev, njev=path[-1].njev)
+    return SearchResult(best, minima, (*path, line), descents.best, ways=ways)
+
+
+# ---- ends and the path to them
+
+
+def _cost(end: Result) -> float:
+    return end.cost
+
+
+def _chosen(searches: SearchMethods, judge: Judge, ends: Sequence[Result]) -> Result:
+    """Choose the lowest end, or one like it if the validations hold on that one alone."""
+    lowest, *others = sorted(ends, key=_cost)
+    if others and others[0].cost > lowest.cost and judge.refused(lowest):
+        highest = lowest.cost + searches.margin(lowest)
+        like = (other for other in others if other.cost <= highest)
+        return next((other for other in like if not judge.refused(other)), lowest)
+    return lowest
+
+
+def _count_like(lowest: Result, costs: ArrayLike, searches: SearchMethods) -> int:
+    """Count the costs that the records do not tell from the lowest of them."""
+    return int(np.count_nonzero(np.asarray(costs) <= lowest.cost + searches.margin(lowest)))
+
+
+def _confirmed(best: Result, doubt: str, like: int) -> Result:
+    """Return the best end: one in doubt has converged only if several descents led there."""
+    unconfirmed = bool(doubt) and best.success and like < CONFIRMED
+    return stopped(best, Stop.UNCONFIRMED) if unconfirmed else best
+
+
+def _notes(doubts: Sequence[str], like: int, costs: ArrayLike) -> Iterator[str]:
+    """Explain the stages of auto after its first one, and the doubts that it left.
+
+    ``doubts`` are those after each stage and of the result; ``like`` of the descents, which ended
+    at ``costs``, led to the lowest minimum or to one like it.
+    """
+    if doubts[0]:
+        yield f"auto took dgn and lm-then-dgn, because after dgn: {doubts[0]}"
+    if doubts[-1]:
+        count = int(np.count_nonzero(np.isfinite(costs)))
+        yield (
+            f"{doubts[-1]}; {like} of {count} descents led to this minimum or to one like it, and "
+            "none lower"
+        )
+
+
+def _refined(
+    searches: SearchMethods,
     history: Sequence[SolverIteration],
     end: Result,
     announce: Announce,
     phase: str = FROM_FURTHER_STARTS,
 ) -> tuple[tuple[SolverIteration, ...], Result]:
-    """Return a last descent from an end that was found elsewhere, behind the path before."""
+    """Make a last descent from an end that was found elsewhere, behind the path before."""
     path = [*history]
     last = path[-1]
 
     def join(line: SolverIteration) -> None:
         first = path[-1] is last
-        path.append(after_search(last, line, phase) if first else following(last, line))
+        path.append(_after_search(last, line, phase) if first else following(last, line))
         announce(path[-1])
 
     result = searches.refined(end, join)
     return tuple(path), replace(result, nfev=last.nfev + result.nfev, njev=last.njev + result.njev)
 
 
-def after_search(
-    last: SolverIteration, point: SolverIteration, phase: str = FROM_FURTHER_STARTS
-) -> SolverIteration:
+def _after_search(last: SolverIteration, point: SolverIteration, phase: str) -> SolverIteration:
     """Return the line of a point that further starts led to, behind the last one of the case."""
     line = following(last, replace(point, number=0))
     return replace(line, phase=phase, step_norm=0.0, damping=nan, inner=0, capped=None)
-
-
-def ways_of(further: FurtherDescents, descents: Descents) -> tuple[Way, ...]:
-    """List the beginnings of all descents, those from the start of the case first."""
-    own: tuple[Way, ...] = ("strategy",)
-    return own * len(descents.ends) + further.ways
-
-
-def interrupted(
-    descents: Descents,
-    minima: MultistartResult,
-    ways: tuple[Way, ...],
-    best: Result,
-    announce: Announce,
-) -> SearchResult:
-    """Return the best point of a search that an interruption ended."""
-    minima, own = replace(minima, interrupted=True), own_end(descents, best)
-    if own is not None:
-        path = descents._replace(best=own).history
-        ends = enumerate(minima.minima)
-        place = next((k for k, end in ends if is_same(end.result, own)), None)
-        return SearchResult(counted(own, descents.ends), minima, path, own, place, ways)
-    last = descents.history[-1]
-    line = after_search(last, replace(best.history[-1], nfev=0, njev=0))
-    announce(line)
-    best = replace(stopped(best, Stop.INTERRUPTED), nfev=last.nfev, njev=last.njev)
-    return SearchResult(best, minima, (*descents.history, line), descents.best, ways=ways)

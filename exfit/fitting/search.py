@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import isfinite
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +13,19 @@ from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
-from exfit.fitting.descents import METHODS_OF_AUTO, NO_JUDGE, Announce, Judge, no_doubt
+from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import (
+    METHODS_OF_AUTO,
+    NO_JUDGE,
     FurtherDescents,
+    Judge,
     SearchResult,
     continued,
-    further_starts,
     global_search,
     judged_again,
     local_search,
+    no_doubt,
 )
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.program import Program
@@ -38,7 +40,6 @@ from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.util.strategies import (
     DEFAULT_STRATEGY,
-    FROM_FURTHER_STARTS,
     SEARCHES,
     STRATEGIES,
 )
@@ -120,7 +121,7 @@ def search(
     judge: Judge | None = None,
     program: Program | None = None,
 ) -> SearchResult:
-    """Return the best point found from the start of a case and, in a global search, from others.
+    """Find the best point from the start of a case and, in a global search, from others.
 
     ``counter`` counts the simulations of the search alone; ``options`` are by default the case's.
     The ``program`` is the one that simulates the records, if there is one.
@@ -129,12 +130,11 @@ def search(
     """
     options = options or case.estimate
     searches = CaseSearches(problem, options, progress, counter, program)
-    staged = method == "auto" and judge is not None
-    judge = judge or NO_JUDGE
     search_of = local_search if options.search == "local" else global_search
-    if staged:
+    if method == "auto" and judge is not None:
         return search_of(searches, METHODS_OF_AUTO, judge, announce)
-    return search_of(searches, (method,), judge._replace(doubt=no_doubt), announce)
+    judge = (judge or NO_JUDGE)._replace(doubt=no_doubt)
+    return search_of(searches, (method,), judge, announce)
 
 
 def continued_from(
@@ -144,8 +144,8 @@ def continued_from(
     announce: Announce,
     counter: SimulationCounter,
     options: Estimate,
-    phase: str = FROM_FURTHER_STARTS,
-    judge: Judge | None = None,
+    phase: str,
+    judge: Judge | None,
 ) -> SearchResult:
     """Return a search that goes on from a point (N,) with a lower cost than its best.
 
@@ -178,57 +178,62 @@ class CaseSearches:
         return tuple(each.name for each in free if not isfinite(each.high - each.low))
 
     def one(self, method: str, announce: Announce) -> estimate.Result:
-        """Return the end of a descent from the start of the case."""
-        if self.program is not None and self.program.has_twin and self.options.jacobian == "exact":
-            by_twin = partial(self._descent, method)
-            return self.program.descend(self.residuals, by_twin, announce)
-        descent = self._descent(method, estimate.OneByOne(self.residuals, self._jacobian))
-        return descent.run(self.residuals.start, announce)
+        """Descend from the start of the case."""
+        residuals, options, program = self.residuals, self.options, self.program
 
-    def _jacobian(self, theta: Array) -> Array:
-        """Return the Jacobian (M, N), no number where the model has none."""
-        try:
-            return JACOBIANS[self.options.jacobian](self.residuals)(theta)
-        except SimulationError:
-            return np.full((1, 1), np.nan)
+        def jacobian(theta: Array) -> Array:
+            try:
+                return JACOBIANS[options.jacobian](residuals)(theta)
+            except SimulationError:  # the model has none
+                return np.full((1, 1), np.nan)
 
-    def _descent(self, method: str, functions: estimate.Functions) -> estimate.Descent:
-        options = self.options
-        descent = estimate.Descent(
-            functions=functions,
-            method=method,
-            max_iterations=options.most_iterations,
-            jacobian_error=jacobian_error(options.jacobian, options.difference_step),
-            good_enough=_good_enough(options, self.residuals),
-            searches=searches_of(options),
-            **self._limits,
-        )
-        return descent if self.program is None else self.program.coarser(descent)
+        def descent(functions: estimate.Functions) -> estimate.Descent:
+            own = self._descent(functions, method)
+            own = replace(
+                own,
+                max_iterations=options.most_iterations,
+                jacobian_error=jacobian_error(options.jacobian, options.difference_step),
+                good_enough=self._good_enough,
+                searches=searches_of(options),
+            )
+            return own if program is None else program.coarser(own)
+
+        if program is not None and program.has_twin and options.jacobian == "exact":
+            return program.descend(residuals, descent, announce)
+        functions = estimate.OneByOne(residuals, jacobian)
+        return descent(functions).run(residuals.start, announce)
 
     def refined(self, end: estimate.Result, announce: Announce) -> estimate.Result:
-        """Return the descent from an end with the full tolerances of the case."""
-        descent = estimate.Descent(
-            functions=estimate.OneByOne(self.residuals, self.residuals.exact),
-            method=DEFAULT_STRATEGY,
-            **self._limits,
+        """Descend from an end with the full tolerances of the case."""
+        functions = estimate.OneByOne(self.residuals, self.residuals.exact)
+        return self._descent(functions, DEFAULT_STRATEGY).run(end.x, announce)
+
+    def _descent(self, functions: estimate.Functions, method: str) -> estimate.Descent:
+        stop, tolerance = self.options.stop, self.options.tolerance
+        return estimate.Descent(
+            functions=functions,
+            method=method,
+            bounds=self.residuals.bounds,
+            x_scale=self.residuals.units,
+            gtol=tolerance.gradient,
+            gtol_absolute=tolerance.gradient_absolute,
+            xtol=tolerance.step,
+            matches=None if stop is None else partial(self.residuals.match, rmse=stop.rmse),
         )
-        return descent.run(end.x, announce)
 
     @property
-    def _limits(self) -> dict[str, Any]:
-        """Where a descent may go and where it ends, by the names that `exfit.estimate` has."""
-        stop, tolerance = self.options.stop, self.options.tolerance
-        return {
-            "bounds": self.residuals.bounds,
-            "x_scale": self.residuals.units,
-            "gtol": tolerance.gradient,
-            "gtol_absolute": tolerance.gradient_absolute,
-            "xtol": tolerance.step,
-            "matches": None if stop is None else partial(self.residuals.match, rmse=stop.rmse),
-        }
+    def _good_enough(self) -> float | None:
+        """The root mean square of the residuals that the case calls a match, if it does."""
+        if self.options.good_enough is None:
+            return None
+        priors = len(self.residuals.priors)
+        share = (self.residuals.samples + priors) / (self.residuals.count + priors)
+        return float(self.options.good_enough.rmse * np.sqrt(share))
 
     def further(self, earlier: Sequence[estimate.Result]) -> FurtherDescents:
-        """Return the minima from further starts and of earlier descents."""
+        """Find the minima from further starts, beside earlier descents."""
+        from exfit.fitting.further_starts import further_starts  # which no local search needs
+
         counter = SimulationCounter()  # the sub-steps are those of a coarse grid
         starts = further_starts(self.problem, self.options.starts, counter)
         minima = estimate.multistart(
@@ -262,15 +267,6 @@ class CaseSearches:
         return 0.5 * (LIKELIHOOD_RATIO * variance + LEAST_NOISE**2 * sum(weights))
 
 
-def _good_enough(options: Estimate, residuals: Residuals) -> float | None:
-    """Return the root mean square of the residuals that a case calls a match, if it does."""
-    if options.good_enough is None:
-        return None
-    priors = len(residuals.priors)
-    share = (residuals.samples + priors) / (residuals.count + priors)
-    return float(options.good_enough.rmse * np.sqrt(share))
-
-
 def jacobian_error(jacobian: str, difference_step: float | None = None) -> float | None:
     """Return the error of a Jacobian by differences, as a share of its largest singular value.
 
@@ -289,11 +285,14 @@ def searches_of(options: Estimate) -> estimate.Searches:
     dgn = estimate.LineSearch(
         capped=options.dgn.step == "capped", cut=CUTS[options.dgn.cut], armijo=options.armijo
     )
+    lm: estimate.TrustRegion | estimate.RatioDamping | estimate.ArmijoDamping
     if options.lm.update == "ratio":
-        return estimate.Searches(dgn=dgn, lm=estimate.RatioDamping(least=options.lm.nu_min))
-    if options.lm.update == "armijo":
-        return estimate.Searches(dgn=dgn, lm=estimate.ArmijoDamping(armijo=options.armijo))
-    return estimate.Searches(dgn=dgn, lm=estimate.TrustRegion(armijo=options.armijo))
+        lm = estimate.RatioDamping(least=options.lm.nu_min)
+    elif options.lm.update == "armijo":
+        lm = estimate.ArmijoDamping(armijo=options.armijo)
+    else:
+        lm = estimate.TrustRegion(armijo=options.armijo)
+    return estimate.Searches(dgn=dgn, lm=lm)
 
 
 def refuse_unfit(case: Case, problem: FitProblem) -> None:

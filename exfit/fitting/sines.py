@@ -13,7 +13,7 @@ from exfit.case.case import Case
 from exfit.case.schema import RecordFile, SineSection, Unknown
 from exfit.dsp.lines import Line, cosine_and_sine, largest_line
 from exfit.errors import RecordError
-from exfit.fitting.descents import minimum_near
+from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.fitting.nuisances import (
     COSINE,
@@ -291,7 +291,7 @@ def _coloured(
     experiments = [setup.experiment for setup in setups]
     disturbed = replace(residuals, experiments=experiments, free=(*residuals.free, *new))
     start = np.append(theta, [parameter.scaled(parameter.start) for parameter in new])
-    errors = disturbed.errors(minimum_near(disturbed, start))[0]
+    errors = disturbed.errors(descent_near(disturbed, start).x)[0]
     places = [Place(setup.name, channel.signal) for setup in setups for channel in setup.channels]
     for place, block in zip(places, slices(disturbed.sizes), strict=True):
         if not is_white(whiteness(errors[block])):

@@ -21,9 +21,9 @@ from exfit.fitting.channel_weights import (
     other_deviations,
     weighted_alike,
 )
-from exfit.fitting.descents import Announce, Judge
+from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.global_search import SearchResult
+from exfit.fitting.global_search import Judge, SearchResult
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import LEAST_NOISE, SimulationCounter, noise_of

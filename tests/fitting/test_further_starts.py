@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import local_case
 
-from exfit.fitting.global_search import further_starts
+from exfit.fitting.further_starts import further_starts
 from exfit.fitting.search import fitted
 from exfit.util.text import rounded_value
 from exfit.workflows import fit

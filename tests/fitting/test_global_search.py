@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
-from exfit.fitting.descents import METHODS_OF_AUTO, NO_JUDGE, Judge, no_doubt
 from exfit.fitting.global_search import (
+    METHODS_OF_AUTO,
+    NO_JUDGE,
     FurtherDescents,
+    Judge,
     global_search,
     judged_again,
     local_search,
+    no_doubt,
 )
 
 MARGIN = 0.01  # of a cost

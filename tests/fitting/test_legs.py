@@ -5,8 +5,7 @@ from places import ROOT
 
 from exfit.case.load import load_case
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.further_starts import legs_of
-from exfit.fitting.global_search import last_leg
+from exfit.fitting.further_starts import last_leg, legs_of
 from exfit.fitting.search import fitted
 
 STARTS = 4
@@ -14,33 +13,34 @@ LOWEST = {"ac1a_typical": (5.057e-6,), "ac8b_unit2": (5.074e-6, 5.090e-6)}
 
 
 def legs(name):
-    """Return the legs of a case, and its bounds."""
+    """Return the legs of a case, why none is linear, and the last of them."""
     _, problem = fitted(load_case(ROOT / "configs" / f"{name}.yaml"))
     own = last_leg(problem)
-    return legs_of(problem.residuals, own), own
+    return (*legs_of(problem.residuals, own), own)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", LOWEST)
 def test_by_way_of_the_linear_phase_every_start_reaches_the_lowest_minimum(name):
     """Without it two in three do: tests/studies/global_search.py counts more of them."""
-    of_case, own = legs(name)
-    found = multistart(spread(own.bounds, STARTS), of_case.linear)
+    of_case, _, own = legs(name)
+    found = multistart(spread(own.bounds, STARTS), of_case)
     for cost in found.end_costs:
         assert any(cost == pytest.approx(lowest, rel=1e-3) for lowest in LOWEST[name])
 
 
 @pytest.mark.long
 def test_some_starts_go_the_direct_way():
-    of_case, own = legs("ac1a_typical")
+    of_case, _, own = legs("ac1a_typical")
     (x,) = spread(own.bounds, 1)
-    both = multistart([x, x], of_case.linear, first_legs=[0, 1])
-    direct = multistart([x], of_case.direct)
+    both = multistart([x, x], of_case, first_legs=[0, 1])
+    direct = multistart([x], of_case[1:])
     assert both.end_costs[1] == direct.end_costs[0]
     assert both.start_costs[1] == direct.start_costs[0] != both.start_costs[0]
 
 
 def test_a_case_that_has_no_linear_response_says_why():
-    of_case, _ = legs("exciter_playback")
-    assert "recorded signals drive the simulation" in of_case.no_linear_phase
-    assert of_case.linear == of_case.direct
+    of_case, why_direct, own = legs("exciter_playback")
+    assert "recorded signals drive the simulation" in why_direct
+    assert [leg.method for leg in of_case] == ["lm-then-dgn", own.method]
+    assert of_case[-1] is own

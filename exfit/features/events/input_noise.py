@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from exfit.dsp.noise import noise
 from exfit.dsp.sampling import sampling_of
 from exfit.estimate import LocalMinimum, Progress, Stop
-from exfit.fitting.descents import descent_near, minimum_near, stopped
+from exfit.fitting.descents import descent_near, stopped
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
@@ -282,9 +282,9 @@ def weighted_by_noise(
         at, before = theta, bias
         white = whitened(problem.residuals, setups, at)
         if not further:
-            theta = minimum_near(white, at)
+            theta = descent_near(white, at).x
         unbiased, bias = without_bias(white, theta)
-        theta = minimum_near(unbiased, theta)
+        theta = descent_near(unbiased, theta).x
         if np.max(np.abs(theta - at)) < FAR and np.max(np.abs(bias - before)) < SMALL_BIAS:
             break
     watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))

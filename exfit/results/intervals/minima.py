@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.estimate import LocalMinimum, half_square
-from exfit.fitting.descents import short_descent, taken_for_validation
-from exfit.fitting.global_search import SearchResult, is_same
+from exfit.fitting.descents import short_descent
+from exfit.fitting.global_search import SearchResult, is_same, taken_for_validation
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.filtering import Filtering
 from exfit.errors import SimulationError
-from exfit.fitting.descents import minimum_near
+from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import prefix_from
 from exfit.fitting.problem import FitProblem, problem_of
@@ -58,7 +58,7 @@ def without_contradicting_samples(
     if not contradicting:
         return problem, ()
     fewer = _without(problem, contradicting)
-    near = [*_samples_at_steps(problem, minimum_near(fewer.compressed, x))]
+    near = [*_samples_at_steps(problem, descent_near(fewer.compressed, x).x)]
     if not all(any(samples.overlaps(other) for other in near) for samples in contradicting):
         return problem, ()
     return fewer, tuple(_note(problem, samples) for samples in contradicting)
