@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import LEAST_NOISE, Residuals, SimulationCounter
+from exfit.fitting.residuals import Residuals, SimulationCounter
 
 Array = NDArray[np.float64]
 

@@ -68,7 +68,8 @@ def further_starts(
     """
     residuals = problem.residuals.counted_by(counter)
     legs, why_direct = legs_of(residuals, last_leg(problem, counter))
-    linear, direct = tuple[Way, ...](("linear",)), tuple[Way, ...](("direct",))
+    linear: tuple[Way, ...] = ("linear",)
+    direct: tuple[Way, ...] = ("direct",)
     if why_direct:
         points = spread(residuals.bounds, count)
         return FurtherStarts(points, legs, direct * count, why_direct)

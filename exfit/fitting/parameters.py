@@ -102,6 +102,7 @@ class FreeParameter:
 def free_parameter(name: str, section: FreeSection, row: Parameter | None) -> FreeParameter:
     """Return a parameter that a case leaves free, as a fit moves it."""
     prior = None if section.prior is None else Prior(section.prior.mean, section.prior.sigma)
+    bounds = tuple(bound for bound in (section.min, section.max) if bound is not None)
     return FreeParameter(
         name,
         section.start,
@@ -110,13 +111,8 @@ def free_parameter(name: str, section: FreeSection, row: Parameter | None) -> Fr
         prior,
         {"raw": 1.0, "start": abs(section.start)}.get(section.scale),
         0.0 if row is not None and row.is_time and row.low >= 0.0 else -inf,
-        _given(section.min, section.max),
+        None if len(bounds) == 2 else bounds,
     )
-
-
-def _given(*bounds: float | None) -> tuple[float, ...] | None:
-    """Those bounds that a case gives, None where it gives both."""
-    return None if None not in bounds else tuple(bound for bound in bounds if bound is not None)
 
 
 def units_of(free: Iterable[FreeParameter]) -> NDArray[np.float64]:

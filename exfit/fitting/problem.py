@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
+from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.simulation.interpolation import NEIGHBOURS, Interpolation
 
+Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 
@@ -52,12 +53,11 @@ def residuals_of(
     free = free_parameters(case, setups)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
-    names = {parameter.name for parameter in free}
-    values = case.values() if start is None else start
-    fixed = {name: value for name, value in values.items() if name not in names}
-    experiments = [setup.experiment for setup in setups]
+    fixed = {**(case.values() if start is None else start)}
+    for parameter in free:
+        fixed.pop(parameter.name, None)
     return Residuals(
-        experiments,
+        [setup.experiment for setup in setups],
         free,
         fixed,
         case.ties,
@@ -95,8 +95,7 @@ def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[
     return [*shared, *(parameter for setup in setups for parameter in setup.free)]
 
 
-Array = NDArray[np.float64]
-Places = NDArray[np.int64]
+# ---- compression
 
 LEAST_GAIN = 3  # times fewer errors: else it does not pay
 EIGENVALUE_ROUNDING = 1e-14  # of the largest of such a form: smaller ones are rounding
@@ -104,25 +103,19 @@ CHANGING_SAMPLES = ("shift", "delay", "scale", "offset")  # nuisances that chang
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
-    """Squared errors of samples as those of six errors for each of K groups, and of one more.
+class CompressedChannel(Channel):
+    """A channel whose simulated samples are all points of the grid (G,).
 
-    A group's samples are read from the same points of the grid: ``rows`` (K, 6). Its errors are
-    ``maps`` (K, 6, 6) times the values there less ``theirs`` (K, 6); ``rest`` is the root of what
-    no response can lower.
+    Its squared errors are those of six errors for each of K groups, and of one more. A group's
+    samples are read from the same points of the grid: ``rows`` (K, 6). Its errors are ``maps``
+    (K, 6, 6) times the values there less ``theirs`` (K, 6); ``rest`` is the root of what no
+    response can lower.
     """
 
-    rows: Places
-    maps: Array
-    theirs: Array
-    rest: float
-
-
-@dataclass(frozen=True, eq=False)
-class CompressedChannel(Channel):
-    """A channel whose simulated samples are all points of the grid (G,)."""
-
-    form: Form = field(kw_only=True)
+    rows: NDArray[np.int64] = field(kw_only=True)
+    maps: Array = field(kw_only=True)
+    theirs: Array = field(kw_only=True)
+    rest: float = field(kw_only=True)
 
     def compared(self, simulated: Array) -> Array:
         """Compare simulated signals (K, G), a row of each."""
@@ -130,75 +123,59 @@ class CompressedChannel(Channel):
 
     def filtered(self, samples: Array) -> Array:
         """Filter samples (G,) for the comparison: (6 K + 1,)."""
-        mapped = np.einsum("kij,kj->ki", self.form.maps, samples[self.form.rows])
-        return np.append(mapped, 0.0)
+        return np.append(np.einsum("kij,kj->ki", self.maps, samples[self.rows]), 0.0)
 
     def slopes(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives (6 K + 1, N) of these, given those (G, N) of samples."""
-        mapped = self.form.maps @ slopes[self.form.rows]
+        mapped = self.maps @ slopes[self.rows]
         return np.vstack([mapped.reshape(-1, slopes.shape[1]), np.zeros(slopes.shape[1])])
 
     @cached_property
     def record(self) -> Array:
         """The record as it is compared, (6 K + 1,)."""
-        return np.append(self.form.theirs, self.form.rest)
+        return np.append(self.theirs, self.rest)
 
     @property
     def size(self) -> int:
         """How many errors there are."""
-        return self.form.theirs.size + 1
+        return self.theirs.size + 1
 
 
 def compressed(residuals: Residuals) -> Residuals:
     """Return residuals with the same cost and gradient at every point, but fewer of them.
 
-    The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
-    same residuals where compression would not save much, or where it does not hold: with filters,
-    with a robust loss or periodic disturbances, where another program simulates, and where the
-    instants at which a record is read, or its scale, are found.
+    Between two points of the grid a response is a polynomial through six of them. However many
+    samples lie there, the sum of their squared errors is a quadratic form of these six values, and
+    six errors have the same sum: a search goes the same way, in a fraction of time and memory. The
+    Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the same
+    residuals where compression would not save much, or where it does not hold: with filters, with a
+    robust loss or periodic disturbances, where another program simulates, and where the instants at
+    which a record is read, or its scale, are found.
 
     Source: Golub & Van Loan 2013, section 5.3 (the least-squares problem of a factor R is that of
     all rows).
     """
     if residuals.robust is not None:
         return residuals
-    experiments = [_compressed_experiment(whole) for whole in residuals.experiments]
+    experiments = []
+    for whole in residuals.experiments:
+        simulator = whole.simulator.on_grid()
+        changing = any(nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances)
+        added = whole.sines or whole.whitening or whole.simulator.responder is not None
+        possible = all(channel.plain for channel in whole.channels) and not (changing or added)
+        errors_on_grid = NEIGHBOURS * len(simulator.times) * len(whole.channels)
+        if possible and LEAST_GAIN * errors_on_grid < sum(whole.sizes):
+            sampling = whole.simulator.sampling()
+            channels = tuple(_compressed_channel(own, sampling) for own in whole.channels)
+            whole = replace(whole, simulator=simulator, channels=channels)
+        experiments.append(whole)
     if all(new is old for new, old in zip(experiments, residuals.experiments, strict=True)):
         return residuals
     return replace(residuals, experiments=experiments)
 
 
-def _compressed_experiment(whole: Experiment) -> Experiment:
-    """Return an experiment with fewer errors, the same where that does not pay or hold."""
-    simulator = whole.simulator.on_grid()
-    changing = any(nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances)
-    plain = all(channel.plain for channel in whole.channels)
-    added = whole.sines or whole.whitening or whole.simulator.responder is not None
-    possible = plain and not (changing or added)
-    errors_on_grid = NEIGHBOURS * len(simulator.times) * len(whole.channels)
-    if not possible or LEAST_GAIN * errors_on_grid >= sum(whole.sizes):
-        return whole
-    sampling = whole.simulator.sampling()
-    return replace(
-        whole,
-        simulator=simulator,
-        channels=tuple(_compressed_channel(channel, sampling) for channel in whole.channels),
-    )
-
-
 def _compressed_channel(channel: Channel, sampling: Interpolation) -> CompressedChannel:
-    return CompressedChannel(
-        signal=channel.signal,
-        measured=channel.measured,
-        weight=channel.weight,
-        filtering=channel.filtering,
-        noise=channel.noise,
-        form=form_of(sampling, channel.measured, channel.kept),
-    )
-
-
-def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -> Form:
-    """Return the form of a record's kept samples (M,)."""
+    measured, kept = channel.measured, channel.kept
     first = sampling.first[kept]
     starts = np.flatnonzero(np.diff(first, prepend=-1))
     group = np.cumsum(np.bincount(starts, minlength=len(first))) - 1
@@ -231,5 +208,14 @@ def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -
     along = np.einsum("kji,kj->ki", vectors, products)
     theirs = np.where(significant, along / roots, 0.0)
     rest = max(float(deviations @ deviations - np.sum(theirs**2)), 0.0)
-    rows = np.minimum(first[starts][:, None] + np.arange(NEIGHBOURS), sampling.last)
-    return Form(rows, maps, theirs + maps.sum(axis=2) * levels[:, None], np.sqrt(rest))
+    return CompressedChannel(
+        signal=channel.signal,
+        measured=measured,
+        weight=channel.weight,
+        filtering=channel.filtering,
+        noise=channel.noise,
+        rows=np.minimum(first[starts][:, None] + np.arange(NEIGHBOURS), sampling.last),
+        maps=maps,
+        theirs=theirs + maps.sum(axis=2) * levels[:, None],
+        rest=np.sqrt(rest),
+    )

@@ -285,7 +285,7 @@ def _split(
     beside = samples - samples[0] - np.cumsum(jumped)
     if np.max(np.abs(beside)) < INVISIBLE:
         return steps, None
-    filtering = filtering_of(source, time, filter)
+    filtering = filtering_of(source, time, np.ones(len(time), dtype=bool), filter)
     return steps, RecordedInput(time, beside if filtering is None else filtering.apply(beside))
 
 

@@ -4,6 +4,7 @@ They are functions of the scaled free parameters; what is known beforehand adds 
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
@@ -13,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.ties import TieError, Ties
-from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.simulation.substeps import NO_SUBSTEPS
 
@@ -29,7 +30,6 @@ CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
 MOST_NUMBERS_AT_ONCE = 1 << 21  # of Jacobians that are made together: 16 MB
-LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 
 
 class SimulationCounter:
@@ -238,7 +238,8 @@ class Residuals:
         down, up = np.clip(theta + below, low, high), np.clip(theta + above, low, high)
         stuck = down == up  # a one-sided difference at the bound that it points to
         down, up = np.where(stuck, theta - above, down), np.where(stuck, theta - below, up)
-        points = [*self._moved(theta, down), *self._moved(theta, up)]
+        moved = np.eye(len(theta), dtype=bool)
+        points = [*np.where(moved, down, theta), *np.where(moved, up, theta)]
         residuals = self._of_many(points)
         for point, of_point in zip(points, residuals, strict=True):
             if of_point is None:
@@ -262,68 +263,60 @@ class Residuals:
 
     def exact_of_many(self, points: Sequence[Array]) -> list[Array]:
         """Return the exact Jacobian at each of points (N,), nan where there is none."""
-        return [jacobian for _, jacobian in self.linearised_of_many(points)]
-
-    def linearised_of_many(self, points: Sequence[Array]) -> list[tuple[Array, Array]]:
-        """Return residuals and exact Jacobian at each of points (N,), nan where there are none."""
         at_once = max(1, MOST_NUMBERS_AT_ONCE // (self.count * max(1, len(self.free))))
         return [
-            linearised
+            jacobian
             for first in range(0, len(points), at_once)
-            for linearised in self._linearised(points[first : first + at_once])
+            for jacobian in self._exact_of_block(points[first : first + at_once])
         ]
 
     def _of_many(self, points: Sequence[Array]) -> list[Array | None]:
         """Return the residuals of several points, None where there are none."""
         self._count(len(points) * len(self.experiments))
         residuals: list[Array | None] = [None] * len(points)
-        sets = {k: values for k, values in enumerate(map(self._reached, points)) if values}
+        sets = dict[int, dict[str, float]]()
+        for k, theta in enumerate(points):
+            with suppress(*UNREACHABLE):
+                sets[k] = self.values(theta)
         if not sets:
             return residuals
         with np.errstate(all="ignore"):
             runs = [experiment.errors_of_many([*sets.values()]) for experiment in self.experiments]
-            errors = _stacked([errors for errors, _ in runs], axis=1)
-            whole = self._with_loss(errors)
+            whole = _stacked([errors for errors, _ in runs], axis=1)
+            if self.robust is not None:
+                whole = self.robust.loss.residual(whole, self._loss_scales)
         parts = np.stack([parts for _, parts in runs])
         self._count(0, int(parts.max()))
         reached = np.all(parts != NO_SUBSTEPS, axis=0)
         for (k, values), own, has_response in zip(sets.items(), whole, reached, strict=True):
-            residuals[k] = self._with_priors(own, values) if has_response else None
+            if has_response:
+                of_priors = [
+                    self.noise * (values[self.free[j].name] - prior.mean) / prior.std
+                    for j, prior in self.priors.items()
+                ]
+                residuals[k] = np.concatenate([own, of_priors]) if of_priors else own
         return residuals
 
-    def _linearised(self, points: Sequence[Array]) -> list[tuple[Array, Array]]:
+    def _exact_of_block(self, points: Sequence[Array]) -> list[Array]:
         self._count(len(points) * len(self.experiments))
         rows = self.count + len(self.priors)
-        linearised = [(np.full(rows, np.nan), np.full((rows, len(x)), np.nan)) for x in points]
-        directed = {k: own for k, own in enumerate(map(self._directed, points)) if own}
+        jacobians = [np.full((rows, len(theta)), np.nan) for theta in points]
+        directed = dict[int, tuple[dict[str, float], list[dict[str, float]]]]()
+        for k, theta in enumerate(points):
+            with suppress(*UNREACHABLE):
+                directed[k] = self.values(theta), self.moves(theta)
         if not directed:
-            return linearised
+            return jacobians
         sets, moves = ([*part] for part in zip(*directed.values(), strict=True))
         with np.errstate(all="ignore"):
             runs = [experiment.tangents_of_many(sets, moves) for experiment in self.experiments]
             errors = _stacked([errors for errors, _, _ in runs], axis=1)
-            residuals = self._with_loss(errors)
             reached = np.all([parts != NO_SUBSTEPS for _, _, parts in runs], axis=0)
-            for row in np.flatnonzero(reached).tolist():
-                k = [*directed][row]
-                slopes = _stacked([slopes[row] for _, slopes, _ in runs])
-                jacobian = self._jacobian(errors[row], slopes, points[k])
-                linearised[k] = self._with_priors(residuals[row], sets[row]), jacobian
-        return linearised
-
-    def _reached(self, theta: Array) -> dict[str, float] | None:
-        """Return every value by name, None where one has no response or a tie no value."""
-        try:
-            return self.values(theta)
-        except UNREACHABLE:
-            return None
-
-    def _directed(self, theta: Array) -> tuple[dict[str, float], list[dict[str, float]]] | None:
-        """Return every value by name, and which of them each parameter moves; None as above."""
-        try:
-            return self.values(theta), self.moves(theta)
-        except UNREACHABLE:
-            return None
+            for row, k in enumerate(directed):
+                if reached[row]:
+                    slopes = _stacked([slopes[row] for _, slopes, _ in runs])
+                    jacobians[k] = self._jacobian(errors[row], slopes, points[k])
+        return jacobians
 
     def _refuse(self, theta: Array) -> None:
         """Raise SimulationError where a point has no response."""
@@ -337,9 +330,6 @@ class Residuals:
     def _count(self, simulations: int, substeps: int = 1) -> None:
         if self.counter is not None:
             self.counter.add(simulations, substeps)
-
-    def _moved(self, theta: Array, to: Array) -> list[Array]:
-        return [np.where(np.arange(len(theta)) == k, to, theta) for k in range(len(theta))]
 
     def moves(self, theta: Array) -> list[dict[str, float]]:
         """Values that each scaled parameter moves, with their rates.
@@ -364,22 +354,6 @@ class Residuals:
             moves.append({free.name: slope, **followers})
         return moves
 
-    def _with_loss(self, errors: Array) -> Array:
-        """Return residuals of errors (..., errors): by the robust loss, where there is one."""
-        if self.robust is None:
-            return errors
-        return self.robust.loss.residual(errors, self._loss_scales)
-
-    def _with_priors(self, errors: Array, values: Mapping[str, float]) -> Array:
-        """Return residuals with those of what is known beforehand."""
-        if not self.priors:
-            return errors
-        of_priors = [
-            self.noise * (values[self.free[k].name] - prior.mean) / prior.std
-            for k, prior in self.priors.items()
-        ]
-        return np.concatenate([errors, of_priors])
-
     @cached_property
     def _loss_scales(self) -> Array:
         """The error of each sample from which on it costs less than its square."""
@@ -391,21 +365,6 @@ class Residuals:
 def _stacked(blocks: Sequence[Array], axis: int = 0) -> Array:
     """Return the blocks of all records as one, without a copy of a single one."""
     return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=axis)
-
-
-def noise_of(channel: Channel) -> float:
-    """Return the standard deviation of a channel's noise, per unit: given, or estimated."""
-    return scatter_of(channel) if channel.noise is None else channel.noise
-
-
-def scatter_of(channel: Channel) -> float:
-    """Return the standard deviation (pu) of a channel's noise by its scatter, before a filter."""
-    measured = channel.measured[channel.kept]
-    apart = 1 if channel.filtering is None else channel.filtering.smooth_over
-    # neighbours in one window of an average scatter little: they share most of it
-    return max(
-        noise(measured[::apart] if len(measured) > NEIGHBOURS * apart else measured), LEAST_NOISE
-    )
 
 
 @dataclass(frozen=True, eq=False)

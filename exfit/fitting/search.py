@@ -27,15 +27,10 @@ from exfit.fitting.global_search import (
     local_search,
     no_doubt,
 )
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.program import Program
-from exfit.fitting.residuals import (
-    CENTRAL_STEP,
-    LEAST_NOISE,
-    ONE_SIDED_STEP,
-    Residuals,
-    SimulationCounter,
-)
+from exfit.fitting.residuals import CENTRAL_STEP, ONE_SIDED_STEP, Residuals, SimulationCounter
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.util.strategies import (

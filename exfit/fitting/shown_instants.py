@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from exfit.dsp.step_detection import CHI_SQUARE, MEDIAN_SAMPLES, interval_below, running_median
 from exfit.fitting.experiment import ExperimentSetup, compared
+from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.residuals import noise_of
 from exfit.plants import BREAKER
 from exfit.util.sorting import median
 

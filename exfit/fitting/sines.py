@@ -108,7 +108,7 @@ def with_sines(
             waiting = {**setup.automatic_sines, channel.signal: _range(section)}
             setup = replace(setup, automatic_sines=waiting)
             continue
-        from exfit.fitting.residuals import noise_of
+        from exfit.fitting.noise import noise_of
 
         measured = channel.measured[channel.kept]
         noise = noise_of(channel)

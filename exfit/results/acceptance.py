@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from exfit.fitting.channels import noise_shape
 from exfit.fitting.experiment import Channel
-from exfit.fitting.residuals import noise_of
+from exfit.fitting.noise import noise_of, noise_shape
 from exfit.results.comparisons import Comparison
 
 MUCH_WORSE = 3.0  # times the error of the fit, or the noise of the record where that is larger

@@ -12,10 +12,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import MEDIAN_DEVIATION, spread
-from exfit.fitting.channels import noise_shape
 from exfit.fitting.experiment import Channel
-from exfit.fitting.propagated_noise import propagated_noise
-from exfit.fitting.residuals import LEAST_NOISE, scatter_of
+from exfit.fitting.noise import LEAST_NOISE, noise_shape, propagated_noise, scatter_of
 from exfit.inference.noise import effective_samples, whiteness
 from exfit.inference.quantiles import chi_square_tail
 from exfit.results.comparisons import Overlay

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
-from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slopes_of
 from exfit.inference.whitening import BIAS_KNOWN_TO

@@ -9,8 +9,8 @@ from records import SAMPLES, UNIT, case_of, config, found_in, recording, several
 from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage
 from exfit.fitting.build import build_experiments
 from exfit.fitting.experiment import Channel
+from exfit.fitting.noise import noise_of
 from exfit.fitting.problem import problem_of, residuals_of
-from exfit.fitting.residuals import noise_of
 from exfit.fitting.uncertainty import uncertainty_at
 from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit

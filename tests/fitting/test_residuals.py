@@ -16,10 +16,10 @@ from exfit.dsp.noise import noise
 from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.fitting.residuals import (
     CENTRAL_STEP,
-    LEAST_NOISE,
     ONE_SIDED_STEP,
     Residuals,
     Robust,

@@ -8,7 +8,7 @@ import pytest
 
 from exfit.dsp.filtering import Filtering, LowPass
 from exfit.fitting.experiment import Channel
-from exfit.fitting.residuals import noise_of
+from exfit.fitting.noise import noise_of
 from exfit.results.acceptance import MUCH_WORSE, judged
 from exfit.results.comparisons import Comparison, Match, PlayedRecord, StepFeatures
 

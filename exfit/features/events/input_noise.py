@@ -28,8 +28,9 @@ from exfit.estimate import LocalMinimum, Progress, Stop
 from exfit.fitting.descents import descent_near, stopped
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.global_search import SearchResult
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.residuals import Residuals
 from exfit.inference.whitening import PropagatedNoise, whitening
 from exfit.inference.wording import digits, listed
 from exfit.plants.parts import initial

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.fitting.residuals import LEAST_NOISE
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.inference.noise import effective_samples, is_white, whiteness
 from exfit.inference.wording import listed
 from exfit.results.comparisons import Comparison

@@ -21,8 +21,9 @@ from exfit.errors import SimulationError
 from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Experiment
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval
 from exfit.results.influences import STRONG, RecorderAverages

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from exfit.estimate import LocalMinimum, half_square
 from exfit.fitting.descents import short_descent
 from exfit.fitting.global_search import SearchResult, is_same, taken_for_validation
-from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.noise import LEAST_NOISE
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.model import Minima, Minimum

@@ -21,7 +21,7 @@ from exfit.estimate import Stop
 from exfit.fitting.build import build_experiment
 from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.propagated_noise import propagated_noise
+from exfit.fitting.noise import propagated_noise
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty

@@ -12,7 +12,8 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
 from exfit.estimate import Progress
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.residuals import Residuals, noise_of
+from exfit.fitting.noise import noise_of
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
 from exfit.results.influences import RecorderAverages, TypicalValue
