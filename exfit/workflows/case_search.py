@@ -24,9 +24,10 @@ from exfit.fitting.channel_weights import (
 from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import Judge, SearchResult
+from exfit.fitting.noise import LEAST_NOISE, noise_of
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
-from exfit.fitting.residuals import LEAST_NOISE, SimulationCounter, noise_of
+from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.inference.noise import LEAST_P, SURPRISING, whiteness

@@ -19,8 +19,8 @@ from rich.table import Table
 
 from exfit.case.load import load_case
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.further_starts import legs_of
-from exfit.fitting.global_search import MERGED, last_leg
+from exfit.fitting.further_starts import last_leg, legs_of
+from exfit.fitting.global_search import MERGED
 from exfit.fitting.search import fitted
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
