@@ -87,7 +87,8 @@ def largest_line(
         left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
         basis = np.asarray(left[:, singular > len(left) * np.finfo(float).eps])
     near = np.clip(spacing * (nearest + np.linspace(-1.0, 1.0, 2 * FINE + 1)), *within)
-    fits = [_regression(errors, cosine_and_sine(f, time[kept] - about), basis) for f in near]
+    others = errors - basis @ (basis.T @ errors)
+    fits = [_regression(others, cosine_and_sine(f, time[kept] - about), basis) for f in near]
     best = int(np.argmin([rest for _, rest in fits]))
     cosine, sine = fits[best][0].tolist()
     share = float(power[nearest] / np.sum(power))
@@ -111,10 +112,12 @@ def share_by_chance(share: float, count: int, tested: int) -> float:
     return min(1.0, tested * (1.0 - share) ** (count - 1))
 
 
-def _regression(errors: Array, pair: Array, basis: Array) -> tuple[Array, float]:
-    """Return the amplitudes (2,) of a pair (M, 2) in errors (M,), and the square of the rest."""
+def _regression(others: Array, pair: Array, basis: Array) -> tuple[Array, float]:
+    """Return the amplitudes (2,) of a pair (M, 2) in errors (M,), and the square of the rest.
+
+    The errors are without what the orthonormal ``basis`` (M, N) explains of them.
+    """
     own = pair - basis @ (basis.T @ pair)
-    others = errors - basis @ (basis.T @ errors)
     amplitudes = np.asarray(np.linalg.lstsq(own, others, rcond=None)[0], dtype=float)
     return amplitudes, float(np.sum((others - own @ amplitudes) ** 2))
 

@@ -117,7 +117,9 @@ def _likeliest(
     """
     candidates = list[AveragesTried]()
     for window, of_rate, averaged in _averaged(residuals, numbers):
-        off, _ = averaged.errors(theta)
+        off = replace(averaged, robust=None)(theta)[: averaged.count]
+        if not np.isfinite(off).all():
+            raise SimulationError("no response with averages")
         made_up_for = basis.T @ off
         left = float(off @ off - made_up_for @ made_up_for)
         gain = (float(errors @ errors) - left) / variance
