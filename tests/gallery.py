@@ -32,7 +32,7 @@ from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
 from exfit.cli import main
 from exfit.show import figures as plots
-from exfit.show import terminal
+from exfit.show import live, terminal
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "gallery.md"
@@ -171,7 +171,7 @@ DRAWN = (
 )  # fmt: skip
 
 
-class Still(terminal.LiveIterations):
+class Still(live.LiveIterations):
     """Shows the iterations of a fit once, when it is done."""
 
     @contextmanager

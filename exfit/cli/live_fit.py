@@ -27,11 +27,11 @@ def fit_live(
     The figures come last: the result is written and shown before they are drawn.
     """
     from exfit import workflows
-    from exfit.show import fits, run_folder, terminal
+    from exfit.show import fits, live, run_folder, terminal
 
     console, figures = terminal.console(), None
-    title, most = terminal.task(case, strategy), case.estimate.most_iterations
-    with terminal.LiveIterations(console, title, most).running() as shown:
+    title, most = live.task(case, strategy), case.estimate.most_iterations
+    with live.LiveIterations(console, title, most).running() as shown:
         result = workflows.fit(case, strategy, shown, shown.starts, shown.live, search=search)
     try:
         figures = run_folder.write_fit(result, folder)

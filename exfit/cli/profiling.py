@@ -44,10 +44,10 @@ def profile(
     if not output.shown:
         profiles = workflows.profile(loaded, parameters)
     else:
-        from exfit.show import terminal
+        from exfit.show import live, terminal
 
         console = terminal.console()
-        with terminal.ProgressBar(console).running() as progress:
+        with live.ProgressBar(console).running() as progress:
             profiles = workflows.profile(loaded, parameters, progress)
     figures = run_folder.write_profiles(profiles, folder)
     if output.as_json:

@@ -83,9 +83,9 @@ def run_planned(
     if not output.shown:
         series = run_all(plan, finished=written)
     else:
-        from exfit.show import terminal
+        from exfit.show import live, terminal
 
-        with terminal.SeriesProgress(terminal.console(), plan).running() as progress:
+        with live.SeriesProgress(terminal.console(), plan).running() as progress:
 
             def finished(run: "FitRun") -> None:
                 progress.finished(run)

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
-from exfit.show import terminal
+from exfit.show import live, terminal
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_a_pipe_has_a_line_where_the_causes_begin_and_one_where_they_end(run, la
 def test_ctrl_c_among_the_causes_keeps_the_fit_and_says_what_was_not_tried(run, late, monkeypatch):
     whole = run("fit", late, "--no-plots", "--json")
 
-    class Interrupting(terminal.LiveIterations):
+    class Interrupting(live.LiveIterations):
         def starts(self, progress):
             if progress.stage == "causes":
                 raise KeyboardInterrupt

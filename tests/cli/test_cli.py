@@ -31,7 +31,7 @@ from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.results.model import Iteration
 from exfit.show import figures as plots
-from exfit.show import terminal
+from exfit.show import live
 from exfit.show.figure_files import FigureFiles
 from exfit.util import files
 
@@ -737,13 +737,13 @@ INTERRUPTED = """\
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
-from exfit.show import terminal
-show = terminal.LiveIterations.__call__
+from exfit.show import live, terminal
+show = live.LiveIterations.__call__
 def interrupted(self, line):
     show(self, line)
     if line.number == 1:
         signal.raise_signal(signal.SIGINT)
-terminal.LiveIterations.__call__ = interrupted
+live.LiveIterations.__call__ = interrupted
 main()
 """
 
@@ -919,7 +919,7 @@ def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monk
     def stop(self, line):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(terminal.LiveIterations, "__call__", stop)
+    monkeypatch.setattr(live.LiveIterations, "__call__", stop)
     ran = run("fit", case_file())
     assert (ran.code, ran.err) == (3, "")
     stored = json.loads(Path("runs/case-fit/result.json").read_text())
@@ -1095,7 +1095,7 @@ def lines(count):
 def test_a_terminal_shows_the_last_iterations_whole(width):
     screen = StringIO()
     console = Console(file=screen, force_terminal=True, width=width, height=24, color_system=None)
-    with terminal.LiveIterations(console, "case: AC1A").running() as watch:
+    with live.LiveIterations(console, "case: AC1A").running() as watch:
         for line in lines(30):
             watch(line)
     last = screen.getvalue().rpartition("earlier iterations)")[2]

@@ -220,13 +220,13 @@ INTERRUPTED = """\
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
-from exfit.show import terminal
-show = terminal.SeriesProgress.__call__
+from exfit.show import live
+show = live.SeriesProgress.__call__
 def interrupted(self, fit, progress):
     show(self, fit, progress)
     if fit.name == "b-lm" and progress.number == 1:
         signal.raise_signal(signal.SIGINT)
-terminal.SeriesProgress.__call__ = interrupted
+live.SeriesProgress.__call__ = interrupted
 main()
 """
 

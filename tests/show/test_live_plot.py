@@ -14,9 +14,7 @@ from rich.text import Text
 from exfit import workflows
 from exfit.fitting.experiment import Experiment
 from exfit.results.model import Iteration
-from exfit.show import terminal
-from exfit.show.terminal import progress
-from exfit.show.terminal import sketch as drawing
+from exfit.show import live
 from exfit.workflows.responses import LiveResponse
 
 TIME = np.linspace(0.0, 10.0, 1001)
@@ -40,7 +38,7 @@ def line(number):
 
 
 def watching(console, iterations=30, sketch=SKETCH):
-    watch = terminal.LiveIterations(console, "case: AC1A", 100)
+    watch = live.LiveIterations(console, "case: AC1A", 100)
     watch.lines = [line(number) for number in range(iterations)]
     if sketch is not None:
         watch.live(sketch)
@@ -60,13 +58,13 @@ def dots_of(code):
 def test_every_dot_stands_where_unicode_has_it():
     rng = np.random.default_rng(0)
     dots = rng.random((12, 10)) < 0.5
-    shown = np.block([[dots_of(code) for code in row] for row in drawing.cells(dots).tolist()])
+    shown = np.block([[dots_of(code) for code in row] for row in live.cells(dots).tolist()])
     np.testing.assert_array_equal(shown, dots)
 
 
 def test_a_line_has_no_gap_however_steep():
     rng = np.random.default_rng(1)
-    dots = drawing.joined(TIME, rng.standard_normal(len(TIME)), (-4.0, 4.0), 30, 8)
+    dots = live.joined(TIME, rng.standard_normal(len(TIME)), (-4.0, 4.0), 30, 8)
     assert dots.any(axis=0).all()
     for left, right in zip(dots.T[:-1], dots.T[1:], strict=True):
         one, other = np.flatnonzero(left), np.flatnonzero(right)
@@ -78,22 +76,22 @@ def test_a_line_has_no_gap_however_steep():
 
 def test_a_level_lies_as_high_as_its_share_of_the_range():
     for level, row in ((1.0, 0), (0.0, 31), (0.5, 16)):
-        dots = drawing.scattered(TIME, np.full(len(TIME), level), (0.0, 1.0), 20, 8)
+        dots = live.scattered(TIME, np.full(len(TIME), level), (0.0, 1.0), 20, 8)
         assert np.flatnonzero(dots.any(axis=1)).tolist() == [row]
 
 
 def test_samples_that_are_no_numbers_are_left_out():
     gappy = np.where((TIME > 4.0) & (TIME < 6.0), np.nan, RISE)
-    dots = drawing.scattered(TIME, gappy, (0.9, 1.1), 50, 8)
+    dots = live.scattered(TIME, gappy, (0.9, 1.1), 50, 8)
     seen = dots.any(axis=0)
     assert seen[:40].all()
     assert not seen[41:59].any()
-    assert drawing.sketched(LiveResponse("vt", TIME, gappy, gappy), 60, 12)
+    assert live.sketched(LiveResponse("vt", TIME, gappy, gappy), 60, 12)
 
 
 @pytest.mark.parametrize(("width", "height"), [(45, 9), (72, 14), (100, 20)])
 def test_a_plot_is_as_large_as_requested(width, height):
-    lines = drawing.sketched(SKETCH, width, height)
+    lines = live.sketched(SKETCH, width, height)
     assert len(lines) == height
     assert max(cell_len(text.plain) for text in lines) == width
     assert "measured" in lines[0].plain
@@ -102,7 +100,7 @@ def test_a_plot_is_as_large_as_requested(width, height):
 
 def test_a_flat_signal_has_different_levels_at_its_axis():
     flat = LiveResponse("vt", TIME, np.ones(len(TIME)), np.ones(len(TIME)))
-    labels = [text.plain.partition("┤")[0] for text in drawing.sketched(flat, 60, 12)]
+    labels = [text.plain.partition("┤")[0] for text in live.sketched(flat, 60, 12)]
     assert any(label.strip() for label in labels)
 
 
@@ -142,23 +140,23 @@ def test_no_column_of_the_history_is_cut_in_two():
         text = watching(screen(width, 12), sketch=None).picture().plain
         (head,) = [row for row in text.splitlines() if row.lstrip().startswith("it ")]
         assert len(head) <= max(width, 20)
-        assert tuple(head.split()) == progress.HISTORY[: len(head.split())]
+        assert tuple(head.split()) == live.HISTORY[: len(head.split())]
 
 
 def test_a_file_and_a_terminal_without_such_characters_ask_for_no_plot():
-    assert terminal.LiveIterations(Console(file=StringIO()), "case").live is None
-    assert terminal.LiveIterations(screen(80, 24, "ascii"), "case").live is None
-    assert terminal.LiveIterations(screen(80, 24), "case").live is not None
+    assert live.LiveIterations(Console(file=StringIO()), "case").live is None
+    assert live.LiveIterations(screen(80, 24, "ascii"), "case").live is None
+    assert live.LiveIterations(screen(80, 24), "case").live is not None
 
 
 @pytest.mark.parametrize("is_terminal", [False, True])
 def test_a_fit_that_is_silent_says_how_far_it_is(monkeypatch, is_terminal):
     """Whatever it is doing: nothing is announced between the lines."""
-    monkeypatch.setattr(progress, "QUIET", 0.01)
+    monkeypatch.setattr(live, "QUIET", 0.01)
     console = Console(file=StringIO(), width=80, height=24, force_terminal=is_terminal)
     said = Event()
-    monkeypatch.setattr(terminal.LiveIterations, "_progress", lambda _: said.set() or Text("here"))
-    with terminal.LiveIterations(console, "title", 30).running() as shown:
+    monkeypatch.setattr(live.LiveIterations, "_progress", lambda _: said.set() or Text("here"))
+    with live.LiveIterations(console, "title", 30).running() as shown:
         shown(line(0))
         said.clear()
         assert said.wait(60.0)
@@ -168,22 +166,22 @@ def test_a_fit_that_is_silent_says_how_far_it_is(monkeypatch, is_terminal):
 def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
     """A drawing takes 10 ms, an iteration 1 ms: all but 3 % is left to the fit."""
     now = {"at": 0.0, "drawn": 0.0}
-    monkeypatch.setattr(progress.time, "perf_counter", lambda: now["at"])
-    whole = terminal.LiveIterations.picture
+    monkeypatch.setattr(live.time, "perf_counter", lambda: now["at"])
+    whole = live.LiveIterations.picture
 
     def slow(self):
         now["at"] += 0.01
         now["drawn"] += 0.01
         return whole(self)
 
-    monkeypatch.setattr(terminal.LiveIterations, "picture", slow)
-    with terminal.LiveIterations(screen(80, 24), "case", 100).running() as watch:
+    monkeypatch.setattr(live.LiveIterations, "picture", slow)
+    with live.LiveIterations(screen(80, 24), "case", 100).running() as watch:
         for number in range(900):
             now["at"] += 0.001
             watch(line(number))
         within = now["drawn"]
     # the first drawing is not yet paid for by the time after it
-    assert within - 0.01 <= progress.SHARE_OF_TIME * now["at"]
+    assert within - 0.01 <= live.SHARE_OF_TIME * now["at"]
     assert within > 0.01
     assert "iteration 899" in watch.picture().plain
 

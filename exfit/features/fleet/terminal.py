@@ -16,8 +16,7 @@ from exfit.features.fleet.folder import Fleet
 from exfit.features.fleet.summary import CaseSummary
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.show.blocks import Block, Mark, Note, Table, columns, row
-from exfit.show.terminal.render import STYLES, show
-from exfit.show.terminal.terminal import paragraph, written
+from exfit.show.terminal import STYLES, paragraph, show, written
 
 FIRST_LINE, BETWEEN_LINES = 10.0, 60.0  # s: when a file or pipe gets its lines
 REFRESHES = 2.0  # a second

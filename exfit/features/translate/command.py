@@ -76,9 +76,9 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     run_folder.refuse_inputs(FILES, [source], folder)
     try:
         if output.shown:
-            from exfit.show import terminal
+            from exfit.show import live, terminal
 
-            with terminal.ProgressBar(terminal.console()).running() as progress:
+            with live.ProgressBar(terminal.console()).running() as progress:
                 translation = translated(fit, target, steps, progress)
         else:
             translation = translated(fit, target, steps)

@@ -15,7 +15,7 @@ from exfit.features.report.page import html
 from exfit.results.io import load_result, result_text
 from exfit.show import fits, terminal
 from exfit.show.notebook import fit_html
-from exfit.show.terminal.terminal import GuardedConsole
+from exfit.show.terminal import GuardedConsole
 
 SHAPES = {"svg", "title", "desc", "path", "g", "text", "tspan"}
 

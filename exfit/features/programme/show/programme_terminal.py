@@ -12,7 +12,7 @@ from exfit.features.programme.case.programme import ProgrammeStep
 from exfit.features.programme.result import FinishedTest
 from exfit.results.model import FitResult, Iteration
 from exfit.results.verdict import NOT_CONVERGED
-from exfit.show.terminal.series import BRIEF, progress_words
+from exfit.show.live import BRIEF, progress_words
 from exfit.util.text import percentage
 
 KIND, VERDICT, SECONDS = 10, 27, 7  # characters of the columns behind the name
