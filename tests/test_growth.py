@@ -145,7 +145,7 @@ SECTION = '''class OffsetPlant(PlantSection):
 def test_a_plant_is_one_file_one_section_and_one_line(copy):
     copy.write("exfit/plants/offset.py", PLANT)
     copy.add(
-        "exfit/plants/kinds.py",
+        "exfit/plants/__init__.py",
         '        "open-circuit": ',
         '        "offset": "offset:OFFSET",\n',
     )

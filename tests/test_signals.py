@@ -15,9 +15,8 @@ from exfit.models.machines import MACHINES
 from exfit.plants import BREAKER, SATURATION, SPEED
 from exfit.plants.alone import alone
 from exfit.plants.machine_on_load import machine_on_load
-from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import open_circuit
-from exfit.plants.playback import DRIVING, playback
+from exfit.plants.playback import DRIVING, machine_playback, playback
 from exfit.plants.unit import UnitOnLoad
 from exfit.records.channel_names import guess_signals
 from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of

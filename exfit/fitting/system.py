@@ -20,8 +20,8 @@ from exfit.plants import (
     SaturationForm,
     Stabilised,
     inputs_at,
-    inputs_for_limiters,
 )
+from exfit.plants.limiting import inputs_for_limiters
 
 Values = Mapping[str, float]
 

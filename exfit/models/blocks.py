@@ -15,13 +15,13 @@ from exfit.engine.trace import Signal as Signal
 from exfit.engine.trace import clip as clip
 from exfit.engine.trace import cos as cos
 from exfit.engine.trace import exp as exp
+from exfit.engine.trace import is_zero
 from exfit.engine.trace import larger as larger
 from exfit.engine.trace import log as log
 from exfit.engine.trace import sin as sin
 from exfit.engine.trace import smaller as smaller
 from exfit.engine.trace import sqrt as sqrt
 from exfit.engine.trace import where as where
-from exfit.models.phasors import modulus
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
 SQRT3 = root(3.0)
@@ -34,6 +34,11 @@ class Limited(NamedTuple):
     slope: Signal
     low: Signal
     high: Signal
+
+
+def modulus(a: Signal, b: Signal) -> Signal:
+    """Return sqrt(a^2 + b^2); where b is not there at all, a, which is then positive."""
+    return a if is_zero(b) else sqrt(a * a + b * b)
 
 
 def rate(T: Signal) -> Signal:

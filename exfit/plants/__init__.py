@@ -1,62 +1,228 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
-from exfit.plants.breaker import BREAKER, SPEED
-from exfit.plants.kinds import EVENTS, KINDS
-from exfit.plants.limiting import PLACES, acts_without_load, inputs_at, inputs_for_limiters
-from exfit.plants.parts import (
-    DRIVING_SCALE,
-    GOVERNOR,
-    MACHINE,
-    MEASURED,
-    NETWORK,
-    SATURATION,
-    STABILISER,
-    VT0,
-    Names,
-    SaturationForm,
-    exciter_inputs,
-    exciter_parameters,
-)
-from exfit.plants.plant import (
-    LIMITER_KINDS,
-    REFERENCES,
-    Attached,
-    Equipment,
-    PlantKind,
-    PowerAt,
-    Stabilised,
-    Swing,
-    kind_of_limiter,
-)
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
-__all__ = [
-    "BREAKER",
-    "DRIVING_SCALE",
-    "EVENTS",
-    "GOVERNOR",
-    "KINDS",
-    "LIMITER_KINDS",
-    "MACHINE",
-    "MEASURED",
-    "NETWORK",
-    "PLACES",
-    "REFERENCES",
-    "SATURATION",
-    "SPEED",
-    "STABILISER",
-    "VT0",
-    "Attached",
-    "Equipment",
-    "Names",
-    "PlantKind",
-    "PowerAt",
-    "SaturationForm",
-    "Stabilised",
-    "Swing",
-    "acts_without_load",
-    "exciter_inputs",
-    "exciter_parameters",
-    "inputs_at",
-    "inputs_for_limiters",
-    "kind_of_limiter",
-]
+from exfit.engine.system import System
+from exfit.models.blocks import Saturation, exponential, exponential_se, quadratic
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model, Sheet
+from exfit.registry import LazyPart
+from exfit.registry import parts as parts_of_features
+from exfit.signals import COMPARED
+
+SaturationForm = Callable[..., Saturation]
+SATURATION: Mapping[str, SaturationForm] = {
+    "quadratic": quadratic,
+    "exponential": exponential,
+    "exponential-se": exponential_se,
+}
+
+# how the names of parameters begin, and the states of a stabiliser and a governor
+MACHINE, NETWORK, STABILISER, GOVERNOR = "machine.", "network.", "stabiliser.", "governor."
+VT0 = "vt0"
+DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
+MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
+BREAKER, SPEED = "breaker", "speed"  # inputs: 1 from the opening on; the recorded change of speed
+
+OF_EXCITER = ("vref", "vs")
+REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
+# what a test may change in any plant, those of features among them
+EVENTS = (*REFERENCES, "E", "angle", "network", BREAKER)
+# what a stabiliser may listen to; pa is the accelerating power, none an input that is not in use
+HEARD = ("speed", "p", "vt", "pa", "none")
+LIMITER_KINDS = ("oel", "uel", "scl")  # what limiters limit, as their names begin
+STATOR_CURRENT = "scl"  # of the two sides of excitation, with an output for each
+GATES = {"takeover": "", "takeover-output": "_out"}  # how the inputs of an exciter end
+SUMMING = "summing"
+PLACES = (*GATES, SUMMING)
+Requirement = Literal["exciter", "machine", "network"]
+Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
+PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
+
+
+class Stabilised(NamedTuple):
+    """A power system stabiliser, and the signals that it listens to."""
+
+    model: Model
+    inputs: tuple[str, ...]
+
+
+class Attached(NamedTuple):
+    """A limiter, and the place at which it acts on the exciter."""
+
+    model: Model
+    place: str
+
+    @property
+    def kind(self) -> str:
+        """Kind of limiter, as its name begins: oel, uel, scl."""
+        return kind_of_limiter(self.model.name)
+
+    @property
+    def prefix(self) -> str:
+        """Beginning of the names of its parameters and states."""
+        return f"{self.kind}."
+
+    @property
+    def signals(self) -> Mapping[str, str]:
+        """The names of its outputs by the side on which they act, oel or uel."""
+        name = self.prefix + self.model.name
+        if self.kind == STATOR_CURRENT:
+            return {side: f"{name}.{side}" for side in ("oel", "uel")}
+        return {self.kind: name}
+
+
+def kind_of_limiter(name: str) -> str:
+    """Kind of a limiter of the catalogue, as its name begins: oel, uel, scl."""
+    return name[:3].lower()
+
+
+def acts_without_load(limiter: Attached) -> bool:
+    """Test whether a limiter has something to limit on open circuit: the field current."""
+    return limiter.model.inputs == ("ifd",)
+
+
+def inputs_at(limiter: Attached) -> dict[str, str]:
+    """Return the inputs of an exciter on which the outputs of a limiter act, by their names."""
+    if limiter.place == SUMMING:
+        return dict.fromkeys(limiter.signals.values(), "vsum")
+    gate = GATES[limiter.place]
+    return {signal: f"v{side}{gate}" for side, signal in limiter.signals.items()}
+
+
+class Equipment(NamedTuple):
+    """Parts and data from which a plant is built.
+
+    ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
+    ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
+    ``swing`` is the form of the equation of the speed, ``power_at`` the place of recorded powers.
+    """
+
+    exciter: Model | None
+    machine: Machine | None
+    saturation: SaturationForm
+    inputs: tuple[str, ...] = ("vref",)
+    recorded: frozenset[str] = frozenset()
+    given: frozenset[str] = frozenset()
+    stabiliser: Stabilised | None = None
+    swing: Swing = "power"
+    power_at: PowerAt = "recorded-voltage"
+    governor: Model | None = None
+    limiters: tuple[Attached, ...] = ()
+
+
+def no_network(given: Collection[str]) -> Sheet:
+    """Return the data sheet of a plant without a network."""
+    return ()
+
+
+@dataclass(frozen=True)
+class PlantKind:
+    """Surroundings of an exciter; ``name`` as a case has it, ``title`` as a report has it.
+
+    ``needs`` are the parts that a case gives, ``events`` what a test may change, ``signals`` what
+    a record may hold. Of these ``driving`` drive the simulation in place of the plant: ``required``
+    ones must be recorded, ``required_one_of`` some others, those ``required_if_used`` where the
+    exciter uses them; ``levels`` are recorded signals whose level at the start is a parameter,
+    ``scaled`` driving ones whose scale is one. ``network`` is the data sheet of the network of
+    which these values are given, ``network_required`` those that must be. ``per_unit`` says that
+    voltages are those of a machine: per unit, and above zero at rest; ``finds_rest`` that the rest
+    before the event is found in the record, ``has_equations`` that exfit simulates it.
+    """
+
+    name: str
+    title: str
+    needs: tuple[Requirement, ...]
+    events: tuple[str, ...]
+    signals: tuple[str, ...]
+    build: Callable[[Equipment], System]
+    driving: tuple[str, ...] = ()
+    required: tuple[str, ...] = ()
+    required_one_of: tuple[str, ...] = ()
+    required_if_used: tuple[str, ...] = ()
+    levels: tuple[str, ...] = ()
+    scaled: tuple[str, ...] = ()
+    network: Callable[[Collection[str]], Sheet] = no_network
+    network_required: tuple[str, ...] = ()
+    per_unit: bool = True
+    finds_rest: bool = False
+    has_equations: bool = True
+
+    @property
+    def has_exciter(self) -> bool:
+        """Flag of a plant with an exciter."""
+        return "exciter" in self.needs
+
+    @property
+    def has_machine(self) -> bool:
+        """Flag of a plant with a machine."""
+        return "machine" in self.needs
+
+    @property
+    def on_load(self) -> bool:
+        """Flag of a machine that feeds a network."""
+        return "network" in self.needs
+
+    @property
+    def closed_loop(self) -> bool:
+        """Flag of an exciter that controls a machine in a simulated plant."""
+        return self.has_exciter and self.has_machine and not self.plays_back
+
+    @property
+    def plays_back(self) -> bool:
+        """Flag of a simulation that a record drives, and that cannot be without one."""
+        return bool(self.required)
+
+    @property
+    def recorded_inputs(self) -> tuple[str, ...]:
+        """The inputs of which a test may take what the record shows, beside a plant."""
+        return () if self.plays_back else tuple(name for name in self.events if name in REFERENCES)
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """Signals to compare with a record."""
+        return tuple(signal for signal in self.signals if signal not in self.driving)
+
+
+def compared(outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """Return those outputs of a plant that may be compared with a record."""
+    return tuple(signal for signal in outputs if signal in COMPARED)
+
+
+class Kinds(Mapping[str, PlantKind]):
+    """The kinds of plant by the names that a case file gives them, each imported when asked for."""
+
+    CORE: Mapping[str, str] = {
+        "open-circuit": "open_circuit:OPEN_CIRCUIT",
+        "infinite-bus": "infinite_bus:INFINITE_BUS",
+        "machine-on-load": "machine_on_load:MACHINE_ON_LOAD",
+        "playback": "playback:PLAYBACK",
+        "machine-playback": "playback:MACHINE_PLAYBACK",
+        "none": "alone:ALONE",
+        "external": "outside:OUTSIDE",
+        "fmu": "outside:FMU",
+    }
+
+    @property
+    def parts(self) -> dict[str, LazyPart]:
+        """All kinds, those of features last."""
+        of_core = {name: LazyPart(f"{__name__}.{path}") for name, path in self.CORE.items()}
+        return {**of_core, **parts_of_features("PLANTS")}
+
+    def __getitem__(self, name: str) -> PlantKind:
+        kind: PlantKind = self.parts[name].load()
+        return kind
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.parts
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parts)
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+
+KINDS = Kinds()

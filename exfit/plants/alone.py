@@ -5,19 +5,19 @@ from functools import cache
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.models.blocks import quadratic
 from exfit.models.sheet import Model
+from exfit.plants import VT0, PlantKind, compared
 from exfit.plants.parts import (
-    VT0,
     Names,
     exciter_inputs,
+    exciter_output,
     exciter_parameters,
     motion,
+    present,
     refuse_taken,
     rest_of,
     seconds,
-    state_of,
     symbols,
 )
-from exfit.plants.plant import PlantKind, compared, present
 
 OUTPUTS = ("vref", "vt")
 
@@ -29,22 +29,20 @@ def alone(model: Model) -> System:
 
     def rest(p: Signals) -> Rest:
         u = exciter_inputs(vt=p[VT0], ifd=0.0)
-        exciter = rest_of(model, p[VT0], u, exciter_parameters(p, model, quadratic))
-        return Rest(exciter.states, exciter.setpoints)
+        return rest_of(model, p[VT0], u, exciter_parameters(p, model, quadratic))
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         vref, d = r["vref"] + u["vref"], Names()
-        values = exciter_parameters(p, model, quadratic)
-        output = model.equations(state_of(model, x, r), exciter_inputs(vref=vref), values, d)
+        output = exciter_output(model, quadratic, exciter_inputs(vref=vref), p, {**r, **x}, d)
         return motion(d, model.states, {"vref": vref, "vt": output, **x})
 
     return System(
-        parameters=(*symbols("", model.sheet), VT0),
+        parameters=(*symbols(("", model.sheet)), VT0),
         setpoints=("vref", *model.setpoints),
         states=model.states,
         inputs=("vref",),
         outputs=(*OUTPUTS, *model.states),
-        time_constants=tuple(seconds("", model.sheet)),
+        time_constants=seconds(("", model.sheet)),
         rest=rest,
         motion=equations,
     )

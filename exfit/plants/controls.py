@@ -1,39 +1,15 @@
-"""What controls a unit on load: its turbine governor and its power system stabiliser."""
+"""What controls a unit on load, its governor and its stabiliser: what it hears, how it rests."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from exfit.engine.system import Rest, Signals
-from exfit.engine.trace import Signal
 from exfit.models.blocks import Limited
 from exfit.models.sheet import Model
-from exfit.plants.parts import GOVERNOR, STABILISER, Names, named_parameters, output_of
-from exfit.plants.plant import Stabilised
+from exfit.plants import Stabilised
+from exfit.plants.parts import Names
 
 ROUNDING_AT_REST = 1e-9  # pu/s
-REFERENCE = GOVERNOR + "pref"  # the setpoint that holds the power at the start
-# what a stabiliser may listen to; pa is the accelerating power, none an input that is not in use
-HEARD = ("speed", "p", "vt", "pa", "none")
-
-
-def governor_rest(governor: Model, power: Signal, p: Signals) -> Rest:
-    """Rest of a governor that holds a power: its states and setpoints by their names there."""
-    x, u = Names(), Names(dw=0.0, p=power)
-    pref = governor.rest(power, u, named_parameters(p, GOVERNOR, governor.sheet), x)
-    written = {GOVERNOR + name: value for name, value in vars(x).items()}
-    setpoints = {GOVERNOR + name: written.pop(GOVERNOR + name) for name in governor.setpoints}
-    return Rest(written, {REFERENCE: pref, **setpoints})
-
-
-def governing(governor: Model, u: Names, p: Signals, r: Signals, x: Signals, d: Names) -> Signal:
-    """Write the slopes of a governor into ``d`` and return the power Pm of its turbine.
-
-    ``u`` holds the speed less 1, ``dw``, the electrical power ``p``, and in ``pref`` by how much
-    its reference has changed since the start.
-    """
-    u.pref = r[REFERENCE] + u.pref
-    return output_of(GOVERNOR, governor, u, p, {**r, **x}, d)
 
 
 def rests_at(governor: Model, values: Mapping[str, float], power: float) -> bool:
@@ -62,16 +38,3 @@ def rests_with_output(stabiliser: Stabilised, values: Mapping[str, float]) -> bo
     seen = listening(stabiliser, Names(speed=0.0, p=1.0, vt=1.0, pa=0.0, none=0.0))
     model.rest(0.0, seen, p, x)
     return bool(abs(model.equations(x, seen, p, Names())) > ROUNDING_AT_REST)
-
-
-def stabiliser_rest(stabiliser: Stabilised, heard: Names, p: Signals) -> dict[str, Signal]:
-    """Return the states of a stabiliser that waits, under their names in the system."""
-    model, x = stabiliser.model, Names()
-    values = named_parameters(p, STABILISER, model.sheet)
-    model.rest(0.0, listening(stabiliser, heard), values, x)
-    return {STABILISER + name: value for name, value in vars(x).items()}
-
-
-def stabilising(stabiliser: Stabilised, heard: Names, p: Signals, x: Signals, d: Names) -> Signal:
-    """Write the slopes of a stabiliser into ``d`` and return its signal vs."""
-    return output_of(STABILISER, stabiliser.model, listening(stabiliser, heard), p, x, d)

@@ -6,26 +6,33 @@ from typing import Literal
 
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal, sqrt
+from exfit.models.blocks import modulus
 from exfit.models.machines import Axes, Machine
-from exfit.models.phasors import modulus
-from exfit.models.sheet import Model, Sheet, sheet
-from exfit.plants.breaker import BREAKER, breaker_of
-from exfit.plants.limiting import signals_of
-from exfit.plants.loaded_machine import Flow, behind, current
-from exfit.plants.parts import (
+from exfit.models.sheet import UP_TO_10, WITHIN_10, Model, Sheet, sheet
+from exfit.plants import (
+    BREAKER,
     MACHINE,
     MEASURED,
     NETWORK,
     VT0,
-    Names,
+    Equipment,
+    PlantKind,
     SaturationForm,
+    Stabilised,
+    Swing,
+    compared,
+)
+from exfit.plants.limiting import Limiters, signals_of
+from exfit.plants.loaded_machine import behind, breaker_of, current
+from exfit.plants.parts import (
+    Names,
     motion,
     named_parameters,
+    present,
     refuse_taken,
     symbols,
     values_named,
 )
-from exfit.plants.plant import Attached, Equipment, PlantKind, Stabilised, Swing, compared, present
 from exfit.plants.unit import (
     ROTOR,
     Controls,
@@ -40,13 +47,13 @@ OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
 
 FLOW: Sheet = sheet(
     ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
-    ("R", 0.0, "pu", (0.0, 10.0), "resistance to the source"),
-    ("X", 0.3, "pu", (0.0, 10.0), "reactance to the source"),
-    ("Rc", 0.0, "pu", (-10.0, 10.0), "resistance of the load compensation"),
-    ("Xc", 0.0, "pu", (-10.0, 10.0), "reactance of the load compensation"),
-    ("P", 0.8, "pu", (-10.0, 10.0), "active power at the start"),
+    ("R", 0.0, *UP_TO_10, "resistance to the source"),
+    ("X", 0.3, *UP_TO_10, "reactance to the source"),
+    ("Rc", 0.0, *WITHIN_10, "resistance of the load compensation"),
+    ("Xc", 0.0, *WITHIN_10, "reactance of the load compensation"),
+    ("P", 0.8, *WITHIN_10, "active power at the start"),
 )
-REACTIVE: Sheet = sheet(("Q", 0.0, "pu", (-10.0, 10.0), "reactive power at the start"))
+REACTIVE: Sheet = sheet(("Q", 0.0, *WITHIN_10, "reactive power at the start"))
 SOURCE: Sheet = sheet(("E", 1.0, "pu", (0.01, 10.0), "voltage of the source"))
 
 OFTEN_STILL = ("E", "R", "X", "angle", "vs", "pref")  # inputs that are there where they change
@@ -69,11 +76,6 @@ def reactive_power(vt: Signal, n: Names) -> Signal:
     return (n.X * reach - sqrt(n.X * n.X * reach * reach - square * rest)) / square
 
 
-def flow(vt: Signal, n: Names, given: Given) -> Flow:
-    """Return the terminals at the start."""
-    return behind(vt, n.P, n.Q if given == "Q" else reactive_power(vt, n), n.R, n.X)
-
-
 @cache
 def infinite_bus(
     model: Model,
@@ -84,7 +86,7 @@ def infinite_bus(
     stabiliser: Stabilised | None = None,
     swing: Swing = "power",
     governor: Model | None = None,
-    limiters: tuple[Attached, ...] = (),
+    limiters: Limiters = (),
 ) -> System:
     """Return an exciter on a machine behind R + jX to a stiff source.
 
@@ -104,7 +106,8 @@ def infinite_bus(
 
     def rest(p: Signals) -> Rest:
         n, vt = named_parameters(p, NETWORK, network), p[VT0]
-        at = flow(vt, n, given)
+        reactive = n.Q if given == "Q" else reactive_power(vt, n)
+        at = behind(vt, n.P, reactive, n.R, n.X)
         states, setpoints = unit_at_rest(unit, vt, n.P, at, p, n)
         return Rest(states, {**setpoints, "source": modulus(at.ex, at.ey)})
 
@@ -129,14 +132,12 @@ def infinite_bus(
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         if breaker is not None:
             it, d.delta = breaker.until_open(it), breaker.until_open(d.delta)
-        vt, power, reactive = terminals.vt, terminals.p, terminals.q
-        outputs = dict(
-            zip(OUTPUTS, (vref, vt, efd, ifd, power, reactive, it, delta, 1.0 + dw), strict=True)
-        )
+        shown = (vref, terminals.vt, efd, ifd, terminals.p, terminals.q, it, delta, 1.0 + dw)
+        outputs = dict(zip(OUTPUTS, shown, strict=True))
         return motion(d, unit.states, {**x, **outputs, **signals, MEASURED: vc1})
 
     return System(
-        parameters=(*unit.parameters(symbols(NETWORK, network)), VT0),
+        parameters=(*unit.parameters(symbols((NETWORK, network))), VT0),
         setpoints=(*unit.setpoints, "source"),
         states=unit.states,
         inputs=inputs,

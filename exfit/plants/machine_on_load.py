@@ -3,29 +3,25 @@
 from functools import cache
 
 from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.models.blocks import modulus
 from exfit.models.machines import Axes, Machine
-from exfit.models.phasors import modulus
-from exfit.models.sheet import Sheet, sheet
-from exfit.plants.breaker import BREAKER, SPEED, breaker_of
-from exfit.plants.loaded_machine import Flow, rotor_frame
+from exfit.models.sheet import WITHIN_10, Sheet, sheet
+from exfit.plants import BREAKER, MACHINE, NETWORK, SPEED, VT0, Equipment, PlantKind
+from exfit.plants.loaded_machine import Flow, breaker_of, loaded_at_rest
 from exfit.plants.parts import (
-    MACHINE,
-    NETWORK,
-    VT0,
     Names,
     motion,
     named_parameters,
+    present,
     seconds,
     symbols,
     values_named,
-    values_of,
 )
-from exfit.plants.plant import Equipment, PlantKind, present
 
 OUTPUTS = ("efd", "vt", "ifd", "p", "q", "it", "speed")
 LOAD: Sheet = sheet(
-    ("P", 0.0, "pu", (-10.0, 10.0), "active power until the breaker opens"),
-    ("Q", 0.0, "pu", (-10.0, 10.0), "reactive power until the breaker opens"),
+    ("P", 0.0, *WITHIN_10, "active power until the breaker opens"),
+    ("Q", 0.0, *WITHIN_10, "reactive power until the breaker opens"),
 )
 
 
@@ -41,12 +37,11 @@ def machine_on_load(machine: Machine, inputs: tuple[str, ...] = (BREAKER,)) -> S
     def rest(p: Signals) -> Rest:
         values = named_parameters(p, MACHINE, machine.sheet)
         n, vt = named_parameters(p, NETWORK, LOAD), p[VT0]
-        stator = rotor_frame(vt, Flow(n.P / vt, n.Q / vt, vt, 0.0), machine, values)
-        fluxes = Names()
-        machine.rest(stator.v, stator.i, values, fluxes)
-        setpoints = {"efd": machine.field(fluxes, stator.i, values), "Pm": n.P}
-        current = {"id": stator.i.d, "iq": stator.i.q}
-        return Rest({**values_of(fluxes, machine.states), "dw": 0.0}, {**setpoints, **current})
+        at = Flow(n.P / vt, n.Q / vt, vt, 0.0)
+        stator, fluxes, efd = loaded_at_rest(vt, at, machine, values)
+        states = {name: getattr(fluxes, name) for name in machine.states}
+        held = {"efd": efd, "Pm": n.P, "id": stator.i.d, "iq": stator.i.q}
+        return Rest({**states, "dw": 0.0}, held)
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         values, slopes = named_parameters(p, MACHINE, machine.sheet), Names()
@@ -74,12 +69,12 @@ def machine_on_load(machine: Machine, inputs: tuple[str, ...] = (BREAKER,)) -> S
         return motion(d, (*machine.states, "dw"), {**x, **outputs})
 
     return System(
-        parameters=(*symbols(MACHINE, machine.sheet), *symbols(NETWORK, LOAD), VT0),
+        parameters=(*symbols((MACHINE, machine.sheet), (NETWORK, LOAD)), VT0),
         setpoints=("efd", "Pm", "id", "iq"),
         states=(*machine.states, "dw"),
         inputs=inputs,
         outputs=(*OUTPUTS, *machine.states, "dw"),
-        time_constants=tuple(seconds(MACHINE, machine.sheet)),
+        time_constants=seconds((MACHINE, machine.sheet)),
         rest=rest,
         motion=equations,
     )

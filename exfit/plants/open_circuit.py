@@ -1,71 +1,59 @@
 """A machine whose breaker is open, at rated speed."""
 
-from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
 
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal
 from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import Model
-from exfit.plants.limiting import (
-    acts_without_load,
-    limited_inputs,
-    limiters_rest,
-    limiting,
-    seconds_of,
-    signals_of,
-    states_of,
-    symbols_of,
-)
-from exfit.plants.parts import (
+from exfit.plants import (
     MACHINE,
     MEASURED,
     VT0,
-    Names,
+    Equipment,
+    PlantKind,
     SaturationForm,
+    acts_without_load,
+    compared,
+)
+from exfit.plants.limiting import (
+    Limiters,
+    limited_exciter,
+    limiters_rest,
+    sheets_of,
+    signals_of,
+    states_of,
+)
+from exfit.plants.parts import (
+    Names,
     exciter_inputs,
     exciter_parameters,
     motion,
     named_parameters,
+    present,
     refuse_taken,
     rest_of,
     seconds,
-    state_of,
     symbols,
     values_named,
-    values_of,
 )
-from exfit.plants.plant import Attached, Equipment, PlantKind, compared, present
 
 OUTPUTS = ("vref", "vt", "efd", "ifd")
 NO_CURRENT = Axes(0.0, 0.0)
 
 
-class OpenMachine(NamedTuple):
-    """A machine on open circuit at one instant; ``slopes(efd, d)`` writes those of its states."""
-
-    vt: Signal
-    ifd: Signal
-    slopes: Callable[[Signal, Names], None]
-
-
-def machine_on_open_circuit(machine: Machine, x: Signals, p: Names) -> OpenMachine:
-    """Signals of a machine without stator current; the fluxes of its q axis are zero."""
-    states = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
-    ifd = machine.field(states, NO_CURRENT, p)
-
-    def slopes(efd: Signal, d: Names) -> None:
-        machine.slopes(states, efd, ifd, NO_CURRENT, p, d)
-
-    return OpenMachine(machine.source(states, p).voltage.q, ifd, slopes)
+def without_current(machine: Machine, x: Signals, p: Names) -> tuple[Names, Signal, Signal]:
+    """Return the states of a machine, its voltage and its field current; its q axis rests at 0."""
+    fluxes = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
+    return fluxes, machine.source(fluxes, p).voltage.q, machine.field(fluxes, NO_CURRENT, p)
 
 
 def at_rest(machine: Machine, vt: Signal, p: Names) -> tuple[dict[str, Signal], Signal]:
     """States that hold vt without stator current, and the field current."""
     fluxes = Names()
     machine.rest(Axes(0.0, vt), NO_CURRENT, p, fluxes)
-    return values_of(fluxes, machine.d_axis), machine.field(fluxes, NO_CURRENT, p)
+    held = {name: getattr(fluxes, name) for name in machine.d_axis}
+    return held, machine.field(fluxes, NO_CURRENT, p)
 
 
 @cache
@@ -74,7 +62,7 @@ def open_circuit(
     machine: Machine,
     saturation: SaturationForm,
     inputs: tuple[str, ...] = ("vref",),
-    limiters: tuple[Attached, ...] = (),
+    limiters: Limiters = (),
 ) -> System:
     """Return an exciter on a machine whose breaker is open, at rated speed.
 
@@ -86,6 +74,7 @@ def open_circuit(
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *machine.d_axis))
     states = (*machine.d_axis, *model.states, *states_of(limiters))
+    unit, of_limiters = (("", model.sheet), (MACHINE, machine.sheet)), sheets_of(limiters)
 
     def rest(p: Signals) -> Rest:
         fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
@@ -95,37 +84,22 @@ def open_circuit(
         return Rest({**fluxes, **exciter.states, **waiting}, exciter.setpoints)
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
-        d = Names()
-        at = machine_on_open_circuit(machine, x, named_parameters(p, MACHINE, machine.sheet))
-        vref = r["vref"] + u["vref"]
-        measured = at.vt + u.get(MEASURED, 0.0)
-        u_exciter = exciter_inputs(
-            vref=vref, vt=at.vt, vc1=measured, ifd=at.ifd, vs=u.get("vs", 0.0)
-        )
-        signals = limiting(limiters, u_exciter, p, x, d)
-        u_exciter = exciter_inputs(**{**vars(u_exciter), **limited_inputs(limiters, signals)})
-        values = exciter_parameters(p, model, saturation)
-        efd = model.equations(state_of(model, x, r), u_exciter, values, d)
-        at.slopes(efd, d)
-        outputs = {"vref": vref, "vt": at.vt, MEASURED: at.vt, "efd": efd, "ifd": at.ifd, **x}
-        return motion(d, states, {**outputs, **signals})
+        values, d = named_parameters(p, MACHINE, machine.sheet), Names()
+        fluxes, vt, ifd = without_current(machine, x, values)
+        vref, measured = r["vref"] + u["vref"], vt + u.get(MEASURED, 0.0)
+        seen = exciter_inputs(vref=vref, vt=vt, vc1=measured, ifd=ifd, vs=u.get("vs", 0.0))
+        efd, signals = limited_exciter(model, saturation, limiters, seen, p, {**r, **x}, d)
+        machine.slopes(fluxes, efd, ifd, NO_CURRENT, values, d)
+        outputs = {"vref": vref, "vt": vt, MEASURED: vt, "efd": efd, "ifd": ifd}
+        return motion(d, states, {**outputs, **x, **signals})
 
     return System(
-        parameters=(
-            *symbols("", model.sheet),
-            *symbols(MACHINE, machine.sheet),
-            VT0,
-            *symbols_of(limiters),
-        ),
+        parameters=(*symbols(*unit), VT0, *symbols(*of_limiters)),
         setpoints=("vref", *model.setpoints),
         states=states,
         inputs=inputs,
         outputs=(*OUTPUTS, *states, *signals_of(limiters)),
-        time_constants=(
-            *seconds("", model.sheet),
-            *seconds(MACHINE, machine.sheet),
-            *seconds_of(limiters),
-        ),
+        time_constants=seconds(*unit, *of_limiters),
         rest=rest,
         motion=equations,
     )

@@ -8,8 +8,8 @@ from typing import Any
 
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.models.sheet import Model, Parameter
-from exfit.plants.parts import VT0, symbols
-from exfit.plants.plant import PlantKind, compared, present
+from exfit.plants import VT0, PlantKind, compared
+from exfit.plants.parts import present, symbols
 from exfit.signals import COMPARED
 
 STATE = "rest"  # a system has at least one; it never moves
@@ -48,7 +48,7 @@ def outside(model: Model, inputs: tuple[str, ...]) -> System:
         return Motion({STATE: 0.0}, {}, signals)
 
     return System(
-        parameters=(*symbols("", model.sheet), VT0),
+        parameters=(*symbols(("", model.sheet)), VT0),
         setpoints=(),
         states=(STATE,),
         inputs=inputs,

@@ -1,42 +1,26 @@
 """What the plants share: names of values, and an exciter as a part of a system."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from math import inf
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
-from exfit.engine.system import Motion, Signals
+from exfit.engine.system import Motion, Rest, Signals
 from exfit.engine.trace import Signal
 from exfit.errors import ModelError
-from exfit.models.blocks import Limited, Saturation, exponential, exponential_se, quadratic
+from exfit.models.blocks import Limited
+from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
+from exfit.plants import SaturationForm
 
-SaturationForm = Callable[..., Saturation]
-
-SATURATION: Mapping[str, SaturationForm] = {
-    "quadratic": quadratic,
-    "exponential": exponential,
-    "exponential-se": exponential_se,
-}
-
-# how the names of parameters begin, and the states of a stabiliser and a governor
-MACHINE = "machine."
-NETWORK = "network."
-STABILISER = "stabiliser."
-GOVERNOR = "governor."
-VT0 = "vt0"
-DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
-
-MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
-
+Component = TypeVar("Component", Model, Machine)
+Part = tuple[str, Sheet]  # how the names of its parameters begin, and its data sheet
 # what an exciter sees of limiters where none acts
 UNLIMITED: Mapping[str, float] = {
     "vsum": 0.0,
-    "vuel": -inf,
-    "voel": inf,
-    "vuel_out": -inf,
-    "voel_out": inf,
+    **{"vuel": -inf, "voel": inf},
+    **{"vuel_out": -inf, "voel_out": inf},
 }
 
 
@@ -45,6 +29,13 @@ class Names(SimpleNamespace):
 
     def __getattr__(self, name: str) -> Any:
         raise ModelError(f"the model uses {name}, which its file does not declare")
+
+
+def present(component: Component | None) -> Component:
+    """Return a part of the equipment; raises ModelError where it is missing."""
+    if component is None:
+        raise ModelError("the plant lacks its exciter or its machine")
+    return component
 
 
 def initial(signal: str) -> str:
@@ -70,7 +61,7 @@ def exciter_inputs(**given: Signal) -> Names:
 
 def exciter_parameters(p: Signals, model: Model, saturation: SaturationForm) -> Names:
     """Return the parameters of an exciter, with its saturation curve where it has one."""
-    values = Names(**{row.symbol: p[row.symbol] for row in model.sheet})
+    values = named_parameters(p, "", model.sheet)
     if {"E1", "SE1", "E2", "SE2"} <= vars(values).keys():
         points = {name: p[name] for name in ("E1", "SE1", "E2", "SE2")}
         values.saturation = partial(saturation, **points)
@@ -82,17 +73,22 @@ def named_parameters(p: Signals, prefix: str, rows: Sheet) -> Names:
     return Names(**{row.symbol: p[prefix + row.symbol] for row in rows})
 
 
-def symbols(prefix: str, rows: Sheet) -> list[str]:
-    """Return the parameters of a part."""
-    return [prefix + row.symbol for row in rows]
+def symbols(*parts: Part) -> list[str]:
+    """Return the parameters of parts."""
+    return [prefix + row.symbol for prefix, rows in parts for row in rows]
 
 
-def seconds(prefix: str, rows: Sheet) -> list[str]:
+def seconds(*parts: Part) -> tuple[str, ...]:
     """Return those of them that are time constants.
 
     A time that may be negative is a coefficient of a numerator, which has no motion of its own.
     """
-    return [prefix + row.symbol for row in rows if row.is_time and row.low >= 0.0]
+    return tuple(
+        prefix + row.symbol
+        for prefix, rows in parts
+        for row in rows
+        if row.is_time and row.low >= 0.0
+    )
 
 
 def values_named(source: Signals, names: Iterable[str]) -> Names:
@@ -100,18 +96,8 @@ def values_named(source: Signals, names: Iterable[str]) -> Names:
     return Names(**{name: source[name] for name in names})
 
 
-def values_of(written: Names, names: Iterable[str]) -> dict[str, Signal]:
-    """Return some of the values that were written."""
-    return {name: getattr(written, name) for name in names}
-
-
-def state_of(model: Model, x: Signals, r: Signals) -> Names:
-    """Return an exciter's states, and the setpoints that it found at the start."""
-    return Names(**vars(values_named(x, model.states)), **vars(values_named(r, model.setpoints)))
-
-
 def output_of(prefix: str, model: Model, u: Names, p: Signals, state: Signals, d: Names) -> Signal:
-    """Write the slopes of a stabiliser or governor into ``d`` and return its output.
+    """Write the slopes of a stabiliser, governor or limiter into ``d`` and return its output.
 
     ``state`` holds its states and setpoints, which have the ``prefix`` in the system as its
     parameters have.
@@ -119,9 +105,17 @@ def output_of(prefix: str, model: Model, u: Names, p: Signals, state: Signals, d
     slopes = Names()
     s = Names(**{name: state[prefix + name] for name in (*model.states, *model.setpoints)})
     output = model.equations(s, u, named_parameters(p, prefix, model.sheet), slopes)
-    for name, slope in vars(slopes).items():
-        setattr(d, prefix + name, slope)
+    vars(d).update({prefix + name: slope for name, slope in vars(slopes).items()})
     return output
+
+
+def states_at_rest(
+    prefix: str, model: Model, output: Signal, u: Names, p: Signals
+) -> tuple[Signal, dict[str, Signal]]:
+    """Return the reference of a stabiliser, governor or limiter, and its states in the system."""
+    x = Names()
+    reference = model.rest(output, u, named_parameters(p, prefix, model.sheet), x)
+    return reference, {prefix + name: value for name, value in vars(x).items()}
 
 
 def refuse_taken(model: Model, taken: Iterable[str]) -> None:
@@ -144,20 +138,23 @@ def motion(written: Names, states: tuple[str, ...], outputs: Signals) -> Motion:
     )
 
 
-class ExciterRest(NamedTuple):
-    """Rest of an exciter that holds its output: states, and setpoints with the reference."""
-
-    states: Signals
-    setpoints: Signals
-
-
-def rest_of(model: Model, output: Signal, u: Names, p: Names) -> ExciterRest:
-    """Return an exciter's states at rest, and the setpoints that hold them."""
+def rest_of(model: Model, output: Signal, u: Names, p: Names) -> Rest:
+    """Return an exciter's states that hold an output, and its setpoints with the reference."""
     x = Names()
-    vref = model.rest(output, u, p, x)
-    written = vars(x)
+    vref, written = model.rest(output, u, p, x), vars(x)
     if written.keys() != {*model.states, *model.setpoints}:
         wrong = ", ".join(sorted(written.keys() ^ {*model.states, *model.setpoints}))
         raise ModelError(f"states and rest of the model do not match: {wrong}")
     setpoints = {name: written[name] for name in model.setpoints}
-    return ExciterRest({name: written[name] for name in model.states}, {"vref": vref, **setpoints})
+    return Rest({name: written[name] for name in model.states}, {"vref": vref, **setpoints})
+
+
+def exciter_output(
+    model: Model, saturation: SaturationForm, u: Names, p: Signals, held: Signals, d: Names
+) -> Signal:
+    """Write the slopes of an exciter into ``d`` and return its output.
+
+    ``held`` are its states, and the setpoints that it found at the start.
+    """
+    s = values_named(held, (*model.states, *model.setpoints))
+    return model.equations(s, u, exciter_parameters(p, model, saturation), d)

@@ -1,34 +1,43 @@
-"""Recorded signals in place of the plant: they drive the exciter alone."""
+"""Recorded signals in place of the plant, which drive the exciter alone, or of the exciter."""
 
 from collections.abc import Callable
 from functools import cache
 
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal
+from exfit.models.machines import Machine
 from exfit.models.sheet import Model
+from exfit.plants import (
+    DRIVING_SCALE,
+    MACHINE,
+    OF_EXCITER,
+    VT0,
+    Equipment,
+    PlantKind,
+    SaturationForm,
+)
 from exfit.plants.limiting import (
-    limited_inputs,
+    Limiters,
+    limited_exciter,
     limiters_rest,
-    limiting,
-    seconds_of,
+    sheets_of,
     signals_of,
     states_of,
-    symbols_of,
 )
+from exfit.plants.open_circuit import NO_CURRENT, at_rest, without_current
 from exfit.plants.parts import (
     Names,
-    SaturationForm,
     exciter_inputs,
     exciter_parameters,
     initial,
     motion,
+    named_parameters,
+    present,
     refuse_taken,
     rest_of,
     seconds,
-    state_of,
     symbols,
 )
-from exfit.plants.plant import OF_EXCITER, Attached, Equipment, PlantKind, present
 
 EFD0, VREF0 = "efd0", "vref0"
 DRIVING = ("vt", "ifd", "p", "q", "speed")  # what may drive an exciter
@@ -52,7 +61,7 @@ def playback(
     driving: tuple[str, ...],
     vref_known: bool = False,
     stabilised: bool = False,
-    limiters: tuple[Attached, ...] = (),
+    limiters: Limiters = (),
 ) -> System:
     """Return an exciter that recorded signals drive: ``driving`` of vt, ifd, p, q, speed.
 
@@ -70,40 +79,36 @@ def playback(
     def rest(p: Signals) -> Rest:
         values = exciter_parameters(p, model, saturation)
         u = exciter_inputs(**{signal: p[initial(signal)] for signal in driving})
-        waiting = limiters_rest(limiters, u, p)
-        if not vref_known:
-            exciter = rest_of(model, p[EFD0], u, values)
-            return Rest({**exciter.states, **waiting}, exciter.setpoints)
-        efd = held_by(
-            p[VREF0], p[EFD0], lambda efd: rest_of(model, efd, u, values).setpoints["vref"]
-        )
-        exciter = rest_of(model, efd, u, values)
-        return Rest({**exciter.states, **waiting}, {**exciter.setpoints, "vref": p[VREF0]})
+        efd = p[EFD0]
+        if vref_known:
+            efd = held_by(
+                p[VREF0], efd, lambda efd: rest_of(model, efd, u, values).setpoints["vref"]
+            )
+        exciter, setpoints = rest_of(model, efd, u, values)
+        known = {"vref": p[VREF0]} if vref_known else {}
+        return Rest({**exciter, **limiters_rest(limiters, u, p)}, {**setpoints, **known})
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         recorded = {signal: p[initial(signal)] + u[signal] for signal in driving}
         vref, vs, d = r["vref"] + u["vref"], u.get("vs", 0.0), Names()
-        u_exciter = exciter_inputs(vref=vref, vs=vs, **recorded)
-        signals = limiting(limiters, u_exciter, p, x, d)
-        u_exciter = exciter_inputs(**{**vars(u_exciter), **limited_inputs(limiters, signals)})
-        values = exciter_parameters(p, model, saturation)
-        efd = model.equations(state_of(model, x, r), u_exciter, values, d)
+        seen = exciter_inputs(vref=vref, vs=vs, **recorded)
+        efd, signals = limited_exciter(model, saturation, limiters, seen, p, {**r, **x}, d)
         outputs = {"vref": vref, "vs": vs, **recorded, "efd": efd, **signals}
         return motion(d, states, {**outputs, **x})
 
     return System(
         parameters=(
-            *symbols("", model.sheet),
+            *symbols(("", model.sheet)),
             *levels,
             EFD0,
             *((VREF0,) if vref_known else ()),
-            *symbols_of(limiters),
+            *symbols(*sheets_of(limiters)),
         ),
         setpoints=("vref", *model.setpoints),
         states=states,
         inputs=(*setpoints, *driving),
         outputs=(*recorded_outputs, *states, *signals_of(limiters)),
-        time_constants=(*seconds("", model.sheet), *seconds_of(limiters)),
+        time_constants=seconds(("", model.sheet), *sheets_of(limiters)),
         rest=rest,
         motion=equations,
     )
@@ -132,4 +137,52 @@ PLAYBACK = PlantKind(
     required_if_used=("ifd", "speed"),
     levels=(*DRIVING, "efd"),
     build=_build,
+)
+
+
+OF_MACHINE = ("efd", "vt", "ifd")
+
+
+@cache
+def machine_playback(machine: Machine) -> System:
+    """Return a machine on open circuit that a recorded field voltage drives.
+
+    Its input is the change of ``efd`` from the start, where it holds the parameter ``vt0``; so an
+    offset of the recorder does no harm. The parameter ``driving_scale`` multiplies that change: the
+    base of a recorder may be another. All per unit.
+    """
+
+    def rest(p: Signals) -> Rest:
+        fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
+        return Rest(fluxes, {"efd": ifd})
+
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+        values, d = named_parameters(p, MACHINE, machine.sheet), Names()
+        fluxes, vt, ifd = without_current(machine, x, values)
+        efd = r["efd"] + p[DRIVING_SCALE] * u["efd"]
+        machine.slopes(fluxes, efd, ifd, NO_CURRENT, values, d)
+        return motion(d, machine.d_axis, {"efd": efd, "vt": vt, "ifd": ifd, **x})
+
+    return System(
+        parameters=(*symbols((MACHINE, machine.sheet)), VT0, DRIVING_SCALE),
+        setpoints=("efd",),
+        states=machine.d_axis,
+        inputs=("efd",),
+        outputs=(*OF_MACHINE, *machine.d_axis),
+        time_constants=seconds((MACHINE, machine.sheet)),
+        rest=rest,
+        motion=equations,
+    )
+
+
+MACHINE_PLAYBACK = PlantKind(
+    name="machine-playback",
+    title="the machine alone, driven by the recorded field voltage",
+    needs=("machine",),
+    events=(),
+    signals=OF_MACHINE,
+    driving=("efd",),
+    required=("efd",),
+    scaled=("efd",),
+    build=lambda equipment: machine_playback(present(equipment.machine)),
 )

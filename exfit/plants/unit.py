@@ -3,38 +3,35 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from exfit.engine.system import Signals
+from exfit.engine.system import Rest, Signals
 from exfit.engine.trace import Signal
+from exfit.models.blocks import modulus
 from exfit.models.machines import Axes, Machine
-from exfit.models.phasors import modulus
 from exfit.models.sheet import Model
-from exfit.plants.controls import REFERENCE, governing, governor_rest, stabiliser_rest, stabilising
+from exfit.plants import GOVERNOR, MACHINE, STABILISER, SaturationForm, Stabilised, Swing
+from exfit.plants.controls import listening
 from exfit.plants.limiting import (
-    limited_inputs,
+    Limiters,
+    limited_exciter,
     limiters_rest,
-    limiting,
-    seconds_of,
+    sheets_of,
     states_of,
-    symbols_of,
 )
 from exfit.plants.loaded_machine import Flow, compensated, loaded_at_rest
 from exfit.plants.parts import (
-    GOVERNOR,
-    MACHINE,
-    STABILISER,
     Names,
-    SaturationForm,
+    Part,
     exciter_inputs,
     exciter_parameters,
     named_parameters,
+    output_of,
     rest_of,
     seconds,
-    state_of,
+    states_at_rest,
     symbols,
-    values_of,
 )
-from exfit.plants.plant import Attached, Stabilised, Swing
 
+REFERENCE = GOVERNOR + "pref"  # the setpoint of a governor that holds the power at the start
 # the rotor's angle to where the voltage behind R + jX is at the start (rad), its speed less 1 (pu)
 ROTOR = ("delta", "dw")
 
@@ -48,7 +45,7 @@ class UnitOnLoad(NamedTuple):
     stabiliser: Stabilised | None = None
     swing: Swing = "power"
     governor: Model | None = None
-    limiters: tuple[Attached, ...] = ()
+    limiters: Limiters = ()
 
     @property
     def added(self) -> tuple[tuple[str, Model], ...]:
@@ -72,32 +69,23 @@ class UnitOnLoad(NamedTuple):
             return (*held, "Pm")
         return (*held, REFERENCE, *(GOVERNOR + name for name in self.governor.setpoints))
 
+    @property
+    def sheets(self) -> tuple[list[Part], list[Part]]:
+        """Data sheets by how their parameters begin: before those of the network, and behind."""
+        added = [(prefix, model.sheet) for prefix, model in self.added]
+        unit = [("", self.exciter.sheet), (MACHINE, self.machine.sheet)]
+        return unit, [*added, *sheets_of(self.limiters)]
+
     def parameters(self, network: Sequence[str]) -> tuple[str, ...]:
         """Return all parameters, with those of the network in their place."""
-        return (
-            *symbols("", self.exciter.sheet),
-            *symbols(MACHINE, self.machine.sheet),
-            *network,
-            *(name for prefix, model in self.added for name in symbols(prefix, model.sheet)),
-            *symbols_of(self.limiters),
-        )
+        unit, added = self.sheets
+        return (*symbols(*unit), *network, *symbols(*added))
 
     @property
     def time_constants(self) -> tuple[str, ...]:
         """Parameters that are times."""
-        return (
-            *seconds("", self.exciter.sheet),
-            *seconds(MACHINE, self.machine.sheet),
-            *(name for prefix, model in self.added for name in seconds(prefix, model.sheet)),
-            *seconds_of(self.limiters),
-        )
-
-
-class UnitRest(NamedTuple):
-    """A unit at rest: its states, and what holds them."""
-
-    states: dict[str, Signal]
-    setpoints: dict[str, Signal]
+        unit, added = self.sheets
+        return seconds(*unit, *added)
 
 
 class Terminals(NamedTuple):
@@ -158,7 +146,7 @@ class Excited(NamedTuple):
 
 def unit_at_rest(
     unit: UnitOnLoad, vt: Signal, power: Signal, at: Flow, p: Signals, network: Names
-) -> UnitRest:
+) -> Rest:
     """Return the unit at rest at vt and a power, with the current and the source of ``at``.
 
     Of the ``network`` Rc and Xc compensate the load.
@@ -167,69 +155,49 @@ def unit_at_rest(
     stator, fluxes, ifd = loaded_at_rest(vt, at, unit.machine, of_machine)
     vc1 = compensated(stator.v, stator.i, network)
     u = exciter_inputs(vt=vt, vc1=vc1, ifd=ifd, p=power, q=vt * at.i_q)
-    values = exciter_parameters(p, unit.exciter, unit.saturation)
-    exciter = rest_of(unit.exciter, ifd, u, values)
-    states = {**values_of(fluxes, unit.machine.states), "delta": stator.delta, "dw": 0.0}
-    states |= limiters_rest(unit.limiters, u, p)
+    exciter = rest_of(unit.exciter, ifd, u, exciter_parameters(p, unit.exciter, unit.saturation))
+    states = {name: getattr(fluxes, name) for name in unit.machine.states}
+    states |= {"delta": stator.delta, "dw": 0.0, **limiters_rest(unit.limiters, u, p)}
     if unit.stabiliser is not None:
-        heard = Names(speed=0.0, p=power, vt=vt, pa=0.0, none=0.0)
-        states |= stabiliser_rest(unit.stabiliser, heard, p)
-    held: Signals = {"Pm": power}
+        heard = listening(unit.stabiliser, Names(speed=0.0, p=power, vt=vt, pa=0.0, none=0.0))
+        states |= states_at_rest(STABILISER, unit.stabiliser.model, 0.0, heard, p)[1]
+    held = {"Pm": power}
     if unit.governor is not None:
-        turbine = governor_rest(unit.governor, power, p)
-        states, held = {**states, **turbine.states}, turbine.setpoints
-    return UnitRest({**states, **exciter.states}, {**exciter.setpoints, **held})
-
-
-def mechanical_power(
-    unit: UnitOnLoad, at: Terminals, pref: Signal, given: UnitState, d: Names
-) -> Signal:
-    """Return the power Pm of the turbine: its governor's, or the one that held the unit at rest."""
-    p, r, x = given
-    if unit.governor is None:
-        return r["Pm"]
-    return governing(unit.governor, Names(dw=at.dw, p=at.p, pref=pref), p, r, x, d)
-
-
-def acceleration(swing: Swing, Pm: Signal, power: Signal, dw: Signal, machine: Names) -> Signal:
-    """Return d(dw)/dt, 1/s, of 2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power.
-
-    As a ``torque`` Pm is not divided by the speed.
-    """
-    driving = Pm - machine.D * dw
-    if swing == "power":
-        driving = driving / (1.0 + dw)
-    return (driving - power) / (2.0 * machine.H)
+        pref, found = states_at_rest(GOVERNOR, unit.governor, power, Names(dw=0.0, p=power), p)
+        kept = [GOVERNOR + name for name in unit.governor.setpoints]
+        held = {REFERENCE: pref, **{name: found.pop(name) for name in kept}}
+        states |= found
+    return Rest({**states, **exciter.states}, {**exciter.setpoints, **held})
 
 
 def unit_motion(
     unit: UnitOnLoad, at: Terminals, controls: Controls, given: UnitState, network: Names, d: Names
 ) -> Excited:
-    """Write the slopes of a unit's states but delta into ``d``, and return what it shows."""
-    p, r, x = given
+    """Write the slopes of a unit's states but delta into ``d``, and return what it shows.
+
+    2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power; as a torque Pm is not divided.
+    """
+    p, state = given.p, {**given.r, **given.x}
     of_machine = named_parameters(p, MACHINE, unit.machine.sheet)
     ifd = unit.machine.field(at.fluxes, at.i, of_machine)
-    power, reactive, vt = at.p, at.q, at.vt
-    Pm, vs = mechanical_power(unit, at, controls.pref, given, d), controls.vs
+    power, vt, vs = at.p, at.vt, controls.vs
+    if unit.governor is None:
+        Pm = state["Pm"]
+    else:
+        seen = Names(dw=at.dw, p=power, pref=state[REFERENCE] + controls.pref)
+        Pm = output_of(GOVERNOR, unit.governor, seen, p, state, d)
     if unit.stabiliser is not None:
         heard = Names(speed=at.dw, p=power, vt=vt, pa=Pm - power, none=0.0)
-        vs = vs + stabilising(unit.stabiliser, heard, p, x, d)
+        seen = listening(unit.stabiliser, heard)
+        vs = vs + output_of(STABILISER, unit.stabiliser.model, seen, p, state, d)
     vc1 = compensated(at.v, at.i, network)
-    u = exciter_inputs(
-        vref=controls.vref,
-        vs=vs,
-        vt=vt,
-        vc1=vc1 + controls.measured,
-        ifd=ifd,
-        p=power,
-        q=reactive,
-        speed=1.0 + at.dw,
-    )
-    signals = limiting(unit.limiters, u, p, x, d)
-    u = exciter_inputs(**{**vars(u), **limited_inputs(unit.limiters, signals)})
-    values = exciter_parameters(p, unit.exciter, unit.saturation)
-    efd = unit.exciter.equations(state_of(unit.exciter, x, r), u, values, d)
+    terminals = {"vt": vt, "vc1": vc1 + controls.measured, "ifd": ifd, "p": power, "q": at.q}
+    u = exciter_inputs(vref=controls.vref, vs=vs, speed=1.0 + at.dw, **terminals)
+    efd, signals = limited_exciter(unit.exciter, unit.saturation, unit.limiters, u, p, state, d)
     unit.machine.slopes(at.fluxes, efd, ifd, at.i, of_machine, d)
     unit.machine.q_slopes(at.fluxes, at.i, of_machine, d)
-    d.dw = acceleration(unit.swing, Pm, power, x["dw"], of_machine)
+    driving = Pm - of_machine.D * state["dw"]
+    if unit.swing == "power":
+        driving = driving / (1.0 + state["dw"])
+    d.dw = (driving - power) / (2.0 * of_machine.H)
     return Excited(efd, ifd, vc1, signals)

@@ -26,7 +26,8 @@ from tiers import examples_of
 
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.plants import SATURATION, exciter_parameters
+from exfit.plants import SATURATION
+from exfit.plants.parts import exciter_parameters
 
 P, Q = 0.8, 0.3  # on load
 # every block of the diagram takes part, and nothing is near a limit or a knee

@@ -27,7 +27,8 @@ from tiers import examples_of
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.plants import SATURATION, exciter_parameters
+from exfit.plants import SATURATION
+from exfit.plants.parts import exciter_parameters
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 

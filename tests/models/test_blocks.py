@@ -26,7 +26,7 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.plants import Names
+from exfit.plants.parts import Names
 
 END, COUNT = 1.0, 200
 TIME = np.linspace(0.0, END, COUNT + 1)

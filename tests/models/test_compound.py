@@ -13,7 +13,8 @@ from references import reference
 from exfit.engine.trace import Graph, evaluate, in_order
 from exfit.models import MODELS
 from exfit.models.blocks import compound_source
-from exfit.plants import MACHINE, Names
+from exfit.plants import MACHINE
+from exfit.plants.parts import Names
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 

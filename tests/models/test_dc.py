@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 from exfit.engine.kernel import LinearKernel
 from exfit.errors import SimulationError
 from exfit.models import MODELS
-from exfit.plants import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
+from exfit.plants import MACHINE, SATURATION, VT0
+from exfit.plants.parts import Names, exciter_inputs, exciter_parameters
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 

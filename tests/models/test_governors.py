@@ -14,8 +14,7 @@ from exfit.engine.tangents import TangentKernel
 from exfit.models import GOVERNORS
 from exfit.models.blocks import SHORTEST, Limited
 from exfit.models.sheet import crossed_limits, typical
-from exfit.plants import Names
-from exfit.plants.parts import motion, values_named
+from exfit.plants.parts import Names, motion, values_named
 
 FREQUENCIES = np.geomspace(0.001, 10.0, 41)  # Hz
 SIDES = ("dw", "p", "pref")

@@ -19,19 +19,10 @@ from exfit.models.blocks import SHORTEST, Limited
 from exfit.models.limiter_blocks import counting
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, typical
-from exfit.plants import (
-    LIMITER_KINDS,
-    MACHINE,
-    NETWORK,
-    PLACES,
-    VT0,
-    Attached,
-    Names,
-    inputs_at,
-    inputs_for_limiters,
-)
+from exfit.plants import LIMITER_KINDS, MACHINE, NETWORK, PLACES, VT0, Attached, inputs_at
 from exfit.plants.infinite_bus import infinite_bus
-from exfit.plants.parts import motion, values_named
+from exfit.plants.limiting import inputs_for_limiters
+from exfit.plants.parts import Names, motion, values_named
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.limit_hits import limiter_actions
 from exfit.simulation.limits import acting_at_rest, equation_limits, limiter_outputs, limits_hit

@@ -34,8 +34,9 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
 from exfit.models.sheet import model as build
-from exfit.plants import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
+from exfit.plants import MACHINE, SATURATION, VT0
 from exfit.plants.open_circuit import open_circuit
+from exfit.plants.parts import Names, exciter_inputs, exciter_parameters
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 

@@ -19,9 +19,9 @@ from exfit.models import MODELS, STABILISERS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import contradictions, crossed_limits, typical
-from exfit.plants import STABILISER, Names, Stabilised
+from exfit.plants import STABILISER, Stabilised
 from exfit.plants.infinite_bus import infinite_bus
-from exfit.plants.parts import motion, values_named
+from exfit.plants.parts import Names, motion, values_named
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Simulator
 

@@ -9,7 +9,7 @@ from oracle import drawn_values, lively_values, typical_values
 from tiers import examples_of
 
 from exfit.models import MODELS
-from exfit.plants import Names
+from exfit.plants.parts import Names
 
 EFD, IFD, VT = 1.3, 1.1, 0.9
 

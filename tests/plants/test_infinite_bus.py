@@ -18,8 +18,7 @@ from exfit.engine.system import parameters_used
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import MACHINE, NETWORK, STABILISER, VT0, Stabilised
-from exfit.plants.controls import HEARD
+from exfit.plants import HEARD, MACHINE, NETWORK, STABILISER, VT0, Stabilised
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, each

@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 from exfit.engine.trace import clip
 from exfit.models import MODELS
 from exfit.models.blocks import Limited
-from exfit.plants import SATURATION, Names, exciter_inputs, exciter_parameters
+from exfit.plants import SATURATION
+from exfit.plants.parts import Names, exciter_inputs, exciter_parameters
 
 
 class Transfer:

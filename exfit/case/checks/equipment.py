@@ -6,8 +6,9 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
-from exfit.plants import PlantKind, Stabilised, acts_without_load, inputs_at, inputs_for_limiters
-from exfit.plants.controls import HEARD, rests_at, rests_with_output
+from exfit.plants import HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
+from exfit.plants.controls import rests_at, rests_with_output
+from exfit.plants.limiting import inputs_for_limiters
 from exfit.util.text import show, show_value
 
 

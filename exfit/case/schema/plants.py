@@ -22,8 +22,7 @@ from exfit.case.schema.values import (
     nothing,
 )
 from exfit.models import MACHINE_NAMES
-from exfit.plants import PLACES, PowerAt, Swing
-from exfit.plants.controls import HEARD
+from exfit.plants import HEARD, PLACES, PowerAt, Swing
 
 if TYPE_CHECKING:
     Heard = str

@@ -5,25 +5,22 @@ from math import pi
 
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal, cos, sin, sqrt
+from exfit.models.blocks import modulus
 from exfit.models.machines import Axes
-from exfit.models.phasors import modulus
 from exfit.models.sheet import Sheet, sheet
+from exfit.plants import MACHINE, MEASURED, NETWORK, REFERENCES, VT0, Equipment, PlantKind, PowerAt
 from exfit.plants.limiting import signals_of
 from exfit.plants.loaded_machine import Flow, behind, current
 from exfit.plants.parts import (
-    MACHINE,
-    MEASURED,
-    NETWORK,
-    VT0,
     Names,
     initial,
     motion,
     named_parameters,
+    present,
     refuse_taken,
     symbols,
     values_named,
 )
-from exfit.plants.plant import REFERENCES, Equipment, PlantKind, PowerAt, present
 from exfit.plants.unit import (
     ROTOR,
     Controls,
@@ -110,7 +107,7 @@ def grid_playback(
             p[NETWORK + name] if name in given else p[initial(name.lower())] for name in ("P", "Q")
         )
         vt, at_terminals, at = terminals_at_rest(p[VT0], power, reactive, n, power_at)
-        return Rest(*unit_at_rest(unit, vt, at_terminals, at, p, n))
+        return unit_at_rest(unit, vt, at_terminals, at, p, n)
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
@@ -143,7 +140,7 @@ def grid_playback(
         return motion(d, unit.states, {**x, **outputs, **signals})
 
     return System(
-        parameters=(*unit.parameters(symbols(NETWORK, network)), VT0, *levels),
+        parameters=(*unit.parameters(symbols((NETWORK, network))), VT0, *levels),
         setpoints=unit.setpoints,
         states=unit.states,
         inputs=inputs,

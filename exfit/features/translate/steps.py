@@ -19,10 +19,19 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.models import GOVERNORS, MODELS, STABILISERS, find
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Model, typical
-from exfit.plants import GOVERNOR, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
+from exfit.plants import (
+    GOVERNOR,
+    MACHINE,
+    NETWORK,
+    SATURATION,
+    STABILISER,
+    VT0,
+    Equipment,
+    PlantKind,
+    Stabilised,
+)
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.open_circuit import OPEN_CIRCUIT
-from exfit.plants.plant import Equipment, PlantKind
 from exfit.results.model import FitResult
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limits import at_rest, equation_limits, limits_hit, traced

@@ -33,13 +33,13 @@ from exfit.models.blocks import (
     compound_source,
     lag,
     limited_lag,
+    modulus,
     pi,
     pi_rest,
     rectifier,
     smaller,
     where,
 )
-from exfit.models.phasors import modulus
 from exfit.models.sheet import (
     FREE,
     GAIN,

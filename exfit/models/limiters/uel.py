@@ -10,12 +10,12 @@ from exfit.models.blocks import (
     lead_lag,
     limited_lag,
     limited_lead_lag,
+    modulus,
     pi,
     smaller,
     where,
 )
 from exfit.models.limiter_blocks import POWERS, power, waiting_integral
-from exfit.models.phasors import modulus
 from exfit.models.sheet import (
     LONG_TIME,
     TIME,

@@ -6,9 +6,8 @@ Stability, 3.3 to 3.6; PSS/E GENROU, GENSAL).
 """
 
 from exfit.engine.trace import Signal, exp, log, where
-from exfit.models.blocks import SHORTEST, lag, quadratic
+from exfit.models.blocks import SHORTEST, lag, modulus, quadratic
 from exfit.models.machines.machine import Axes
-from exfit.models.phasors import modulus
 
 D_AXIS = ("EQP", "PSID")
 D_AXIS_DRAWING = """\

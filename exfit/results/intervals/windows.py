@@ -66,7 +66,7 @@ def spread_over_windows(
 
     Source: Cochran 1954, The combination of estimates from different experiments.
     """
-    from exfit.plants.machine_playback import MACHINE_PLAYBACK
+    from exfit.plants.playback import MACHINE_PLAYBACK
 
     if case.kind is not MACHINE_PLAYBACK or TPD0 not in {free.name for free in residuals.free}:
         return None
