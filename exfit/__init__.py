@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from exfit.features.fleet.folder import read_fleet
     from exfit.features.planner.table_cases import cases_of_table
     from exfit.features.programme.run import run
-    from exfit.features.programme.steady.saturation import saturation_curve
+    from exfit.features.programme.saturation import saturation_curve
     from exfit.features.rank.ranked_cases import rank
     from exfit.features.translate.translate import translate
     from exfit.records.record import Record

@@ -10,7 +10,7 @@ from yaml import safe_dump
 from exfit.case import peek
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
-from exfit.features.programme.case.programme import load_programme
+from exfit.features.programme.programme import load_programme
 from exfit.features.start.tables import read_test_table
 from exfit.util.text import MOST_TEXTS
 from exfit.workflows.given_values import read_parameters

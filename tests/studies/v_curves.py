@@ -16,12 +16,12 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from exfit.features.programme.steady.fields_on_load import (  # noqa: E402
+from exfit.features.programme.v_curve import (  # noqa: E402
     FieldMeasurement,
     PointsOnLoad,
     field_on_load,
+    v_curve,
 )
-from exfit.features.programme.steady.v_curve import v_curve  # noqa: E402
 from exfit.fitting.parameters import FreeParameter  # noqa: E402
 from exfit.models.machines import MACHINES  # noqa: E402
 from exfit.models.sheet import typical  # noqa: E402

@@ -146,8 +146,8 @@ def _of_a_fit(name: str = "first_order") -> Mapping[str, bytes]:
 @cache
 def _of_a_programme() -> Mapping[str, bytes]:
     """Return what a programme of two tests at rest leaves, by paths in its folder."""
-    from exfit.features.programme.case.programme import load_programme
     from exfit.features.programme.folder import write_programme, write_test
+    from exfit.features.programme.programme import load_programme
     from exfit.features.programme.run import run
 
     content = yaml.safe_load((CONFIGS / "programmes" / "ac8b_unit1.yaml").read_bytes())

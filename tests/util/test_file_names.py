@@ -4,7 +4,7 @@ import pytest
 
 from exfit.features.compare import files as compare
 from exfit.features.design import files as design
-from exfit.features.rank import files as rank
+from exfit.features.rank import ranking_output as rank
 from exfit.features.report.writing import PAGE, PRINT
 from exfit.features.translate import files as translate
 from exfit.show import run_folder

@@ -7,7 +7,6 @@ from math import inf
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Protocol
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import (
@@ -32,7 +31,6 @@ from exfit.features.fleet.plan import (
     Share,
     case_files,
     planned_case,
-    refused_case,
     share_of,
 )
 from exfit.features.fleet.summary import CaseSummary
@@ -50,8 +48,8 @@ MOST_TABLES = 5  # until those are left to another run that goes on in the folde
 CaseMaking = Callable[[], str]  # writes a case and returns "", or why it cannot be made
 
 
-class BatchObserver(Protocol):
-    """Sees a batch go on; all calls come from one thread, in the order of the events.
+class BatchObserver:
+    """Sees a batch go on, and does nothing; all calls come from one thread, in their order.
 
     Of each case of the run ``kept`` or ``finished`` is called once, unless the run is interrupted.
     Cases are named by their paths as the index has them.
@@ -68,22 +66,6 @@ class BatchObserver(Protocol):
 
     def finished(self, summary: CaseSummary) -> None:
         """A case has come to its end, whatever it is: done, failed, refused, no record ..."""
-
-
-class Unobserved:
-    """An observer that looks away."""
-
-    def begun(self, cases: int, workers: int) -> None:
-        """Ignore how much there is to do."""
-
-    def kept(self, case: str) -> None:
-        """Ignore a case that is done already."""
-
-    def started(self, case: str) -> None:
-        """Ignore the begin of a fit."""
-
-    def finished(self, summary: CaseSummary) -> None:
-        """Ignore the end of a case."""
 
 
 def batch(
@@ -149,14 +131,14 @@ def batch(
     each_once = {case_name(place, file): file for file in (*existing, *made)}
     files = share_of([*each_once.values()], share, place)
     settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
-    count = min(workers or processors(), max(1, len(files))) if workers != 0 else 1
-    if workers == 0:
-        compute = compute or in_this_process
-    run = BatchRun(files, place, settings, observer or Unobserved(), made)
+    run = BatchRun(files, place, settings, observer or BatchObserver(), made)
+    count = min(workers or processors(), max(1, len(files)))
     if scheduler is not None:
         from exfit.features.fleet.dispatch import cluster_workers
 
         compute, count = cluster_workers(scheduler, time_limit), 0
+    elif workers == 0:
+        compute, count = compute or in_this_process, 1
     try:
         interrupted = run.fit_all(compute or local_workers(count, time_limit), count)
     except ExfitError:
@@ -164,8 +146,7 @@ def batch(
             tables_of(place, write_tables)
         raise
     fleet = tables_of(place, write_tables)
-    names = frozenset(case_name(place, file) for file in files)
-    return replace(fleet, run=names, interrupted=interrupted)
+    return replace(fleet, run=frozenset(run.files), interrupted=interrupted)
 
 
 def _refuse(
@@ -187,7 +168,7 @@ def _refuse(
 
 
 class BatchRun:
-    """A run over some cases: it writes what they come to into the folder, and announces it."""
+    """A run over some cases, by their names: it keeps what they come to, and announces it."""
 
     def __init__(
         self,
@@ -195,11 +176,11 @@ class BatchRun:
         folder: Path,
         settings: BatchSettings,
         observer: BatchObserver,
-        made: Mapping[Path, CaseMaking] = MappingProxyType({}),
+        made: Mapping[Path, CaseMaking],
     ) -> None:
+        self.files = {case_name(folder, file): file for file in files}
         self.made = {case_name(folder, file): make for file, make in made.items()}
-        self.files, self.folder, self.settings = files, folder, settings
-        self.observer = observer
+        self.folder, self.settings, self.observer = folder, settings, observer
 
     def fit_all(self, compute: Compute, workers: int) -> bool:
         """Fit the cases that are not done; return whether an interruption ended it."""
@@ -220,13 +201,10 @@ class BatchRun:
     def _to_fit(self) -> Iterator[PlannedCase]:
         """Yield the cases that are to be fitted; the others are entered and announced."""
         keys = set[str]()
-        for file in self.files:
-            make = self.made.get(case_name(self.folder, file))
-            reason = "" if make is None else make()  # a case of a table is made first
-            if reason:
-                case = refused_case(file, self.folder, reason)
-            else:
-                case = planned_case(file, self.folder, self.settings)
+        for name, file in self.files.items():
+            make = self.made.get(name)
+            why_not_made = "" if make is None else make()  # a case of a table is made first
+            case = planned_case(file, self.folder, self.settings, why_not_made)
             write_entry(self.folder, case.entry)
             key = case.entry.key
             kept = is_done(self.folder, key) or (
@@ -235,18 +213,17 @@ class BatchRun:
             if case.task is None:
                 self.observer.finished(row_of(case.entry))
             elif key in keys or kept:
-                self.observer.kept(case.entry.case)
+                self.observer.kept(name)
             else:
                 keys.add(key)
                 yield case
 
     def _begin(self, case: PlannedCase) -> bool:
         """Announce that a case begins; return false where another run has done it meanwhile."""
-        if is_done(self.folder, case.entry.key):
-            self.observer.kept(case.entry.case)
-            return False
-        self.observer.started(case.entry.case)
-        return True
+        done = is_done(self.folder, case.entry.key)
+        announce = self.observer.kept if done else self.observer.started
+        announce(case.entry.case)
+        return not done
 
     def _end(self, case: PlannedCase, outcome: CaseOutcome) -> None:
         """Keep the outcome of a case, and announce it."""
@@ -258,13 +235,12 @@ class BatchRun:
             write_outcome(self.folder, entry.key, outcome)
         row = row_of(entry, outcome.failure)
         if outcome.summary is not None:
-            row = outcome.summary.named(row.name, entry.case)
+            row = replace(outcome.summary, name=row.name, case=entry.case)
         self.observer.finished(row)
 
     def _note_the_others(self) -> None:
         """Enter the cases that were not even planned when the run came to an early end."""
-        for file in self.files:
-            name = case_name(self.folder, file)
+        for name in self.files:
             if not has_entry(self.folder, name):
                 write_entry(self.folder, IndexEntry(name))
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from exfit.errors import ExfitError
-from exfit.features.fleet.bundle import BundledTask
 from exfit.features.fleet.cluster import (
     ANSWERED_WITHIN,
     ClusterError,
@@ -30,7 +29,8 @@ from exfit.features.fleet.cluster import (
 from exfit.features.fleet.folder import CaseOutcome, Failure
 from exfit.features.fleet.local import Begin, Compute, End, Waiting, group_of
 from exfit.features.fleet.plan import PlannedCase
-from exfit.features.fleet.remote import RemoteCase, Reply, unpacked
+from exfit.features.fleet.remote import BundledTask, RemoteCase, Reply, unpacked
+from exfit.features.fleet.summary import FailureKind
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -39,9 +39,7 @@ if TYPE_CHECKING:
     from distributed import Future as DaskFuture
 
 MOST_DEATHS = 3  # of the process of a case, after which the case is to blame
-MOST_LOSSES = (
-    10  # of the worker of a case: mostly it is ended from outside, so there are more tries
-)
+MOST_LOSSES = 10  # of its worker: mostly that is ended from outside, so there are more tries
 AHEAD = 2  # cases for each thread of a worker: one that it fits, one that it need not wait for
 MOST_BYTES = 256_000_000  # of the cases that are under way; one alone may have more
 LOOK = 1.0  # s between two looks at which workers there are
@@ -87,7 +85,7 @@ class Dispatch:
     ``threads`` are those of the workers in use, ``groups`` what they had last; ``checks`` are the
     answers of new workers, ``refused`` the reasons why others may not be used; ``begun`` are the
     cases that were announced. ``deaths`` and ``losses`` count how often the process and the worker
-    of a case ended in its middle, by its key.
+    of a case ended in its middle, by its name.
     """
 
     client: "Client"
@@ -150,16 +148,12 @@ class Dispatch:
             self._lose(worker)
         self._check(present)
         self.looked = monotonic()
+        refused = bool(present) and present.keys() <= self.refused.keys()
         if self.threads:
             self.had_workers = self.looked
-        elif self._is_useless(present):
+        elif refused or self.looked - self.had_workers > WITHOUT_WORKERS:
             address = self.client.scheduler.address
             raise ClusterError(self._refusals() or f"{address}: no worker is left")
-
-    def _is_useless(self, present: Mapping[str, int]) -> bool:
-        """Find that no worker will come: all are refused, or there was none for long."""
-        refused = bool(present) and present.keys() <= self.refused.keys()
-        return refused or self.looked - self.had_workers > WITHOUT_WORKERS
 
     def _check(self, present: Mapping[str, int]) -> None:
         """Use those workers that have shown that they may be, and ask those that are new."""
@@ -187,12 +181,16 @@ class Dispatch:
         sent = self.sent.pop(key)
         with suppress(Exception):  # the scheduler may have forgotten it
             self.client.cancel(sent.future, force=True)
-        name = _key(sent.case)
+        name = sent.case.entry.case
         self.losses[name] += begun
         if self.losses[name] < MOST_LOSSES:
             self.waiting.add(sent.case)
         else:
-            self._crash(sent.case, f"its worker was lost {MOST_LOSSES} times in the middle of it")
+            reason = f"its worker was lost {MOST_LOSSES} times in the middle of it"
+            self._fail(sent.case, "crashed", reason)
+
+    def _fail(self, case: PlannedCase, kind: FailureKind, reason: str) -> None:
+        self.end(case, CaseOutcome(failure=Failure(kind, reason)))
 
     def _send(self) -> None:
         """Send cases to the workers that need some: one to each before any has a second."""
@@ -229,7 +227,7 @@ class Dispatch:
         try:
             bundled = case._replace(task=BundledTask.of(case.task))
         except ExfitError as fault:
-            self.end(case, CaseOutcome(failure=Failure("failed", str(fault))))
+            self._fail(case, "failed", str(fault))
             return
         payload = pickle.dumps(RemoteCase(bundled, self.batch, self.time_limit))
         key = f"exfit-{uuid4().hex}"
@@ -243,20 +241,27 @@ class Dispatch:
         future.add_done_callback(lambda done: self.arrived.put(done.key))
 
     def _fetch(self) -> None:
-        """Wait for a case to end, but no longer than until the next look at the workers."""
+        """Wait for a case to end, but no longer than until the next look at the workers.
+
+        One whose worker was lost, or can fit none, is given to another.
+        """
+        from distributed.client import FutureCancelledError
+        from distributed.scheduler import KilledWorker
+
         try:
             key = self.arrived.get(timeout=LOOK)
-        except Empty:
+            sent = self.sent[key]
+        except (Empty, KeyError):  # taken back before
             return
-        sent = self.sent.get(key)
-        if sent is None:
-            return  # taken back before
         try:
             reply = sent.future.result(timeout=FETCHED_WITHIN)
         except TimeoutError:
             self.arrived.put(key)  # or its worker is gone with it, as the next look shows
+        except (FutureCancelledError, KilledWorker, OSError):
+            self._take_back(key)
         except Exception as fault:
-            self._fail(key, sent, fault)
+            self.refused[sent.worker] = f"can fit no case: {type(fault).__name__}: {fault}"
+            self._lose(sent.worker)
         else:
             del self.sent[key]
             sent.future.release()
@@ -270,29 +275,11 @@ class Dispatch:
             finally:
                 self.end(case, unpacked(reply.packed))
             return
-        self.deaths[_key(case)] += 1
-        if self.deaths[_key(case)] < MOST_DEATHS:
+        self.deaths[case.entry.case] += 1
+        if self.deaths[case.entry.case] < MOST_DEATHS:
             self.waiting.add(case)
         else:
-            self._crash(case, f"{reply.death}; so it was {MOST_DEATHS} times")
-
-    def _fail(self, key: str, sent: Sent, fault: Exception) -> None:
-        """Give a case to another worker: its own was lost, or can fit none."""
-        from distributed.client import FutureCancelledError
-        from distributed.scheduler import KilledWorker
-
-        if isinstance(fault, FutureCancelledError | KilledWorker | OSError):
-            self._take_back(key)
-        else:
-            self.refused[sent.worker] = f"can fit no case: {type(fault).__name__}: {fault}"
-            self._lose(sent.worker)
-
-    def _crash(self, case: PlannedCase, reason: str) -> None:
-        self.end(case, CaseOutcome(failure=Failure("crashed", reason)))
-
-
-def _key(case: PlannedCase) -> str:
-    return "" if case.task is None else case.task.key
+            self._fail(case, "crashed", f"{reply.death}; so it was {MOST_DEATHS} times")
 
 
 def _in_worker() -> Callable[[bytes], Any]:

@@ -13,7 +13,7 @@ import hashlib
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,6 +29,7 @@ from exfit.util.typed import plain
 
 INDEX, CASES = "index", "cases"
 SUMMARY, FAILED = "summary.json", "failed.json"
+OUTCOMES = (WHOLE_FIT, WHOLE_PROGRAMME, FAILED)
 FIT_OF_PROGRAMME = "fit"
 VERSION = 1  # of a summary; one of another version is made again
 KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
@@ -179,14 +180,16 @@ def has_entry(folder: Path, case: str) -> bool:
 
 
 def entries_of(folder: Path) -> dict[str, IndexEntry]:
-    """Return the index by the paths of the cases; a damaged entry is missing until its next run."""
+    """Return the index by the paths of the cases; a damaged entry is missing until its next run.
+
+    So is one whose key is no name of a folder here, but perhaps a way out of it.
+    """
     entries = (read_kept(file, IndexEntry) for file in sorted((folder / INDEX).glob("*.json")))
-    return {entry.case: entry for entry in entries if entry is not None and _is_of_batch(entry)}
-
-
-def _is_of_batch(entry: IndexEntry) -> bool:
-    """Accept the key of an entry if it is the name of a folder here, and no way out of it."""
-    return not entry.key or KEY.fullmatch(entry.key) is not None
+    return {
+        entry.case: entry
+        for entry in entries
+        if entry is not None and (not entry.key or KEY.fullmatch(entry.key))
+    }
 
 
 def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
@@ -204,7 +207,7 @@ def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
     entries = [*entries_of(place).values()]
     names = distinct_names([case_path(place, entry.case) for entry in entries])
     rows = [
-        _row(place, entry).named(name, entry.case)
+        replace(_row(place, entry), name=name, case=entry.case)
         for name, entry in zip(names, entries, strict=True)
     ]
     return Fleet(place, tuple(sorted(rows, key=lambda row: (row.name.casefold(), row.name))))
@@ -212,23 +215,13 @@ def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
 
 def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
     """Stamp all files of a folder that change when a case is added or comes to an end."""
-    return frozenset(_stamps(folder))
-
-
-def _stamps(folder: Path) -> Iterator[tuple[str, int, int]]:
-    for entry in (folder / INDEX).glob("*.json"):
-        yield from _stamp(entry)
-    for outcome in (WHOLE_FIT, WHOLE_PROGRAMME, FAILED):
-        for file in folder.glob(f"*/{outcome}"):
-            yield from _stamp(file)
-
-
-def _stamp(file: Path) -> Iterator[tuple[str, int, int]]:
-    try:
-        status = file.stat()
-    except OSError:  # replaced or removed meanwhile
-        return
-    yield str(file), status.st_mtime_ns, status.st_size
+    stamps = set[tuple[str, int, int]]()
+    for pattern in (f"{INDEX}/*.json", *(f"*/{each}" for each in OUTCOMES)):
+        for file in folder.glob(pattern):
+            with suppress(OSError):  # replaced or removed meanwhile
+                status = file.stat()
+                stamps.add((str(file), status.st_mtime_ns, status.st_size))
+    return frozenset(stamps)
 
 
 def row_of(entry: IndexEntry, failure: Failure | None = None) -> CaseSummary:
@@ -247,30 +240,24 @@ def row_of(entry: IndexEntry, failure: Failure | None = None) -> CaseSummary:
 
 
 def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
-    row = row_of(entry)
-    if not entry.key:
-        return row
-    if is_done(folder, entry.key):
-        try:
-            return _summary(folder, entry.key)
-        except ExfitError as fault:
-            return replace(row, status="failed", reason=str(fault))
-    return row_of(entry, failure_of(folder, entry.key))
-
-
-def _summary(folder: Path, key: str) -> CaseSummary:
-    """Return the summary of a fit that is done; raises ExfitError where it cannot be read."""
-    summary = read_kept(folder / key / SUMMARY, CaseSummary, version=VERSION)
+    """Return the row of a case: its summary where it is done, made again where that is missing."""
+    if not entry.key or not is_done(folder, entry.key):
+        return row_of(entry, failure_of(folder, entry.key) if entry.key else None)
+    place = folder / entry.key
+    summary = read_kept(place / SUMMARY, CaseSummary, version=VERSION)
     if summary is not None:
         return summary
-    if (folder / key / WHOLE_PROGRAMME).is_file():
-        from exfit.features.fleet.programmes import summary_of_programme
-        from exfit.features.programme.kept import load_summary
+    try:
+        if (place / WHOLE_PROGRAMME).is_file():
+            from exfit.features.fleet.task import summary_of_programme
+            from exfit.features.programme.folder import load_summary
 
-        programme = load_summary(folder / key)
-        seconds = sum(getattr(each, "seconds", 0.0) for each in programme.results.values())
-        return summary_of_programme(programme, key, seconds)
-    from exfit.results.io import load_result
+            programme = load_summary(place)
+            seconds = sum(getattr(each, "seconds", 0.0) for each in programme.results.values())
+            return summary_of_programme(programme, entry.key, seconds)
+        from exfit.results.io import load_result
 
-    result = load_result(folder / key)
-    return summary_of(result, key, result.seconds)
+        result = load_result(place)
+        return summary_of(result, entry.key, result.seconds)
+    except ExfitError as fault:
+        return replace(row_of(entry), status="failed", reason=str(fault))

@@ -12,7 +12,7 @@ from exfit.case.peek import command_of, content_of, files_in, fmu_of
 from exfit.case.yaml import decoded, open_places
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.features.fleet.folder import IndexEntry, case_name
-from exfit.features.fleet.summary import CaseStatus, facts_of
+from exfit.features.fleet.summary import facts_of
 from exfit.features.fleet.task import CODE, CaseTask, FurtherFiles, key_of
 from exfit.runs.runner import FitSettings
 from exfit.util.files import read_regular, refuse_bytes
@@ -84,9 +84,8 @@ def _cases_below(top: Path, written: Path) -> Iterator[Path]:
         folders[:] = sorted(
             name for name in visible if not (written.exists() and written.samefile(here / name))
         )
-        for name in sorted(files):
-            if Path(name).suffix.lower() in SUFFIXES and _may_be_case(here / name):
-                yield here / name
+        yaml = (here / name for name in sorted(files) if Path(name).suffix.lower() in SUFFIXES)
+        yield from filter(_may_be_case, yaml)
 
 
 def _may_be_case(file: Path) -> bool:
@@ -113,13 +112,17 @@ def share_of(cases: Sequence[Path], part: Share, folder: Path) -> tuple[Path, ..
     return tuple(case for case in cases if case in own)
 
 
-def planned_case(case: Path, folder: Path, settings: BatchSettings) -> PlannedCase:
+def planned_case(
+    case: Path, folder: Path, settings: BatchSettings, why_not_made: str = ""
+) -> PlannedCase:
     """Return a case with its key, and the task that its fit is; or why it has none."""
     entry = IndexEntry(case_name(folder, case))
     try:
-        data = read_regular(case)
+        data = b"" if why_not_made else read_regular(case)
     except OSError as fault:
-        return _without_task(entry, "refused", f"{case}: cannot be read: {fault.strerror}")
+        why_not_made = f"{case}: cannot be read: {fault.strerror}"
+    if why_not_made:
+        return PlannedCase(replace(entry, status="refused", reason=why_not_made))
     try:
         content = content_of(decoded(data, case), case)
     except CaseError:  # which its fit will report
@@ -128,9 +131,9 @@ def planned_case(case: Path, folder: Path, settings: BatchSettings) -> PlannedCa
     files = (case, *(file for file in files_in(content, case.parent) if file != case))
     reason = _why_refused(content, files, settings.trust)
     if reason:
-        return _without_task(entry, "refused", reason)
+        return PlannedCase(replace(entry, status="refused", reason=reason))
     if content and not WITH_RECORD & content.keys():
-        return _without_task(entry, "no record", NO_RECORD)
+        return PlannedCase(replace(entry, status="no record", reason=NO_RECORD))
     key = key_of(files, settings.fit, data)
     task = CaseTask(files, key, folder / key, settings.fit, _group(content), settings.further)
     return PlannedCase(replace(entry, key=key), task)
@@ -149,32 +152,20 @@ def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool)
     return ""
 
 
-def refused_case(case: Path, folder: Path, reason: str) -> PlannedCase:
-    """Return a case that cannot be made, with the reason."""
-    return _without_task(IndexEntry(case_name(folder, case)), "refused", reason)
-
-
-def _without_task(entry: IndexEntry, status: CaseStatus, reason: str) -> PlannedCase:
-    return PlannedCase(replace(entry, status=status, reason=reason))
-
-
 def _group(content: Mapping[str, Any]) -> str:
     """Name the group of cases that share their machine code."""
-    parameters = content.get("parameters")
+    parts = map(content.get, ("plant", "stabiliser", "governor"))
+    limiters, parameters = content.get("limiters"), content.get("parameters")
+    several = limiters if isinstance(limiters, list) else []
     free = parameters.get("free") if isinstance(parameters, Mapping) else None
-    plant, *added = (
-        {key: value for key, value in section.items() if key in ("type", "machine", "model")}
-        if isinstance(section, Mapping)
-        else None
-        for section in map(content.get, ("plant", "stabiliser", "governor"))
-    )
-    keys = ("model", "saturation", "efd_times_speed")
-    limiters = content.get("limiters")
-    attached = [
-        {key: entry.get(key) for key in ("model", "place")}
-        for entry in (limiters if isinstance(limiters, list) else ())
-        if isinstance(entry, Mapping)
+    models = [
+        *map(content.get, ("model", "saturation", "efd_times_speed")),
+        *(_picked(part, ("type", "machine", "model")) for part in parts),
+        *(_picked(limiter, ("model", "place")) for limiter in several),
+        sorted(map(str, free)) if isinstance(free, Mapping) else [],
     ]
-    models = [*map(content.get, keys), plant, *added, *attached]
-    names = sorted(map(str, free)) if isinstance(free, Mapping) else []
-    return json.dumps([*models, names], default=str, sort_keys=True)
+    return json.dumps(models, default=str, sort_keys=True)
+
+
+def _picked(section: Any, keys: Sequence[str]) -> Any:
+    return [section.get(key) for key in keys] if isinstance(section, Mapping) else None

@@ -118,65 +118,56 @@ def sisters(cases: Iterable[CaseSummary]) -> tuple[SisterGroup, ...]:
     groups: dict[tuple[str, ...], list[CaseSummary]] = defaultdict(list)
     for case in cases:
         if case.status == "done":
-            groups[_shared(case)].append(case)
+            facts = (" ".join((stated(case.about, fact) or "").split()) for fact in ALIKE)
+            shared = (case.model, case.machine_model, *(fact.casefold() for fact in facts))
+            groups[shared].append(case)
     built = (_group(members) for _, members in sorted(groups.items()))
     return tuple(group for group in built if len(group.cases) > 1)
-
-
-def _shared(case: CaseSummary) -> tuple[str, ...]:
-    facts = (" ".join((stated(case.about, fact) or "").split()).casefold() for fact in ALIKE)
-    return (case.model, case.machine_model, *facts)
 
 
 def _group(members: Sequence[CaseSummary]) -> SisterGroup:
     compared: dict[tuple[str, ...], CaseSummary] = {}
     left_out: dict[str, str] = {}
     for case in members:
-        identity = _unit(case)
+        # a unit by its place, else its name, else all content of its case
+        identity: tuple[str, ...] = (case.key,)
+        plant, unit = (stated(case.about, fact) for fact in (PLANT, UNIT))
+        if case.bus is not None and case.machine_id is not None:
+            identity = ("bus", str(case.bus), case.machine_id)
+        elif plant and unit:
+            identity = (plant, unit)
         if not case.holds:
             left_out[case.name] = case.verdict
         elif identity in compared:
             left_out[case.name] = f"the unit of {compared[identity].name}"
         else:
             compared[identity] = case
-    cases, first = tuple(compared.values()), members[0]
-    facts = tuple(filter(None, (stated(first.about, fact) for fact in ALIKE)))
-    names = dict.fromkeys(name for case in cases for name in case.fitted)
-    parameters = (
-        _parameter(name, [case for case in cases if name in case.fitted]) for name in names
-    )
+    first = members[0]
+    having: dict[str, list[CaseSummary]] = defaultdict(list)
+    for case in compared.values():
+        for name in case.fitted:
+            having[name].append(case)
     return SisterGroup(
         first.model,
         first.machine_model,
-        facts,
-        cases,
-        tuple(parameter for parameter in parameters if len(parameter.values) > 1),
+        tuple(filter(None, (stated(first.about, fact) for fact in ALIKE))),
+        tuple(compared.values()),
+        tuple(_parameter(name, several) for name, several in having.items() if len(several) > 1),
         left_out,
     )
 
 
-def _unit(case: CaseSummary) -> tuple[str, ...]:
-    """Identify a unit by its place, else its name, else all content of its case."""
-    if case.bus is not None and case.machine_id is not None:
-        return ("bus", str(case.bus), case.machine_id)
-    plant, unit = (stated(case.about, fact) for fact in (PLANT, UNIT))
-    return (plant, unit) if plant and unit else (case.key,)
-
-
 def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
-    values = [
-        SisterValue(case.name, own.value, own.low, own.high, missing_interval(case, name))
-        for case in cases
-        for own in [case.fitted[name]]
-    ]
-    unit = next(iter(cases)).fitted[name].unit
+    values = []
+    for case in cases:
+        own = case.fitted[name]
+        remark = missing_interval(case, name)
+        values.append(SisterValue(case.name, own.value, own.low, own.high, remark))
+    unit = cases[0].fitted[name].unit
     closed = [v for v in values if v.low is not None and v.high is not None]
     if len(closed) < FEWEST:
         return SisterParameter(name, unit, tuple(_beyond_intervals(values)))
-    low, value, high = (
-        np.array([getattr(v, side) for v in closed], dtype=float)
-        for side in ("low", "value", "high")
-    )
+    low, value, high = np.array([(v.low, v.value, v.high) for v in closed], dtype=float).T
     below, above = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
     judged = deviations(Estimates(value, below / ERRORS_IN_HALF, above / ERRORS_IN_HALF))
     columns = (judged.deviation, judged.probability, judged.outlier)
@@ -200,8 +191,5 @@ def _beyond_intervals(values: Sequence[SisterValue]) -> Iterator[SisterValue]:
 
     for value in values:
         others = [o.case for o in values if ends_before(value, o) or ends_before(o, value)]
-        yield (
-            value._replace(remark=f"beyond the interval of {', '.join(others)}")
-            if others
-            else value
-        )
+        remark = f"beyond the interval of {', '.join(others)}" if others else value.remark
+        yield value._replace(remark=remark)

@@ -1,7 +1,7 @@
 """A row of the table of a batch: what a case came to, in figures and small curves."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from math import inf, nan
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -14,7 +14,6 @@ from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE
 
 if TYPE_CHECKING:
-    from exfit.results.comparisons import Comparison
     from exfit.results.model import FitResult
 
 Array = NDArray[np.float64]
@@ -117,10 +116,6 @@ class CaseSummary:
     notes: tuple[str, ...] = ()
     about: Facts = field(default_factory=dict)
 
-    def named(self, name: str, case: str) -> "CaseSummary":
-        """Return the summary for another case of equal content."""
-        return replace(self, name=name, case=case)
-
     @property
     def outcome(self) -> str:
         """The outcome in a few words: the verdict, or why there is none."""
@@ -140,29 +135,23 @@ class CaseSummary:
 
 def facts_of(content: Mapping[str, Any]) -> CaseFacts:
     """Read the unit from the content of a case file, faulty or not."""
-    as_found, plant = _mapping(content.get("as_found")), _mapping(content.get("plant"))
+    about, as_found, plant = (
+        section if isinstance(section := content.get(key), Mapping) else {}
+        for key in ("about", "as_found", "plant")
+    )
     bus, machine_id = as_found.get("bus"), as_found.get("id")
     bus = bus if isinstance(bus, int) and not isinstance(bus, bool) else None
     machine_id = None if machine_id is None else str(machine_id)
-    return CaseFacts(
-        unit=_unit(_mapping(content.get("about")), bus, machine_id),
-        bus=bus,
-        machine_id=machine_id,
-        model=_text(content.get("model")),
-        machine_model=_text(plant.get("machine")),
-    )
+    model, machine = _text(content.get("model")), _text(plant.get("machine"))
+    return CaseFacts(_unit(about, bus, machine_id), bus, machine_id, model, machine)
 
 
 def _unit(about: Mapping[Any, Any], bus: int | None, machine_id: str | None) -> str:
     """Name the unit as its case does, else by its place in the planner's file."""
     facts = {str(key): _text(fact) for key, fact in about.items()}
-    machine = None if machine_id is None else f"machine {machine_id}"
-    place = filter(None, (None if bus is None else f"bus {bus}", machine))
+    place = [] if bus is None else [f"bus {bus}"]
+    place += [] if machine_id is None else [f"machine {machine_id}"]
     return stated(facts, UNIT) or ", ".join(place)
-
-
-def _mapping(content: Any) -> Mapping[Any, Any]:
-    return content if isinstance(content, Mapping) else {}
 
 
 def _text(content: Any) -> str:
@@ -204,9 +193,9 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
         holds=result.holds,
         rmse=rmse,
         validation=validation,
-        unresolved=() if result.knowledge is None else _unresolved(result),
+        unresolved=_unresolved(result),
         parameters=_parameters(result),
-        curves=tuple(curve for match in result.comparisons for curve in _curves(match)),
+        curves=tuple(_curves(result)),
         seconds=round(seconds, 3),
         notes=(*result.notes, *(note for match in result.comparisons for note in match.notes)),
         about=dict(result.about),
@@ -221,7 +210,7 @@ def _unresolved(result: "FitResult") -> tuple[str, ...]:
     """
     from exfit.results.intervals.determination import NEEDS_PROFILE, UNFINISHED
 
-    if result.verdict.misfit:
+    if result.knowledge is None or result.verdict.misfit:
         return ()
     return tuple(
         name
@@ -237,30 +226,30 @@ def _parameters(result: "FitResult") -> dict[str, SummaryParameter]:
         for part in result.parts
         for symbol, row in (part.sheet or {}).items()
     }
-    of_records = result.of_records
-    parameters = {}
+    of_records, parameters = result.of_records, {}
     for name, value in result.values.items():
-        if name not in of_records:
-            fitted = result.parameters.get(name)
-            low, high = (None, None) if fitted is None else fitted.interval or (None, None)
-            unit = units.get(name, "") if fitted is None else fitted.unit
-            source = result.source_of(name)
-            bounds = () if fitted is None else (fitted.min, fitted.max)
+        if name in of_records:
+            continue
+        source, fitted = result.source_of(name), result.parameters.get(name)
+        if fitted is None:
+            unit = units.get(name, "")
+            parameters[name] = SummaryParameter(value, None, None, source, unit, False)
+        else:
+            low, high = fitted.interval or (None, None)
             parameters[name] = SummaryParameter(
-                value, low, high, source, unit, fitted is not None, *bounds
+                value, low, high, source, fitted.unit, True, fitted.min, fitted.max
             )
     return parameters
 
 
-def _curves(comparison: "Comparison") -> list[SummaryCurve]:
-    """Return the signals of a comparison, thinned to their extremes."""
+def _curves(result: "FitResult") -> Iterator[SummaryCurve]:
+    """Yield the signals of the fitted records, thinned to their extremes."""
     from exfit.dsp.decimation import kept_rows
     from exfit.results.thinning import rounded
 
-    curves = []
-    for signal, overlay in comparison.overlays.items():
-        drawn = [overlay.measured, overlay.simulated]
-        rows = kept_rows(drawn, (MOST_POINTS - 2) // (2 * len(drawn)))
-        samples = [rounded(line[rows], CURVE_DIGITS) for line in (comparison.time, *drawn)]
-        curves.append(SummaryCurve(comparison.name, signal, *samples))
-    return curves
+    for comparison in result.comparisons:
+        for signal, overlay in comparison.overlays.items():
+            drawn = [overlay.measured, overlay.simulated]
+            rows = kept_rows(drawn, (MOST_POINTS - 2) // (2 * len(drawn)))
+            samples = [rounded(line[rows], CURVE_DIGITS) for line in (comparison.time, *drawn)]
+            yield SummaryCurve(comparison.name, signal, *samples)

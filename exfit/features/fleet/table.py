@@ -157,8 +157,8 @@ def write_tables(fleet: Fleet) -> None:
 
 def report_file(result: "FitResult | ProgrammeResult", folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the report of a fit, or a programme, that will lie in a folder."""
+    from exfit.features.programme.programme_page import programme_page
     from exfit.features.programme.result import ProgrammeResult
-    from exfit.features.programme.show.programme_page import programme_page
     from exfit.features.report.page import fit_page, page_html
 
     if isinstance(result, ProgrammeResult):

@@ -1,20 +1,23 @@
-"""One case of a batch, from its files to the files of its fit: the same in every worker."""
+"""One case of a batch, from its files to the files of its fit: the same in every worker.
+
+A programme is a case: all tests of a unit in one run, one folder and one row.
+"""
 
 import hashlib
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from traceback import extract_tb
 from typing import TYPE_CHECKING
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import KEY_DIGITS, CaseOutcome, Failure
-from exfit.features.fleet.programmes import TESTS, run_programme, summary_of_programme
-from exfit.features.fleet.summary import summary_of
+from exfit.features.fleet.summary import CaseSummary, SummaryParameter, summary_of
 from exfit.runs import store
 from exfit.runs.runner import FitSettings
-from exfit.runs.store import digest_of
+from exfit.util.file_names import WHOLE_PROGRAMME
 from exfit.util.files import read_regular
 
 if TYPE_CHECKING:
@@ -26,6 +29,8 @@ FurtherFiles = Callable[["FitResult | ProgrammeResult", Path], Iterable[tuple[st
 
 CODE = ".py"
 CHANGED = "changed while the case was fitted: run the batch again"
+TESTS = "tests"  # the key at the top of a case file that makes it a programme
+BASE = ".base"  # how the name of what is no parameter of the unit ends: 1 pu of a channel
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,12 @@ def key_of(files: Sequence[Path], settings: FitSettings, case: bytes | None = No
     A file that is missing or cannot be read counts as such. ``files`` are the case and those that
     it names, in its order; ``case`` is the content of the first where it has been read already.
     """
-    first = digest_of(files[0]) if case is None else hashlib.sha256(case).hexdigest()
-    return _key([first, *map(digest_of, files[1:])], settings)
+    first = store.digest_of(files[0]) if case is None else hashlib.sha256(case).hexdigest()
+    return _key([first, *map(store.digest_of, files[1:])], settings)
+
+
+def _key(digests: Sequence[str | None], settings: FitSettings) -> str:
+    return store.key_of(digests, **settings._asdict())[:KEY_DIGITS]
 
 
 def run_case(task: CaseTask) -> CaseOutcome:
@@ -79,9 +88,8 @@ def crash(fault: BaseException, seconds: float = 0.0) -> CaseOutcome:
     """Return the outcome of a case in which happened what should not, after processor time in s."""
     frames = extract_tb(fault.__traceback__)
     place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
-    return CaseOutcome(
-        failure=Failure("crashed", f"{type(fault).__name__}: {fault}{place}", seconds)
-    )
+    reason = f"{type(fault).__name__}: {fault}{place}"
+    return CaseOutcome(failure=Failure("crashed", reason, seconds))
 
 
 def _outcome(task: CaseTask, began: float) -> CaseOutcome:
@@ -100,7 +108,7 @@ def _outcome(task: CaseTask, began: float) -> CaseOutcome:
         data = read_regular(path)
     except OSError:
         return CaseOutcome(changed=CHANGED)
-    digests = [hashlib.sha256(data).hexdigest(), *map(digest_of, task.files[1:])]
+    digests = [hashlib.sha256(data).hexdigest(), *map(store.digest_of, task.files[1:])]
     if _key(digests, settings) != task.key:
         return CaseOutcome(changed=CHANGED)
     text = decoded(data, path)
@@ -123,9 +131,75 @@ def _outcome(task: CaseTask, began: float) -> CaseOutcome:
     return CaseOutcome({**made, **files}, summary)
 
 
-def _key(digests: Sequence[str | None], settings: FitSettings) -> str:
-    return store.key_of(digests, **settings._asdict())[:KEY_DIGITS]
-
-
 def _seconds(began: float) -> float:
     return round(time.process_time() - began, 3)
+
+
+def run_programme(
+    file: Path, strategy: str | None, search: str | None
+) -> "tuple[ProgrammeResult, dict[str, str]]":
+    """Run a programme; return its result and its files by name, as `exfit run` writes them.
+
+    Raises ExfitError where one of its tests fails, KeyboardInterrupt where it is interrupted.
+    """
+    from exfit.features.programme import folder
+    from exfit.features.programme.run import run
+
+    with TemporaryDirectory(prefix="exfit-", ignore_cleanup_errors=True) as temporary:
+        place = Path(temporary)
+        result = run(
+            file, place, again=True, keep=folder.write_test, strategy=strategy, search=search
+        )
+        if result.interrupted:
+            raise KeyboardInterrupt
+        if result.failed:
+            raise ExfitError("\n".join(f"{name}: {why}" for name, why in result.failed.items()))
+        folder.write_programme(result, place)
+        return result, files_of(place)
+
+
+def files_of(place: Path) -> dict[str, str]:
+    """Read the files of a programme by name, last the one that says that all is done."""
+    paths = sorted(path for path in place.rglob("*") if path.is_file())
+    paths.sort(key=lambda path: path == place / WHOLE_PROGRAMME)
+    return {path.relative_to(place).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+
+
+def summary_of_programme(result: "ProgrammeResult", key: str, seconds: float) -> CaseSummary:
+    """Summarise a programme as a row: its fit of the bump tests, with what all tests gave.
+
+    Verdict and reason are those of the first test that is not matched, or of the last one.
+    """
+    from exfit.results.facts import UNIT, stated
+
+    weakest = next((test for test in result.tests if not test.holds), result.tests[-1])
+    if result.fit is not None:
+        row = summary_of(result.fit, key, seconds)
+    else:
+        models = {part.kind: part.name for part in result.unit.parts}
+        row = CaseSummary(
+            result.name,
+            result.path.as_posix(),
+            key,
+            "done",
+            unit=stated({key: str(fact) for key, fact in result.about.items()}, UNIT) or "",
+            model=models.get("exciter", ""),
+            machine_model=models.get("machine", ""),
+            seconds=seconds,
+            about=dict(result.about),
+        )
+    measured = {
+        value.name: SummaryParameter(
+            value.value, *value.interval, value.source, value.unit, True, value.min, value.max
+        )
+        for value in result.values
+        if value.entered and not value.name.endswith(BASE)
+    }
+    return replace(
+        row,
+        verdict=weakest.verdict,
+        reason=f"{weakest.name}: {weakest.reason}",
+        holds=result.holds,
+        parameters={**row.parameters, **measured},
+        notes=(*row.notes, *result.warnings),
+    )

@@ -12,6 +12,7 @@ from rich.progress_bar import ProgressBar as Bar
 from rich.table import Table as Grid
 from rich.text import Text
 
+from exfit.features.fleet.batch import BatchObserver
 from exfit.features.fleet.folder import Fleet
 from exfit.features.fleet.summary import CaseSummary
 from exfit.results.verdict import GOOD, MATCHES
@@ -32,7 +33,7 @@ HARMLESS = (GOOD, MATCHES, "no record")
 MARKS: dict[str, Mark] = {GOOD: "ok", MATCHES: "doubt", "no record": "faint", "not run": "faint"}
 
 
-class BatchProgress:
+class BatchProgress(BatchObserver):
     """Shows how far a batch is: a few lines that change, or plain lines in a file or pipe."""
 
     def __init__(self, console: Console, clock: Callable[[], float] = time.monotonic) -> None:

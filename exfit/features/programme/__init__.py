@@ -2,8 +2,8 @@
 
 COMMANDS = {"run": ("fit", "Run all tests of a unit, each feeding the later ones.", "command:run")}
 
-PUBLIC = {"run": "run:run", "saturation_curve": "steady.saturation:saturation_curve"}
+PUBLIC = {"run": "run:run", "saturation_curve": "saturation:saturation_curve"}
 
 CHECKS = {"tests": "command:check"}
 
-SECTIONS = {"tests": "case.programme_schema:ProgrammeSection"}
+SECTIONS = {"tests": "programme_schema:ProgrammeSection"}

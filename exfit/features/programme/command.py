@@ -40,7 +40,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
     matched, a validation that is not accepted, or not all tests are run.
     """
     from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.case.programme import load_programme, steps_of
+    from exfit.features.programme.programme import load_programme, steps_of
     from exfit.features.programme.run import run as run_programme
 
     loaded = load_programme(programme)
@@ -50,7 +50,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
     inputs = [loaded.path, *(file for name in names for file in loaded.files_of(name))]
     programme_folder.refuse_inputs(inputs, names, folder)
     if output.shown:
-        from exfit.features.programme.show.programme_terminal import ProgrammeProgress
+        from exfit.features.programme.programme_terminal import ProgrammeProgress
         from exfit.show import terminal
 
         with ProgrammeProgress(terminal.console(), steps).running() as shown:
@@ -71,7 +71,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
 def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
     """Write the results of all tests and their report, show them, and draw the figures."""
     from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme.show import programme_blocks
+    from exfit.features.programme import programme_blocks
     from exfit.features.report.writing import write_report
     from exfit.show import terminal
 
@@ -97,9 +97,9 @@ def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
 
 def check(path: Path) -> bool:
     """Check each test of a programme and show what comes of it; False: something speaks against."""
-    from exfit.features.programme.case.programme import load_programme
+    from exfit.features.programme import programme_blocks
+    from exfit.features.programme.programme import load_programme
     from exfit.features.programme.run import check_programme
-    from exfit.features.programme.show import programme_blocks
     from exfit.show import terminal
 
     sound, console = True, terminal.console()

@@ -1,25 +1,98 @@
-"""The folder of a programme: one folder for each test, what all came to, and one report."""
+"""The folder of a programme: one folder for each test, what all came to, and one report.
 
-from collections.abc import Callable, Iterable
+The result of a test lies there under a hash of all that goes into it, and is not run again.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from exfit.features.programme.kept import summary_text, text_of
-from exfit.features.programme.result import FinishedTest, ProgrammeResult
-from exfit.features.programme.steady.saturation_result import SaturationResult
-from exfit.features.programme.steady.v_curve_result import VCurve
+from exfit.errors import ExfitError
+from exfit.features.programme.programme import Programme
+from exfit.features.programme.result import (
+    EnteredValue,
+    FinishedTest,
+    KeptSummary,
+    ProgrammeResult,
+    ProgrammeStep,
+    StepResult,
+)
+from exfit.features.programme.results_at_rest import SaturationResult, VCurve
+from exfit.results.io import load_result, result_text
 from exfit.results.model import FitResult
 from exfit.results.tables import table
+from exfit.runs import store
+from exfit.runs.runner import AS_CASES_SAY, FitSettings
 from exfit.show import run_folder
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.signals import TERMINALS
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
-from exfit.util.files import write, write_together
+from exfit.util.files import read_json, write, write_together
+from exfit.util.text import show_value, to_json
+from exfit.util.typed import plain
+from exfit.util.typed_reading import FormError, read
 
 POINTS = "points.csv"
 FIGURES_AT_REST = ("saturation.png", "v_curve.png")  # a test at rest has one of them
+KEY = "test"  # the label of the key among the inputs of a fit
+VERSION = 1  # of the file of a test that is no fit
+RESULTS: Mapping[str, type[SaturationResult] | type[VCurve]] = {
+    "saturation": SaturationResult,
+    "steady": VCurve,
+}
+
+Keep = Callable[[FinishedTest, Path], None]
+
+
+def key_of(
+    step: ProgrammeStep,
+    programme: Programme,
+    values: tuple[EnteredValue, ...],
+    settings: FitSettings = AS_CASES_SAY,
+) -> str:
+    """Return the SHA-256 of all that goes into a test: its section, its files, values, exfit.
+
+    ``values`` are those that the tests before gave.
+    """
+    entered = {
+        value.name: [value.value, value.std_error, value.source]
+        for value in values
+        if value.entered
+    }
+    files = [store.digest_of(path) for path in programme.files_of(step.name)]
+    given = {name: value for name, value in settings._asdict().items() if value is not None}
+    content = programme.content_of(step.name)
+    return store.key_of(files, content=content, values=entered, **given)
+
+
+def result_kept(step: ProgrammeStep, key: str, folder: Path) -> StepResult | None:
+    """Return the result of an earlier run of a test with the same key; None where there is none."""
+    file = folder / step.name / WHOLE_FIT
+    if step.kind in RESULTS:
+        labels = {"version": VERSION, "key": key}
+        result = store.read_kept(file, RESULTS[step.kind], under="result", **labels)
+        return result if result is not None and result.consistent else None
+    try:
+        fit = load_result(file)
+    except ExfitError:
+        return None  # there is none, or it is not ours
+    return fit if fit.inputs.get(KEY) == key else None
+
+
+def text_of(test: FinishedTest) -> str:
+    """Return the text of the result.json of a test."""
+    if isinstance(test.result, FitResult):
+        return result_text(test.result)
+    content: dict[str, Any] = {"version": VERSION, "kind": test.kind, "key": test.key}
+    return to_json({**content, "result": plain(test.result, whole=True)})
+
+
+def keep(test: FinishedTest, folder: Path) -> None:
+    """Write the result of a test, and nothing else of it, into the folder of its programme."""
+    write(folder / test.name / WHOLE_FIT, text_of(test))
 
 
 def write_test(test: FinishedTest, folder: Path) -> None:
@@ -40,21 +113,6 @@ def write_test(test: FinishedTest, folder: Path) -> None:
         write_together(own, numbers, FIGURES_AT_REST)
 
 
-def write_programme(result: ProgrammeResult, folder: Path) -> None:
-    """Write the summary of a programme; raises ExfitError where that is not possible."""
-    write(folder / WHOLE_PROGRAMME, summary_text(result))
-
-
-def figures_of(result: ProgrammeResult, folder: Path) -> dict[str, FigureFiles]:
-    """Return the figures of each test that are not in its folder yet."""
-    return {
-        test.name: FigureFiles.beside(
-            folder / test.name / WHOLE_FIT, partial(_missing, folder / test.name, _planned(test))
-        )
-        for test in result.tests
-    }
-
-
 def points_table(result: SaturationResult | VCurve) -> str:
     """Return the points of a test at rest as CSV, beside what is simulated where it is."""
     if isinstance(result, SaturationResult):
@@ -67,30 +125,69 @@ def points_table(result: SaturationResult | VCurve) -> str:
     return table([*columns], [np.asarray(column, np.float64) for column in columns.values()])
 
 
-def _planned(test: FinishedTest) -> Callable[[], PlannedFigures]:
-    if isinstance(test.result, FitResult):
-        return partial(run_folder.figures_of_fit, test.result)
-    return partial(_figure_at_rest, test.result, test.name)
+def figures_of(result: ProgrammeResult, folder: Path) -> dict[str, FigureFiles]:
+    """Return the figures of each test that are not in its folder yet."""
+    return {
+        test.name: FigureFiles.beside(
+            folder / test.name / WHOLE_FIT, partial(_missing_figures, test, folder / test.name)
+        )
+        for test in result.tests
+    }
 
 
-def _figure_at_rest(result: SaturationResult | VCurve, name: str) -> PlannedFigures:
-    from exfit.features.programme.show import programme_figures as figures
+def _missing_figures(test: FinishedTest, folder: Path) -> PlannedFigures:
+    from exfit.features.programme import programme_figures as figures
 
-    if isinstance(result, VCurve):
+    result, planned = test.result, dict[str, PlannedFigure]()
+    if isinstance(result, FitResult):
+        planned |= run_folder.figures_of_fit(result)
+    elif isinstance(result, VCurve):
         shows = "V-curves: the points beside the machine's model"
-        return {"v_curve.png": PlannedFigure(shows, partial(figures.v_curve, result, name))}
-    shows = "the saturation curve with its points"
-    return {"saturation.png": PlannedFigure(shows, partial(figures.saturation, result, name))}
-
-
-def _missing(folder: Path, planned: Callable[[], PlannedFigures]) -> PlannedFigures:
-    return {name: figure for name, figure in planned().items() if not (folder / name).is_file()}
+        planned["v_curve.png"] = PlannedFigure(shows, partial(figures.v_curve, result, test.name))
+    else:
+        drawing = partial(figures.saturation, result, test.name)
+        planned["saturation.png"] = PlannedFigure("the saturation curve with its points", drawing)
+    return {name: figure for name, figure in planned.items() if not (folder / name).is_file()}
 
 
 def refuse_inputs(files: Iterable[Path], names: Iterable[str], folder: Path) -> None:
     """Raise ExfitError where the tests of these names would write over a file of the programme."""
     for name in names:
         run_folder.refuse_unwritable(folder / name, run_folder.OF_FIT)
-        run_folder.refuse_inputs(
-            run_folder.OF_FIT, files, folder / name, [path.stem for path in files]
-        )
+        stems = [path.stem for path in files]
+        run_folder.refuse_inputs(run_folder.OF_FIT, files, folder / name, stems)
+
+
+def write_programme(result: ProgrammeResult, folder: Path) -> None:
+    """Write the summary of a programme; raises ExfitError where that is not possible."""
+    write(folder / WHOLE_PROGRAMME, summary_text(result))
+
+
+def summary_text(result: ProgrammeResult) -> str:
+    """Return the text of programme.json: all of a programme but the results of its tests."""
+    return to_json({"version": VERSION, **plain(result)})
+
+
+def load_summary(folder: Path) -> ProgrammeResult:
+    """Return the result of a programme, given its folder: of its summary and of each test.
+
+    Raises ExfitError where it cannot be read, or has changed since.
+    """
+    source = folder / WHOLE_PROGRAMME
+    content = read_json(source)
+    try:
+        if content.get("version") != VERSION:
+            raise FormError(f"version: {show_value(content.get('version'))} is not {VERSION}")
+        summary: KeptSummary = read(KeptSummary, content)
+        for at, test in enumerate(summary.tests):
+            if Path(test.name).name != test.name:
+                raise FormError(f"tests[{at}].name: {show_value(test.name)} is not that of a test")
+    except FormError as fault:
+        raise ExfitError(f"{source}: not the result of a programme: {fault}; run again") from None
+    tests = []
+    for test in summary.tests:
+        result = result_kept(test, test.key, folder)
+        if result is None:
+            raise ExfitError(f"{folder / test.name}: not the result of this programme; run again")
+        tests.append(FinishedTest(**vars(test), result=result, kept=True))
+    return ProgrammeResult(**{**vars(summary), "tests": tuple(tests)})

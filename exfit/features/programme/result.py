@@ -6,14 +6,12 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from exfit.features.programme.steady.saturation_result import SaturationResult
-from exfit.features.programme.steady.v_curve_result import VCurve
+from exfit.features.programme.results_at_rest import SaturationResult, VCurve
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
-from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.text import ERRORS_IN_INTERVAL, error_of_interval, rounded_value
-from exfit.util.typed import plain
+from exfit.util.typed import IN_FILE, KEY, plain
 
 StepResult = SaturationResult | VCurve | FitResult
 
@@ -66,30 +64,43 @@ class EnteredValue:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FinishedTest:
-    """A test that has been run, or all bump tests, which are fitted together.
+@dataclass(frozen=True)
+class ProgrammeStep:
+    """A test that is run by itself, or all bump tests, which are fitted together.
 
-    ``key`` is a hash of all that goes into it; ``kept`` says whether the result is that of an
-    earlier run with the same key.
+    ``name`` is that of its folder, ``tests`` are the names of its tests.
     """
 
     name: str
     kind: str
     tests: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class KeptTest(ProgrammeStep):
+    """A test as programme.json names it; ``key`` is a hash of all that goes into its result."""
+
     key: str
-    result: StepResult
-    kept: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedTest(KeptTest):
+    """A test that has been run; its result is ``kept`` of an earlier run with the same key."""
+
+    result: StepResult = field(metadata=IN_FILE)
+    kept: bool = field(default=False, metadata=IN_FILE)
 
     @property
     def verdict(self) -> str:
         """The verdict, in the words of that of a fit."""
-        return verdict_of(self.result)
+        result = self.result
+        return outcome_of(result) if isinstance(result, FitResult) else result.verdict.verdict
 
     @property
     def reason(self) -> str:
         """The verdict in a sentence."""
-        return reason_of(self.result)
+        result = self.result
+        return explanation_of(result) if isinstance(result, FitResult) else result.verdict.reason
 
     @property
     def interrupted(self) -> bool:
@@ -99,27 +110,37 @@ class FinishedTest:
     @property
     def holds(self) -> bool:
         """Whether its results can be used: an exit code of 0 by itself."""
-        if isinstance(self.result, FitResult):
-            return self.result.holds
-        return self.verdict in (GOOD, MATCHES)
+        result = self.result
+        return result.holds if isinstance(result, FitResult) else result.verdict.matches
 
 
 @dataclass(frozen=True, eq=False)
-class ProgrammeResult:
+class KeptSummary:
+    """The content of programme.json but its version: a programme without the results of its tests.
+
+    ``failed`` holds the error of each test that could not be run, by its name; ``not_run`` names
+    those that an interruption left out. ``unit`` has the models with what the tests gave.
+    """
+
+    path: Path = field(metadata={KEY: "programme"})
+    about: Mapping[str, float | str]
+    tests: tuple[KeptTest, ...]
+    values: tuple[EnteredValue, ...] = ()
+    failed: Mapping[str, str] = field(default_factory=dict)
+    not_run: tuple[str, ...] = ()
+    interrupted: bool = False
+    unit: UnitDescription = field(default_factory=UnitDescription)
+
+
+@dataclass(frozen=True, eq=False)
+class ProgrammeResult(KeptSummary):
     """A programme that has been run: its tests in the order of the run, and the values they gave.
 
     ``failed`` holds the error of each test that could not be run, by its name; ``not_run`` names
     those that an interruption left out. ``unit`` has the models with what the tests gave.
     """
 
-    path: Path
-    about: Mapping[str, float | str]
     tests: tuple[FinishedTest, ...]
-    values: tuple[EnteredValue, ...] = ()
-    failed: Mapping[str, str] = field(default_factory=dict)
-    not_run: tuple[str, ...] = ()
-    interrupted: bool = False
-    unit: UnitDescription = field(default_factory=UnitDescription)
 
     @property
     def name(self) -> str:
@@ -150,35 +171,19 @@ class ProgrammeResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of all tests as plain data, as ``exfit run --json`` prints them."""
-        return {
-            "programme": str(self.path),
-            "about": plain(self.about),
-            "tests": [
-                {
-                    "name": test.name,
-                    "kind": test.kind,
-                    "tests": list(test.tests),
-                    "verdict": test.verdict,
-                    "reason": test.reason,
-                    "holds": test.holds,
-                    "kept": test.kept,
-                    "result": plain(test.result),
-                }
-                for test in self.tests
-            ],
-            "values": [plain(value) for value in self.values],
-            "failed": plain(self.failed),
-            "not_run": list(self.not_run),
-            "interrupted": self.interrupted,
-            "warnings": list(self.warnings),
-        }
-
-
-def verdict_of(result: StepResult) -> str:
-    """Word the verdict of a test as that of a fit."""
-    return outcome_of(result) if isinstance(result, FitResult) else result.verdict.verdict
-
-
-def reason_of(result: StepResult) -> str:
-    """Word the verdict of a test in a sentence."""
-    return explanation_of(result) if isinstance(result, FitResult) else result.verdict.reason
+        content: dict[str, Any] = plain(self)
+        del content["unit"]
+        content["tests"] = [
+            {
+                "name": test.name,
+                "kind": test.kind,
+                "tests": list(test.tests),
+                "verdict": test.verdict,
+                "reason": test.reason,
+                "holds": test.holds,
+                "kept": test.kept,
+                "result": plain(test.result),
+            }
+            for test in self.tests
+        ]
+        return {**content, "warnings": list(self.warnings)}

@@ -10,36 +10,43 @@ from pathlib import Path
 from exfit import estimate, workflows
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
-from exfit.features.programme.case.programme import (
-    FIT,
-    Programme,
+from exfit.features.programme.folder import KEY, RESULTS, Keep, keep, key_of, result_kept
+from exfit.features.programme.programme import FIT, Programme, load_programme, steps_of
+from exfit.features.programme.programme_schema import BUMP, SaturationTest, SteadyTest
+from exfit.features.programme.result import (
+    EnteredValue,
+    FinishedTest,
+    ProgrammeResult,
     ProgrammeStep,
-    load_programme,
-    steps_of,
+    StepResult,
 )
-from exfit.features.programme.case.schema_at_rest import SaturationTest, SteadyTest
-from exfit.features.programme.kept import KEY, RESULTS, Keep, keep, key_of, result_kept
-from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
-from exfit.features.programme.steady.tests_at_rest import points_of, saturation, steady
-from exfit.features.programme.values import bases_of, errors_of_bases, values_given, with_values
+from exfit.features.programme.results_at_rest import SaturationResult, VCurve
+from exfit.features.programme.tests_at_rest import points_of, saturation, steady
 from exfit.fitting.recordings import record_of
 from exfit.plants import MACHINE
 from exfit.records.reading import file_hash
+from exfit.records.units import alike
 from exfit.results.description import UnitDescription
-from exfit.results.model import FitResult, Iteration
+from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.runs.runner import AS_CASES_SAY, FitSettings, run_in_turn
+from exfit.util.sources import FITTED, LEAST_CERTAIN_FIRST, NOT_STATED
 from exfit.workflows.case_description import parts_of
+from exfit.workflows.given_values import with_given_values
 from exfit.workflows.model_check import Check
 
 Progress = Iteration | estimate.Progress
 Values = tuple[EnteredValue, ...]
+Watch = Callable[[ProgrammeStep, Progress | None], None]
+
+MEASURED = "measured"
+BASE = ".base"  # how the name of a base ends, behind its signal
 
 
 def run(
     programme: Programme | str | PathLike[str],
     folder: str | PathLike[str] | None = None,
     again: bool = False,
-    progress: Callable[[ProgrammeStep, Progress | None], None] = lambda *_: None,
+    progress: Watch = lambda *_: None,
     finished: Callable[[FinishedTest], None] = lambda _: None,
     keep: Keep = keep,
     strategy: str | None = None,
@@ -77,18 +84,19 @@ def run(
     refuse_unreadable(programme)
     values = list[EnteredValue]()
     place = None if folder is None else Path(folder)
+    kept, settings = None if again else place, FitSettings(strategy, search)
 
     def finished_step(step: ProgrammeStep) -> FinishedTest:
-        kept = None if again else place
-        test = finished_test(
-            programme, step, tuple(values), kept, progress, FitSettings(strategy, search)
-        )
+        test = finished_test(programme, step, tuple(values), kept, progress, settings)
         if place is not None:
             keep(test, place)
         values.extend(values_given(test, programme))
         return test
 
     ran = run_in_turn(steps_of(programme), finished_step, finished)
+    case = programme.shared_case()
+    with suppress(CaseError):  # a fit with these values has failed, which says why
+        case = with_values(case, tuple(values))
     return ProgrammeResult(
         path=programme.path,
         about=programme.about,
@@ -97,42 +105,29 @@ def run(
         failed=ran.failed,
         not_run=ran.not_run,
         interrupted=ran.interrupted,
-        unit=_unit_of(programme, tuple(values)),
+        unit=UnitDescription(tuple(parts_of(case)), case.values(), case.sources()),
     )
-
-
-def _unit_of(programme: Programme, values: Values) -> UnitDescription:
-    """Return the models of a programme, with what its tests gave where the file allows it."""
-    case = programme.shared_case()
-    with suppress(CaseError):  # a fit with these values has failed, which says why
-        case = with_values(case, values)
-    return UnitDescription(tuple(parts_of(case)), case.values(), case.sources())
 
 
 def refuse_unreadable(programme: Programme) -> None:
     """Raise CaseError with what hinders the files of a programme from being read."""
-    faults: list[str] = []
-    for read in _readings(programme):
-        try:
-            read()
-        except ExfitError as fault:
-            faults += str(fault).splitlines()
-    if faults:
-        raise CaseError(dict.fromkeys(faults))
-
-
-def _readings(programme: Programme) -> "list[Callable[[], object]]":
-    """Plan the reading of each file of a programme."""
     readings: list[Callable[[], object]] = []
     for step in steps_of(programme):
-        section = None if step.name == FIT else programme.test(step.name)
+        section = programme.test(step.name)
         if isinstance(section, SaturationTest | SteadyTest):
             readings.append(partial(points_of, section, programme.folder))
         else:
             case = case_of(programme, step)
             records = (*case.recordings, *case.validations)
             readings += [partial(record_of, case, recording) for recording in records]
-    return readings
+    faults: list[str] = []
+    for reading in readings:
+        try:
+            reading()
+        except ExfitError as fault:
+            faults += str(fault).splitlines()
+    if faults:
+        raise CaseError(dict.fromkeys(faults))
 
 
 def case_of(programme: Programme, step: ProgrammeStep) -> Case:
@@ -145,25 +140,27 @@ def finished_test(
     step: ProgrammeStep,
     values: Values,
     folder: Path | None,
-    progress: Callable[[ProgrammeStep, Progress | None], None] = lambda *_: None,
+    progress: Watch = lambda *_: None,
     settings: FitSettings = AS_CASES_SAY,
 ) -> FinishedTest:
     """Return a test with its result: the one that is kept in a folder, or else that of a run."""
     programme = programme.with_bases(bases_of(values))
     key = key_of(step, programme, values, settings)
-    kept = None if folder is None else result_kept(step, key, folder)
-    if kept is not None:
-        result = _as_it_is_now(kept, programme)
-        return FinishedTest(step.name, step.kind, step.tests, key, result, kept=True)
-    progress(step, None)
-    result = _result_of(programme, step, values, partial(progress, step), settings)
-    if isinstance(result, FitResult) and not result.interrupted:
-        result = replace(
-            result,
-            inputs={**result.inputs, KEY: key},
-            files={**result.files, KEY: "all that goes into it"},
-        )
-    return FinishedTest(step.name, step.kind, step.tests, key, result)
+    result = None if folder is None else result_kept(step, key, folder)
+    kept = result is not None
+    if result is None:
+        progress(step, None)
+        result = _result_of(programme, step, values, partial(progress, step), settings)
+        if isinstance(result, FitResult) and not result.interrupted:
+            inputs = {**result.inputs, KEY: key}
+            files = {**result.files, KEY: "all that goes into it"}
+            result = replace(result, inputs=inputs, files=files)
+    elif isinstance(result, FitResult):  # with what the file says now beside its tests
+        inputs = dict(result.inputs)
+        with suppress(OSError):
+            inputs["case"] = file_hash(programme.path)
+        result = replace(result, about=programme.about, case_text=programme.text, inputs=inputs)
+    return FinishedTest(**vars(step), key=key, result=result, kept=kept)
 
 
 def _result_of(
@@ -173,14 +170,19 @@ def _result_of(
     progress: Callable[[Progress | None], None],
     settings: FitSettings,
 ) -> StepResult:
-    section = None if step.name == FIT else programme.test(step.name)
+    section = programme.test(step.name)
     shared = programme.shared_case()
     machine = shared.parts.machine
     if isinstance(section, SaturationTest):
         return saturation(section, points_of(section, programme.folder), machine)
     if isinstance(section, SteadyTest) and machine is not None:
         case = with_values(shared, values)
-        own, errors = case.values(), {**case.std_errors(), **errors_of_bases(values)}
+        own, errors = case.values(), {**case.std_errors()}
+        errors |= {
+            value.name: value.std_error
+            for value in values
+            if value.name.endswith(BASE) and value.entered
+        }
         data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
         std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
         points = points_of(section, programme.folder)
@@ -189,14 +191,104 @@ def _result_of(
     return workflows.fit(case, settings.strategy, progress, progress, search=settings.search)
 
 
-def _as_it_is_now(result: StepResult, programme: Programme) -> StepResult:
-    """Return a result that is kept, with what the file of the programme says beside its tests."""
-    if not isinstance(result, FitResult):
-        return result
-    inputs = dict(result.inputs)
-    with suppress(OSError):
-        inputs["case"] = file_hash(programme.path)
-    return replace(result, about=programme.about, case_text=programme.text, inputs=inputs)
+def with_values(case: Case, values: Values) -> Case:
+    """Return a case with what the tests before it gave, and how uncertain that is.
+
+    A free parameter starts from it.
+
+    Raises CaseError where a value contradicts others, or lies outside the bounds of a free one.
+    """
+    own = case.values()
+    last = {value.name: value for value in values if value.entered and value.name in own}
+    if not last:
+        return case
+    sources = {name: value.source for name, value in last.items()}
+    numbers = {name: value.value for name, value in last.items()}
+    changed = with_given_values(case, numbers, "the tests before", sources)
+    by_test = {
+        name: given._replace(source=f"test {last[name].test}") if name in last else given
+        for name, given in changed.given_values.items()
+    }
+    std_errors = {name: value.std_error for name, value in last.items()}
+    return replace(changed, given_values=by_test, given_std_errors=std_errors)
+
+
+def bases_of(values: Values) -> dict[str, tuple[float, str]]:
+    """Collect the bases that tests gave, by signal: 1 pu, and its unit."""
+    return {
+        value.name.removesuffix(BASE): (value.value, value.unit)
+        for value in values
+        if value.name.endswith(BASE)
+    }
+
+
+def values_given(test: FinishedTest, programme: Programme) -> Iterator[EnteredValue]:
+    """Yield the values of a finished test for those after it, each beside that of the file.
+
+    Only what the test limits on both sides counts, and only where its points or record are matched.
+
+    A value of the file stays where its source is more certain than a test: a fitted value replaces
+    one that is typical or has no source stated, a measured one also one that was fitted; what was
+    measured before, unless by an earlier test of the programme itself, what a test report says, the
+    maker's and the nameplate's remain. Of equal certainty the test of the programme counts.
+    """
+    if not test.holds:
+        return
+    case = programme.shared_case()
+    own, sources, stated = case.values(), case.sources(), {*case.values()} - {*case.typical()}
+    for value in _measured(test):
+        low, high = value.interval
+        if value.name.endswith(BASE):
+            # beside the first base of the file that contradicts it
+            signal = value.name.removesuffix(BASE)
+            bases = [
+                channel.base
+                for section in programme.columns()
+                if (channel := section.get(signal)) is not None
+                and isinstance(getattr(channel, "base", None), float)
+                and channel.unit is not None
+                and alike(channel.unit, value.unit)
+            ]
+            outside = [base for base in bases if not low <= base <= high]
+            given = next(iter((*outside, *bases)), None)
+            source, entered = NOT_STATED if bases else "", not bases
+        elif value.name in own:
+            given = own[value.name] if value.name in stated else None
+            source, certainty = sources[value.name], LEAST_CERTAIN_FIRST.index
+            entered = certainty(source) <= certainty(value.source)
+        else:
+            continue
+        excluded = given is not None and not low <= given <= high
+        yield replace(value, given=given, given_source=source, entered=entered, excluded=excluded)
+
+
+def _measured(test: FinishedTest) -> Iterator[EnteredValue]:
+    """Yield what a test limits on both sides."""
+    result = test.result
+    if isinstance(result, SaturationResult):
+        values = [(MACHINE + symbol, v, "") for symbol, v in result.machine_values.items()]
+        values += [(signal + BASE, v, unit) for signal, (v, unit) in result.channel_bases.items()]
+        for name, value, unit in values:
+            low, high = value.interval
+            if low is not None and high is not None:
+                yield EnteredValue(name, value.value, (low, high), MEASURED, test.name, unit)
+    elif isinstance(result, VCurve):
+        for symbol, parameter in result.parameters.items():
+            name = symbol if parameter.of_record else MACHINE + symbol
+            yield from _fitted(name, parameter, MEASURED, test.name)
+    elif test.kind != BUMP:
+        for name, parameter in result.parameters.items():
+            if name.startswith(MACHINE):
+                yield from _fitted(name, parameter, FITTED, test.name)
+
+
+def _fitted(
+    name: str, parameter: FittedParameter, source: str, test: str
+) -> Iterator[EnteredValue]:
+    low, high = parameter.interval or (None, None)
+    if low is not None and high is not None:
+        value = EnteredValue(name, parameter.value, (low, high), source, test, parameter.unit)
+        yield replace(value, min=parameter.min, max=parameter.max)
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +314,7 @@ def check_programme(programme: Programme) -> Iterator[CheckedStep]:
     Raises CaseError where a file cannot be read.
     """
     refuse_unreadable(programme)
-    values: tuple[EnteredValue, ...] = ()
+    values: Values = ()
     for step in steps_of(programme):
         try:
             if step.kind in RESULTS:

@@ -18,7 +18,6 @@ from exfit.cli.several_fits import draw_each, refuse_files_of_cases, run_planned
 from exfit.util.strategies import SEARCHES, SEARCHES_EXPLAINED
 
 if TYPE_CHECKING:
-    from exfit.features.rank.ranked_cases import Ranking
     from exfit.show.figure_files import FigureFiles
 
 
@@ -53,8 +52,9 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
     or to DIR. Ctrl-C keeps the models that are done. Exit code 0: all were fitted, and the first
     one matches; 1: bad input; 3: otherwise.
     """
-    from exfit.features.rank.files import FILES, write_ranking
     from exfit.features.rank.ranked_cases import planned_models, ranking_of
+    from exfit.features.rank.ranking_output import FILES, ranking_blocks, write_ranking
+    from exfit.show import terminal
 
     loaded = load(case)
     names = [] if models is None else [name.strip() for name in models.split(",")]
@@ -66,23 +66,16 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
     try:
         of_all = write_ranking(ranking, folder)
     finally:  # whatever becomes of the files
-        _show(ranking, folder, output)
+        if output.as_json:
+            print_json(ranking.to_dict())
+        elif output.shown:
+            console = terminal.console()
+            console.print()
+            terminal.show(console, ranking_blocks(ranking))
+            console.print()
+            terminal.written(console, folder)
     output.draw(of_all)
     if output.figures:
         draw_each(figures, output)
     if not ranking.complete:
         raise SystemExit(NOT_CONVERGED)
-
-
-def _show(ranking: "Ranking", folder: Path, output: Output) -> None:
-    if output.as_json:
-        print_json(ranking.to_dict())
-    elif output.shown:
-        from exfit.features.rank.ranking_blocks import ranking as blocks_of
-        from exfit.show import terminal
-
-        console = terminal.console()
-        console.print()
-        terminal.show(console, blocks_of(ranking))
-        console.print()
-        terminal.written(console, folder)

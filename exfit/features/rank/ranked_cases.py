@@ -111,18 +111,20 @@ def planned_models(
 
 
 def _names(own: str, given: Sequence[str]) -> Sequence[str]:
-    """Return the names of the models, that of the case first where they are not given."""
+    """Return the names of the models, that of the case first where they are not given.
+
+    A type stands for several.
+    """
     exciters = [name for name in MODELS if name != ALONE]
     if not given:
         return relatives(own, exciters)
     if [name.lower() for name in given] == [ALL]:
         return [own, *(name for name in without_doubles(own, exciters) if name != own)]
-    return [name for entry in given for name in _of_entry(entry, own, exciters)]
-
-
-def _of_entry(entry: str, own: str, exciters: Sequence[str]) -> Sequence[str]:
-    """Return the names that an entry of a list of models stands for: a type for several."""
-    return members(entry.upper(), own, exciters) if entry.upper() in FAMILIES else [entry]
+    names: list[str] = []
+    for entry in given:
+        kind = entry.upper()
+        names += members(kind, own, exciters) if kind in FAMILIES else [entry]
+    return names
 
 
 def ranking_of(case: Case, series: FitSeries) -> Ranking:

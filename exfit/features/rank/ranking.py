@@ -97,7 +97,16 @@ class Likelihood:
         # below the least noise of a recorder nothing says more
         squares = [max(float(np.mean(errors**2)), LEAST_NOISE**2) for errors in channels]
         samples = np.array([*map(len, channels)], dtype=float)
-        return cls(np.array(squares), samples, np.array([*map(_effective, channels)]))
+        effective = [
+            float(len(errors)) if is_white(whiteness(errors)) else effective_samples(errors)
+            for errors in channels
+        ]
+        return cls(np.array(squares), samples, np.array(effective))
+
+    @property
+    def penalty(self) -> float:
+        """What the criterion counts for a parameter."""
+        return log(max(float(np.sum(self.effective)), 1.0))
 
     def deviance(self, samples: Array) -> float:
         """Return -2 log of the likelihood of so many samples, each channel's noise unknown.
@@ -105,6 +114,15 @@ class Likelihood:
         What is the same for all models is left out.
         """
         return float(samples @ np.log(self.squares))
+
+    def gap(self, other: "Likelihood", more: int) -> float:
+        """Excess of the criterion of another model, which has so many parameters fewer.
+
+        What this one has in more parameters counts against it; what it has in fewer does not count
+        for it: that a model is larger than it need be is no evidence against it.
+        """
+        gain = other.deviance(self.effective) - self.deviance(self.effective)
+        return gain - max(more, 0) * self.penalty
 
 
 def ranked(
@@ -125,9 +143,14 @@ def ranked(
         "fit": _refuted(fitted, counts, judged),
         "validation": _refuted(unseen, [0] * len(fits), judged),
     }
-    criteria = _criteria(fitted, counts)
+    # the criterion of each, but for a sum that all share
+    best = min(fitted, key=lambda model: model.deviance(model.samples))
+    criteria = [
+        model.deviance(best.effective) + count * best.penalty
+        for model, count in zip(fitted, counts, strict=True)
+    ]
     models = [
-        _ranked(
+        _ranked_model(
             name,
             result,
             criterion - min(criteria),
@@ -136,15 +159,12 @@ def ranked(
         )
         for k, ((name, result), criterion) in enumerate(zip(results.items(), criteria, strict=True))
     ]
-    return tuple(sorted(models, key=_order))
+    return tuple(
+        sorted(models, key=lambda m: (m.refuted_by is None, m.validation_rmse or 0.0, m.bic))
+    )
 
 
-def _order(model: RankedModel) -> tuple[bool, float, float]:
-    validation = model.validation_rmse
-    return model.refuted_by is None, 0.0 if validation is None else validation, model.bic
-
-
-def _ranked(
+def _ranked_model(
     name: str,
     result: FitResult,
     bic: float,
@@ -172,51 +192,24 @@ def _rmse(comparisons: Sequence[Comparison]) -> float:
     return sqrt(sum(match.rmse**2 for match in comparisons) / len(comparisons))
 
 
-def _criteria(models: Sequence[Likelihood], counts: Sequence[int]) -> list[float]:
-    """Return the criterion of each model, but for a sum that all share."""
-    effective = min(models, key=lambda model: model.deviance(model.samples)).effective
-    penalty = log(max(float(np.sum(effective)), 1.0))
-    return [
-        model.deviance(effective) + count * penalty
-        for model, count in zip(models, counts, strict=True)
-    ]
-
-
 def _refuted(
     models: Sequence[Likelihood], counts: Sequence[int], judged: Sequence[bool]
 ) -> list[bool]:
-    """Find the models that another one describes the records strongly better than.
-
-    What a better model has in more parameters counts against it; what it has in fewer does not
-    count for it: that a model is larger than it need be is no evidence against it.
-    """
+    """Find the models that another one describes the records strongly better than."""
+    rivals = [
+        (model, count) for model, count, own in zip(models, counts, judged, strict=True) if own
+    ]
     return [
-        own
-        and any(
-            judged[k] and _gap(better, model, counts[k] - count) > STRONG
-            for k, better in enumerate(models)
-            if better is not model
-        )
+        own and any(rival.gap(model, more - count) > STRONG for rival, more in rivals)
         for model, count, own in zip(models, counts, judged, strict=True)
     ]
-
-
-def _gap(better: Likelihood, model: Likelihood, more: int) -> float:
-    """Excess of the criterion of a model over that of another, never by its size."""
-    gain = model.deviance(better.effective) - better.deviance(better.effective)
-    return gain - max(more, 0) * log(max(float(np.sum(better.effective)), 1.0))
-
-
-def _effective(errors: Array) -> float:
-    """Number of independent samples that errors are worth: all of them where they are white."""
-    return float(len(errors)) if is_white(whiteness(errors)) else effective_samples(errors)
 
 
 def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
     """Yield the sentences about models that the records tell apart, and about those they do not."""
     judged = [model for model in models if model.refuted_by is not None]
     if len(judged) > 1:
-        yield _judgement(judged)
+        yield _told_apart(judged)
     if models and not any(model.matches for model in models):
         yield "none of these models matches the records"
     for model in models:
@@ -226,16 +219,17 @@ def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
         yield "a record that no fit saw, under `validate`, tells models apart that this one cannot"
 
 
-def _judgement(judged: Sequence[RankedModel]) -> str:
-    """Select the models that the records do not refute."""
+def _told_apart(judged: Sequence[RankedModel]) -> str:
+    """Word which models the records do not refute, and which is best where they refute all."""
     possible = [model.name for model in judged if model.possible]
-    typical = dict.fromkeys(name for model in judged for name in model.typical_machine)
+    typical = [*dict.fromkeys(name for model in judged for name in model.typical_machine)]
+    best = min(judged, key=lambda model: model.bic).name
     if typical and len(possible) < len(judged):
-        best = listed(possible or [min(judged, key=lambda model: model.bic).name])
         return (
-            f"with this machine the records match {best} best; that they refute the others is not "
-            f"shown: {listed([*typical])} {'is' if len(typical) == 1 else 'are'} typical, and "
-            "other values may let them match: give the machine's own, or free them under plant.free"
+            f"with this machine the records match {listed(possible or [best])} best; that they "
+            f"refute the others is not shown: {listed(typical)} "
+            f"{'is' if len(typical) == 1 else 'are'} typical, and other values may let them match: "
+            "give the machine's own, or free them under plant.free"
         )
     if len(possible) > 1:
         return (
@@ -244,7 +238,6 @@ def _judgement(judged: Sequence[RankedModel]) -> str:
         )
     if possible:
         return f"the records refute all of these models but {possible[0]}"
-    best = min(judged, key=lambda model: model.bic).name
     if judged[0].name == best:
         return f"no model describes all channels best; {best} is the best on the whole"
     return (

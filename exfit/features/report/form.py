@@ -6,7 +6,7 @@ from shlex import join
 from typing import NamedTuple
 
 from exfit import __version__
-from exfit.features.programme.kept import KEY
+from exfit.features.programme.folder import KEY
 from exfit.features.programme.result import ProgrammeResult
 from exfit.features.report.behaviour import UsabilityCheck, no_usability, usability
 from exfit.features.report.words import DASH, number

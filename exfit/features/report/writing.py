@@ -53,8 +53,8 @@ def _page(result: Path, other: FitResult | None) -> tuple[Page, Path]:
     """Return the page of a result that a file or folder holds, and its folder."""
     summary = result / WHOLE_PROGRAMME if result.is_dir() else result
     if summary.name == WHOLE_PROGRAMME and summary.is_file():
-        from exfit.features.programme.kept import load_summary
-        from exfit.features.programme.show.programme_page import programme_page
+        from exfit.features.programme.folder import load_summary
+        from exfit.features.programme.programme_page import programme_page
 
         if other is not None:
             raise ExfitError(f"{summary}: --against compares fits, and this is a programme")

@@ -14,10 +14,9 @@ from exfit.errors import ExfitError
 from exfit.features.fleet.batch import tables_of
 from exfit.features.fleet.folder import CaseOutcome, write_outcome
 from exfit.features.fleet.local import in_this_process as here
-from exfit.features.fleet.programmes import files_of
 from exfit.features.fleet.table import report_file
-from exfit.features.fleet.task import CHANGED
-from exfit.features.programme.kept import load_summary
+from exfit.features.fleet.task import CHANGED, files_of
+from exfit.features.programme.folder import load_summary
 from exfit.util.typed import plain
 
 NAMES = ("a", "b", "c", "d")

@@ -14,7 +14,7 @@ from tiers import few_of
 import exfit
 from exfit.case.peek import files_of
 from exfit.errors import CaseError, ExfitError
-from exfit.features.fleet.bundle import bundle_of, laid_out
+from exfit.features.fleet.remote import bundle_of, laid_out
 from exfit.models.exciters import first_order
 from exfit.results.io import result_text
 from exfit.util.files import ROOT

@@ -6,7 +6,7 @@ import pytest
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError
-from exfit.features.programme.case.programme import load_programme
+from exfit.features.programme.programme import load_programme
 
 MACHINE = {"Tpd0": 6.0, "Tppd0": 0.035, "Xd": 1.8, "Xpd": 0.3, "Xppd": 0.25, "Xl": 0.2}
 RECORD = {"file": "up.csv", "time": "t", "channels": {"vt": "vt"}}

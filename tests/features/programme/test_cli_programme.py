@@ -7,7 +7,7 @@ import pytest
 from programmes import OF_MACHINE, programme_content, written
 
 from exfit.features.programme import folder as programme_folder
-from exfit.features.programme.kept import load_summary
+from exfit.features.programme.folder import load_summary
 
 STEPS = ["saturation", "v-curve", OF_MACHINE, "fit"]
 OUT = ("--no-plots", "-o", "out")

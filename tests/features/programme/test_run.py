@@ -13,8 +13,9 @@ import exfit
 from exfit import workflows
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme import run as running
-from exfit.features.programme.case.programme import ProgrammeStep, load_programme
-from exfit.features.programme.kept import load_summary, result_kept, summary_text
+from exfit.features.programme.folder import load_summary, result_kept, summary_text
+from exfit.features.programme.programme import load_programme
+from exfit.features.programme.result import ProgrammeStep
 from exfit.results.verdict import NOT_CONVERGED
 from exfit.util.files import write
 

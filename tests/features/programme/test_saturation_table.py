@@ -3,9 +3,9 @@
 import numpy as np
 from rich.console import Console
 
-from exfit.features.programme.show import programme_figures
-from exfit.features.programme.show.programme_blocks import saturation
-from exfit.features.programme.steady.saturation import saturation_curve
+from exfit.features.programme import programme_figures
+from exfit.features.programme.programme_blocks import saturation
+from exfit.features.programme.saturation import saturation_curve
 from exfit.show import figures as plots
 from exfit.show import terminal
 

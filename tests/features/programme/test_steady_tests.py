@@ -3,8 +3,8 @@
 import pytest
 
 from exfit.case.checks.node import ContentNode
-from exfit.features.programme.case.programme_checks import steady_test_faults
-from exfit.features.programme.case.schema_at_rest import SteadyTest
+from exfit.features.programme.programme_checks import steady_test_faults
+from exfit.features.programme.programme_schema import SteadyTest
 
 COLUMNS = {
     "p": {"column": "MW", "unit": "MW", "base": 120.0},

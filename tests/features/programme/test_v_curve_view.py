@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from exfit.features.programme.show import programme_figures
-from exfit.features.programme.show.programme_blocks import v_curve as blocks_of
-from exfit.features.programme.steady.fields_on_load import (
+from exfit.features.programme import programme_figures
+from exfit.features.programme.programme_blocks import v_curve as blocks_of
+from exfit.features.programme.results_at_rest import VCurve
+from exfit.features.programme.v_curve import (
     FieldMeasurement,
     PointsOnLoad,
     field_on_load,
+    v_curve,
 )
-from exfit.features.programme.steady.v_curve import v_curve
-from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical

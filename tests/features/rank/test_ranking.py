@@ -10,8 +10,8 @@ from cases import FIRST_ORDER, TIME, TRUTH
 from rich.console import Console
 
 import exfit
-from exfit.features.rank.ranking import STRONG, Likelihood, _gap, ranked, ranking_sentences
-from exfit.features.rank.ranking_blocks import ranking as blocks_of
+from exfit.features.rank.ranking import STRONG, Likelihood, ranked, ranking_sentences
+from exfit.features.rank.ranking_output import ranking_blocks as blocks_of
 from exfit.results.comparisons import Overlay
 from exfit.results.verdict import NOT_CONVERGED, Verdict
 from exfit.show import terminal
@@ -112,7 +112,7 @@ def test_coloured_errors_count_as_the_few_that_they_are(result):
             overlay = Overlay(np.zeros(SAMPLES), errors - basis @ (basis.T @ errors))
             fits.append(Likelihood.of([replace(result.comparison, overlays={"vt": overlay})]))
         true, rival = fits
-        wrong += _gap(rival, true, 0) > STRONG
+        wrong += rival.gap(true, 0) > STRONG
         wrong_if_white += true.deviance(every) - rival.deviance(every) > STRONG
     # 5 % is what a test may do; counted as if they were white they do it in nearly half
     # of all

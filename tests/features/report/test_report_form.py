@@ -8,7 +8,7 @@ from records import TEST, TIME, case_of, config, one, synthetic
 
 import exfit
 from exfit import workflows
-from exfit.features.programme.show.programme_page import programme_page
+from exfit.features.programme.programme_page import programme_page
 from exfit.features.report.behaviour import usability
 from exfit.features.report.form import form, form_without_bumps, rated, signatures
 from exfit.features.report.matches import as_found

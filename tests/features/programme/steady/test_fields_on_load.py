@@ -7,7 +7,7 @@ import pytest
 from places import REFERENCE
 from scipy.optimize import brentq
 
-from exfit.features.programme.steady.fields_on_load import field_on_load
+from exfit.features.programme.v_curve import field_on_load
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 

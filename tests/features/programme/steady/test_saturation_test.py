@@ -5,14 +5,9 @@ import pytest
 
 from exfit.case.checks.node import ContentNode
 from exfit.errors import RecordError
-from exfit.features.programme.case.programme_checks import saturation_test_faults
-from exfit.features.programme.case.schema_at_rest import SaturationTest
-from exfit.features.programme.steady.tests_at_rest import (
-    channel_bases,
-    machine_values,
-    points_of,
-    saturation,
-)
+from exfit.features.programme.programme_checks import saturation_test_faults
+from exfit.features.programme.programme_schema import SaturationTest
+from exfit.features.programme.tests_at_rest import points_of, saturation
 from exfit.models.machines import MACHINES
 
 BASE, RATED = 850.0, 15.75  # A, kV
@@ -41,7 +36,7 @@ def file(tmp_path):
 def test_a_file_without_a_time_gives_the_machine_its_saturation_and_the_channels_their_bases(file):
     test = section(file=file.name, columns=COLUMNS)
     result = saturation(test, points_of(test, file.parent), MACHINES["GENROU"])
-    values, bases = machine_values(result), channel_bases(result)
+    values, bases = result.machine_values, result.channel_bases
     # of the file's six digits after the point
     assert values["S10"].value == pytest.approx(2.0 * 0.2**2, abs=1e-4)
     assert values["S12"].value == pytest.approx(2.0 * 0.4**2 / 1.2, abs=1e-4)
@@ -73,7 +68,7 @@ def test_a_brushless_unit_gives_the_machine_nothing(file):
     test = section(file=file.name, columns=COLUMNS, brushless=True, form="exponential-se")
     result = saturation(test, points_of(test, file.parent), MACHINES["GENROU"])
     assert result.form == "exponential-se"
-    assert (dict(machine_values(result)), dict(channel_bases(result))) == ({}, {})
+    assert (result.machine_values, result.channel_bases) == ({}, {})
 
 
 def test_a_unit_of_the_file_needs_a_base(tmp_path):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from exfit.errors import RecordError
-from exfit.features.programme.case.schema_at_rest import SteadyTest
-from exfit.features.programme.steady.fields_on_load import field_on_load
-from exfit.features.programme.steady.tests_at_rest import points_of, steady
+from exfit.features.programme.programme_schema import SteadyTest
+from exfit.features.programme.tests_at_rest import points_of, steady
+from exfit.features.programme.v_curve import field_on_load
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 

@@ -5,13 +5,14 @@ import pytest
 from tiers import few_of
 
 from exfit.errors import ModelError
-from exfit.features.programme.steady.fields_on_load import (
+from exfit.features.programme.v_curve import (
     FieldMeasurement,
     FieldsOnLoad,
     PointsOnLoad,
     field_on_load,
+    search_of,
+    v_curve,
 )
-from exfit.features.programme.steady.v_curve import v_curve
 from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
@@ -124,7 +125,7 @@ def test_what_is_fitted_to_points_that_do_not_match_has_no_interval():
 def test_values_lead_back_to_the_saliency_that_is_searched_in_place_of_xq():
     fields = FieldsOnLoad(SALIENT, points())
     problem = fields.problem(TRUTH, [free("Xq", 0.7, 0.3, 1.2)])
-    search = fields.search(problem)
+    search = search_of(problem)
     assert search.values(search.theta(problem.values(problem.theta(TRUTH))))["Xq"] == pytest.approx(
         TRUTH["Xq"]
     )

@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exfit.errors import ExfitError
-from exfit.features.programme.steady.saturation_forms import (
+from exfit.features.programme.results_at_rest import (
+    Array,
+    FittedCurve,
+    MeasuredValue,
+    SaturationForm,
+    SaturationResult,
+)
+from exfit.features.programme.saturation_forms import (
     AT_10,
     AT_12,
     BASE,
@@ -24,13 +31,6 @@ from exfit.features.programme.steady.saturation_forms import (
     CurvePoints,
     FormFit,
     fitted,
-)
-from exfit.features.programme.steady.saturation_result import (
-    Array,
-    FittedCurve,
-    MeasuredValue,
-    SaturationForm,
-    SaturationResult,
 )
 from exfit.inference.quantiles import student_quantile
 from exfit.inference.wording import listed
@@ -103,9 +103,9 @@ def saturation_curve(
         what = f"{len(points.vt)} points on two branches; at least {least} are needed"
         raise ExfitError(f"saturation: {what}")
     fits = sorted((fitted(name, points) for name in EXCESS), key=lambda fit: fit.rms)
-    curves = [curve_of(fit, refutes(fits[0], fit)) for fit in fits]
-    curves = [beside_others(curve, curves, float(points.vt.max())) for curve in curves]
-    resistance = hot_resistance(ifd, efd, winding)
+    curves = [_curve_of(fit, fits[0]) for fit in fits]
+    curves = [_beside_others(curve, curves, float(points.vt.max())) for curve in curves]
+    resistance = _hot_resistance(ifd, efd, winding)
     base = next(curve.ifd_base for curve in curves if curve.form == form)
     result = SaturationResult(
         form=form,
@@ -114,7 +114,7 @@ def saturation_curve(
         exciter=exciter,
         left_out=tuple(np.flatnonzero(dead).tolist()),
         residual=float(vt[dead].mean()) if dead.any() else None,
-        efd_base=None if resistance is None or exciter else product(base, resistance),
+        efd_base=None if resistance is None or exciter else _product(base, resistance),
         resistance=resistance,
         efd_unit=efd_unit,
         notes=(),
@@ -122,7 +122,7 @@ def saturation_curve(
         ifd=ifd,
         direction=direction,
     )
-    return replace(result, notes=tuple(notes(result))).as_judged()
+    return replace(result, notes=tuple(_notes(result))).as_judged()
 
 
 def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:
@@ -133,10 +133,10 @@ def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:
         raise ExfitError(f"saturation: {len(vt)} voltages, but {len(ifd)} field currents")
     if not (np.isfinite(vt).all() and np.isfinite(ifd).all()):
         raise ExfitError("saturation: a point is not a finite number")
-    if np.any(ifd < 0.0) or np.any(vt < 0.0):
-        k = int(np.flatnonzero((ifd < 0.0) | (vt < 0.0))[0])
+    for k in np.flatnonzero((ifd < 0.0) | (vt < 0.0))[:1]:
         raise ExfitError(f"saturation: point {k + 1}: vt {vt[k]:g}, ifd {ifd[k]:g}: below 0")
-    count = int(np.sum(ifd > WITHOUT_CURRENT * ifd.max())) if len(ifd) else 0
+    with_current = ifd > WITHOUT_CURRENT * ifd.max(initial=0.0)
+    count = int(np.sum(with_current))
     if count < FEWEST_POINTS:
         what = "points with field current"
         raise ExfitError(f"saturation: {count} {what}; at least {FEWEST_POINTS} are needed")
@@ -144,9 +144,7 @@ def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:
     if not low <= vt.max() <= high:
         text = f"the highest voltage is {vt.max():.4g} pu, outside {low:g} ... {high:g}"
         raise ExfitError(f"saturation: {text}: are unit and base of vt right?")
-    dead = (ifd > WITHOUT_CURRENT * ifd.max()) & (vt == 0.0)
-    if dead.any():
-        k = int(np.flatnonzero(dead)[0])
+    for k in np.flatnonzero(with_current & (vt == 0.0))[:1]:
         raise ExfitError(f"saturation: point {k + 1}: vt is 0 at ifd {ifd[k]:g}")
 
 
@@ -169,22 +167,15 @@ def directions(vt: Array) -> Array:
     return direction
 
 
-def refutes(best: FormFit, other: FormFit) -> bool:
-    """Find that one form fits so much better that the other is none of the curve's.
-
-    As for an interval: by more than its cost may rise.
-    """
-    variance = 2.0 * best.rise / float(best.x[BASE]) ** 2 / len(best.points.vt)
-    return bool(other.rms**2 - best.rms**2 > variance)
-
-
-def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
+def _curve_of(fit: FormFit, best: FormFit) -> FittedCurve:
     """Return a form's fit as a result: offsets and band are per unit."""
     values, per_unit = fit.values(), 1.0 / float(fit.x[BASE])
     grid = np.linspace(0.0, max(1.2, float(fit.points.vt.max())), SAMPLES_OF_CURVE)
-    mean, half = per_unit * fit.mean(grid), per_unit * fit.band(grid)
+    mean, half = per_unit * fit.mean(grid, fit.x), per_unit * fit.band(grid)
     line = grid + per_unit * float(fit.x[OFFSET]) - half[0]  # no saturation is below none
     loop = values[HALF_LOOP].times(2.0 * per_unit) if fit.points.branches > 1 else None
+    # as for an interval: a form is none of the curve's by more than the best one's cost may rise
+    variance = 2.0 * best.rise / float(best.x[BASE]) ** 2 / len(best.points.vt)
     return FittedCurve(
         form=fit.form,
         ifd_base=values[BASE],
@@ -193,7 +184,7 @@ def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
         offset=values[OFFSET].times(per_unit),
         hysteresis=loop,
         rms=fit.rms,
-        refuted=refuted,
+        refuted=bool(fit.rms**2 - best.rms**2 > variance),
         extrapolated=(),
         vt=grid,
         ifd=mean,
@@ -202,7 +193,9 @@ def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
     )
 
 
-def beside_others(curve: FittedCurve, curves: Sequence[FittedCurve], highest: float) -> FittedCurve:
+def _beside_others(
+    curve: FittedCurve, curves: Sequence[FittedCurve], highest: float
+) -> FittedCurve:
     """Return a curve that is no surer than the points are of their form, the best match first.
 
     The intervals of a form that the points refute hold what the best one has; those of the
@@ -223,17 +216,12 @@ def beside_others(curve: FittedCurve, curves: Sequence[FittedCurve], highest: fl
 def _widened(own: MeasuredValue, others: Sequence[MeasuredValue]) -> MeasuredValue:
     """Return a value whose interval holds the values of others."""
     low, high = own.interval
-    values = [other.value for other in others]
-    return replace(
-        own,
-        interval=(
-            None if low is None else min(low, *values, own.value),
-            None if high is None else max(high, *values, own.value),
-        ),
-    )
+    values = [own.value, *(other.value for other in others)]
+    low = None if low is None else min(low, *values)
+    return replace(own, interval=(low, None if high is None else max(high, *values)))
 
 
-def hot_resistance(ifd: Array, efd: Array | None, winding: FieldWinding) -> MeasuredValue | None:
+def _hot_resistance(ifd: Array, efd: Array | None, winding: FieldWinding) -> MeasuredValue | None:
     """Return the resistance of the hot field winding, given or as the slope of efd over ifd.
 
     The line need not pass through zero: brushes take a voltage of their own.
@@ -253,52 +241,51 @@ def hot_resistance(ifd: Array, efd: Array | None, winding: FieldWinding) -> Meas
     return MeasuredValue(slope, error, (slope - half, slope + half)).times(winding.rise)
 
 
-def product(base: MeasuredValue, resistance: MeasuredValue) -> MeasuredValue:
+def _product(base: MeasuredValue, resistance: MeasuredValue) -> MeasuredValue:
     """Return the field voltage of a field current, with the relative errors of both."""
-    ends = (_end_of_product(base, resistance, 0), _end_of_product(base, resistance, 1))
-    return MeasuredValue(base.value * resistance.value, None, ends, resistance.why)
+    value, ends = base.value * resistance.value, list[float | None]()
+    for sign, *sides in zip((-1.0, 1.0), base.interval, resistance.interval, strict=True):
+        pairs = zip(sides, (base, resistance), strict=True)
+        shares = [end / factor.value - 1.0 for end, factor in pairs if end is not None]
+        share = float(np.copysign(np.linalg.norm(shares), sign))
+        ends.append(value * (1.0 + share) if len(shares) == len(sides) else None)
+    return MeasuredValue(value, None, (ends[0], ends[1]), resistance.why)
 
 
-def _end_of_product(base: MeasuredValue, resistance: MeasuredValue, side: int) -> float | None:
-    ends = [(factor.interval[side], factor.value) for factor in (base, resistance)]
-    shares = [end / value - 1.0 for end, value in ends if end is not None]
-    if len(shares) < len(ends):
-        return None
-    share = float(np.copysign(np.linalg.norm(shares), side - 0.5))
-    return base.value * resistance.value * (1.0 + share)
-
-
-def notes(result: SaturationResult) -> Iterator[str]:
-    """Yield the sentences of a test."""
+def _notes(result: SaturationResult) -> Iterator[str]:
+    """Yield what limits the numbers of a test, in sentences."""
     if result.exciter:
         yield (
             "ifd is the field current of a brushless exciter: the curve is that of exciter and "
             "machine together, and gives the machine neither S10 and S12 nor a base of ifd"
         )
-    yield from _of_hysteresis(result)
-    yield from _of_line(result)
-    yield from _of_range(result.curve, result.highest)
-    yield from _of_forms(result)
-    yield from _of_point(result)
-
-
-def _of_hysteresis(result: SaturationResult) -> Iterator[str]:
-    if result.curve.hysteresis is None:
+    used, best = result.curve, result.curves[0]
+    vt = np.delete(result.vt, result.left_out)
+    if used.hysteresis is None:
         going = "rising" if np.delete(result.direction, result.left_out)[0] > 0.0 else "falling"
         yield (
             f"hysteresis cannot be seen: all points were taken with {going} voltage; the numbers "
             "are those of this branch, moved through zero"
         )
-
-
-def _of_line(result: SaturationResult) -> Iterator[str]:
-    vt = np.delete(result.vt, result.left_out)
     low = int(np.sum(vt < AIR_GAP_END))
     if low < FEWEST_LOW_POINTS:
         yield (
             f"{low or 'no'} point{'' if low == 1 else 's'} below {AIR_GAP_END:g} pu (the lowest is "
             f"{vt.min():.3g} pu): the air-gap line depends on the form of the curve"
         )
+    yield from _of_range(used, result.highest)
+    others = [curve.form for curve in result.curves if curve is not used and not curve.refuted]
+    if used.refuted:
+        yield (
+            f"the points are not on a curve of form {used.form} (rms {used.rms:.2g} pu); "
+            f"{best.form} (rms {best.rms:.2g} pu) has S(1.0) {best.S10.value:.3g}, S(1.2) "
+            f"{best.S12.value:.3g} and a base of {best.ifd_base.value:.4g} {result.unit}, which "
+            "the intervals hold"
+        )
+    elif others:
+        yield f"the points do not distinguish {used.form} from {listed(others)}"
+    if len(vt) >= FEWEST_POINTS_FOR_OUTLIER:
+        yield from _outlier(result)
 
 
 def _of_range(curve: FittedCurve, highest: float) -> Iterator[str]:
@@ -315,26 +302,8 @@ def _of_range(curve: FittedCurve, highest: float) -> Iterator[str]:
         yield "the air-gap line is not determined by the points"
 
 
-def _of_forms(result: SaturationResult) -> Iterator[str]:
-    used, best = result.curve, result.curves[0]
-    if used.refuted:
-        yield (
-            f"the points are not on a curve of form {used.form} (rms {used.rms:.2g} pu); "
-            f"{best.form} (rms {best.rms:.2g} pu) has S(1.0) {best.S10.value:.3g}, S(1.2) "
-            f"{best.S12.value:.3g} and a base of {best.ifd_base.value:.4g} {result.unit}, which "
-            "the intervals hold"
-        )
-        return
-    others = [curve.form for curve in result.curves if curve is not used and not curve.refuted]
-    if others:
-        yield f"the points do not distinguish {used.form} from {listed(others)}"
-
-
-def _of_point(result: SaturationResult) -> Iterator[str]:
+def _outlier(result: SaturationResult) -> Iterator[str]:
     residuals = result.residuals
-    count = int(np.sum(np.isfinite(residuals)))
-    if count < FEWEST_POINTS_FOR_OUTLIER:
-        return
     farthest = int(np.nanargmax(np.abs(residuals)))
     if abs(residuals[farthest]) > FAR_FROM_CURVE * result.curve.rms:
         yield (

@@ -1,9 +1,9 @@
 """A fit of points: few residuals, whose functions are cheap, so that every interval is profiled."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import hypot, isfinite
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,11 @@ class PointProblem:
     following: Callable[[dict[str, float]], dict[str, float]] = dict
     leading: Callable[[Values], Values] = dict
 
+    @property
+    def start(self) -> dict[str, float]:
+        """All values at the start."""
+        return {**self.given, **{each.name: each.start for each in self.free}}
+
     def values(self, theta: Array) -> dict[str, float]:
         """Return all values at scaled parameters (N,)."""
         pairs = zip(self.free, theta, strict=True)
@@ -75,14 +80,11 @@ class PointProblem:
         columns = []
         for k, x in enumerate(theta):
             ends = np.clip([x - DIFFERENCE, x + DIFFERENCE], low[k], high[k])
-            below, above = (self.residuals(self._moved(theta, k, end)) for end in ends)
+            moved = np.tile(theta, (2, 1))
+            moved[:, k] = ends
+            below, above = map(self.residuals, moved)
             columns.append((above - below) / (ends[1] - ends[0]))
         return np.stack(columns, axis=1)
-
-    def _moved(self, theta: Array, index: int, x: float) -> Array:
-        moved = theta.copy()
-        moved[index] = x
-        return moved
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -90,6 +92,33 @@ class PointProblem:
         limits = [(each.scaled(each.low), each.scaled(each.high)) for each in self.free]
         low, high = np.array(limits).T
         return low, high
+
+    def linearisation(self, values: Values) -> Linearisation:
+        """Return the errors and their derivatives at some values."""
+        free, theta, errors = self.free, self.theta(values), self.errors(values)
+        return Linearisation(
+            names=tuple(each.name for each in free),
+            units=("",) * len(free),
+            values=np.array([values[each.name] for each in free]),
+            logarithmic=np.array([each.logarithmic for each in free]),
+            width=np.array([each.width for each in free]),
+            held=tuple(each.bound(values[each.name]) for each in free),
+            errors=errors,
+            jacobian=self.jacobian(theta)[: len(errors)] / self.slopes(theta),
+            influence=errors,
+            curvature=np.ones(len(errors)),
+            channels=self.blocks,
+            priors=tuple(
+                PriorRow(k, self.priors[each.name].mean, self.priors[each.name].std, 1.0)
+                for k, each in enumerate(free)
+                if each.name in self.priors
+            ),
+            through_zero=tuple(each.low < 0.0 < each.high for each in free),
+        )
+
+    def slopes(self, theta: Array) -> Array:
+        """Return the derivatives of the free values (N,) by their scaled parameters."""
+        return np.array([each.slope(float(x)) for each, x in zip(self.free, theta, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +137,6 @@ class FittedPoints:
     def scatter(self, signal: str) -> float:
         """Return the standard deviation of a signal's weighted errors, less what was fitted."""
         return next(noise.estimated for noise in self.confidence.noise if noise.label == signal)
-
-    def explained(self, name: str, why: str) -> Self:
-        """Return the same fit with another reason for an interval that is open."""
-        parameters = self.confidence.parameters
-        parameters = {**parameters, name: replace(parameters[name], why=why)}
-        return replace(self, confidence=replace(self.confidence, parameters=parameters))
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -146,7 +169,7 @@ def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:
     for _ in range(MOST_DESCENTS):
         result = descended(search, theta)
         values = search.values(result.x)
-        linear = linearisation(problem, values)
+        linear = problem.linearisation(values)
         intervals = confidence(linear, data="the points", hint="")
         profiles = profiled(problem, search, values, linear, intervals) if result.success else {}
         lower = [each for each in profiles.values() if each.profile.moved]
@@ -157,6 +180,19 @@ def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:
     known = {name: by_profile(intervals.parameters[name], each) for name, each in profiles.items()}
     intervals = replace(intervals, parameters={**intervals.parameters, **known})
     return FittedPoints(values, result, intervals, identifiability(linear, intervals))
+
+
+def descended(problem: PointProblem, theta: Array) -> estimate.Result:
+    """Return the minimum to which a descent leads from scaled parameters (N,)."""
+    return estimate.least_squares(
+        problem.residuals,
+        theta,
+        problem.jacobian,
+        problem.bounds,
+        STRATEGY,
+        x_scale=units_of(problem.free),
+        jacobian_error=DIFFERENCE_ERROR,
+    )
 
 
 class PointProfile(NamedTuple):
@@ -182,13 +218,13 @@ def profiled(
     of_search = {each.name for each in search.free}
     profiles: dict[str, PointProfile] = {}
     for form, names in ((search, limits.keys() & of_search), (problem, limits.keys() - of_search)):
-        index_of = {each.name: k for k, each in enumerate(form.free) if each.name in names}
-        if not index_of:
+        rise_of = {k: limits[each.name] for k, each in enumerate(form.free) if each.name in names}
+        if not rise_of:
             continue
         made = estimate.profiles(
             estimate.OneByOne(form.residuals, form.jacobian),
             form.theta(values),
-            {index: limits[name] for name, index in index_of.items()},
+            rise_of,
             form.bounds,
             points=POINTS_OF_PROFILE,
             workers=1,
@@ -198,64 +234,22 @@ def profiled(
     return profiles
 
 
-def descended(problem: PointProblem, theta: Array) -> estimate.Result:
-    """Return the minimum to which a descent leads from scaled parameters (N,)."""
-    return estimate.least_squares(
-        problem.residuals,
-        theta,
-        problem.jacobian,
-        problem.bounds,
-        STRATEGY,
-        x_scale=units_of(problem.free),
-        jacobian_error=DIFFERENCE_ERROR,
-    )
-
-
-def linearisation(problem: PointProblem, values: Values) -> Linearisation:
-    """Return the errors of a fit of points and their derivatives at some values."""
-    free, theta = problem.free, problem.theta(values)
-    errors = problem.errors(values)
-    slopes = np.array([each.slope(float(x)) for each, x in zip(free, theta, strict=True)])
-    return Linearisation(
-        names=tuple(each.name for each in free),
-        units=("",) * len(free),
-        values=np.array([values[each.name] for each in free]),
-        logarithmic=np.array([each.logarithmic for each in free]),
-        width=np.array([each.width for each in free]),
-        held=tuple(each.bound(values[each.name]) for each in free),
-        errors=errors,
-        jacobian=problem.jacobian(theta)[: len(errors)] / slopes,
-        influence=errors,
-        curvature=np.ones(len(errors)),
-        channels=problem.blocks,
-        priors=tuple(
-            PriorRow(k, problem.priors[each.name].mean, problem.priors[each.name].std, 1.0)
-            for k, each in enumerate(free)
-            if each.name in problem.priors
-        ),
-        through_zero=tuple(each.low < 0.0 < each.high for each in free),
-    )
-
-
 def by_profile(known: Uncertainty, made: PointProfile) -> Uncertainty:
-    """Read the interval of a parameter from its profile."""
+    """Read the interval of a parameter from its profile, and the reason for each open side."""
     profile = made.profile
     parameter = made.problem.free[profile.index]
-    limits = [None if end is None else parameter.value(end) for end in (profile.low, profile.high)]
-    interval = None if limits == [None, None] else (limits[0], limits[1])
-    why = " and ".join(open_sides(parameter, profile))
-    return replace(known, interval=interval, why=why or None, method="profile")
-
-
-def open_sides(parameter: FreeParameter, profile: estimate.CostProfile) -> Iterator[str]:
-    """Yield the reasons why a profile has no limit on a side."""
+    low, high = (
+        None if end is None else parameter.value(end) for end in (profile.low, profile.high)
+    )
     bounds = (f"its min {parameter.low:.4g}", f"its max {parameter.high:.4g}")
-    limits = (profile.low, profile.high)
-    for side, limit, end, bound in zip(
-        ("lower", "upper"), limits, profile.ends, bounds, strict=True
-    ):
-        if limit is None:
-            yield f"has no {side} limit: {ENDS.get(end, f'the points do not exclude {bound}')}"
+    sides = zip(("lower", "upper"), (low, high), profile.ends, bounds, strict=True)
+    why = " and ".join(
+        f"has no {side} limit: {ENDS.get(end, f'the points do not exclude {bound}')}"
+        for side, limit, end, bound in sides
+        if limit is None
+    )
+    interval = None if low is None and high is None else (low, high)
+    return replace(known, interval=interval, why=why or None, method="profile")
 
 
 def allowing_for_errors(
@@ -266,19 +260,23 @@ def allowing_for_errors(
     As `intervals.value_errors.allowing_for`; derivatives by the values are central differences.
     What is free, no value of the problem, or without effect on the points is left out.
     """
-    free = {parameter.name for parameter in problem.free}
-    given = {*problem.given} - free
-    moved = {
-        name: _change(problem, fit.values, name, std_error)
-        for name, std_error in std_errors.items()
-        if name in given
-    }
-    errors = {name: change for name, change in moved.items() if change.any()}
+    at_fit, errors = problem.errors(fit.values), dict[str, Array]()
+    given = problem.given.keys() - {parameter.name for parameter in problem.free}
+    for name, std_error in std_errors.items():
+        if name not in given:
+            continue
+        change, sides = np.zeros_like(at_fit), 0
+        for step in (-STEP, STEP):
+            value = fit.values[name] + step * std_error
+            moved = problem.errors({**fit.values, name: value})
+            if np.isfinite(moved).all():  # else the data contradict each other on this side
+                change, sides = change + (moved - at_fit) / step, sides + 1
+        if change.any():
+            errors[name] = change / max(sides, 1)
     if not errors:
         return fit
-    linear, theta = linearisation(problem, fit.values), problem.theta(fit.values)
-    slopes = [parameter.slope(float(x)) for parameter, x in zip(problem.free, theta, strict=True)]
-    own = problem.jacobian(theta) / slopes
+    linear, theta = problem.linearisation(fit.values), problem.theta(fit.values)
+    own = problem.jacobian(theta) / problem.slopes(theta)
     of_values = np.zeros((len(own), len(errors)))
     of_values[: len(linear.errors)] = np.stack([*errors.values()], axis=1)
     shifts = first_order_shifts(own, of_values, linear.free, bounds_hold=False)
@@ -292,15 +290,3 @@ def allowing_for_errors(
     }
     confidence = replace(fit.confidence, parameters=parameters)
     return replace(fit, confidence=confidence, allowed_for=tuple(errors))
-
-
-def _change(
-    problem: PointProblem, values: Mapping[str, float], name: str, std_error: float
-) -> Array:
-    """Change of the errors of the points (M,) by one standard error of a value."""
-    change, sides = np.zeros_like(problem.errors(values)), 0
-    for step in (-STEP, STEP):
-        moved = problem.errors({**values, name: values[name] + step * std_error})
-        if np.isfinite(moved).all():  # else the data contradict each other on this side
-            change, sides = change + (moved - problem.errors(values)) / step, sides + 1
-    return change / max(sides, 1)

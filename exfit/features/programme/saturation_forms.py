@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.estimate import OneByOne, ProfileEnd, half_square, least_squares, profiles
-from exfit.features.programme.steady.saturation_result import Array, MeasuredValue, SaturationForm
+from exfit.features.programme.results_at_rest import Array, MeasuredValue, SaturationForm
 from exfit.inference.confidence import LEVEL, Interval
 from exfit.inference.quantiles import student_quantile
 from exfit.models.blocks import exponential_se
@@ -77,7 +77,7 @@ class FormFit:
 
     def errors(self, x: Array) -> Array:
         """Return the weighted errors (M,) of the points."""
-        simulated = self._mean(self.points.vt, x) + self._loop @ x[HALF_LOOP:]
+        simulated = self.mean(self.points.vt, x) + self._loop @ x[HALF_LOOP:]
         return np.asarray(self.weight * (simulated - self.points.ifd))
 
     def residuals(self, x: Array) -> Array:
@@ -93,31 +93,22 @@ class FormFit:
     def slopes_of_mean(self, vt: Array, x: Array) -> Array:
         """Return the derivatives (K, 4) of the mean curve by base, S10, S12 and offset."""
         step = min(DIFFERENCE, 1e-3 * x[AT_10], 1e-3 * (x[AT_12] - x[AT_10]))
-        columns = [self.unsaturated_and_excess(vt, x)]
+        columns = [self._without_offset(vt, x)]
         for index in (AT_10, AT_12):
             above, below = x.copy(), x.copy()
             above[index] += step
             below[index] -= step
-            columns.append((self._mean(vt, above) - self._mean(vt, below)) / (2.0 * step))
+            columns.append((self.mean(vt, above) - self.mean(vt, below)) / (2.0 * step))
         return np.column_stack([*columns, np.ones_like(vt)])
 
-    def unsaturated_and_excess(self, vt: Array, x: Array) -> Array:
+    def _without_offset(self, vt: Array, x: Array) -> Array:
         """Return the field current (K,) in pu that a voltage needs: the line and what is above."""
         with np.errstate(all="ignore"):
             return vt + EXCESS[self.form](vt, np.float64(x[AT_10]), np.float64(x[AT_12]))
 
-    def mean(self, vt: Array) -> Array:
+    def mean(self, vt: Array, x: Array) -> Array:
         """Return the mean of the branches (K,) in the unit of the points."""
-        return self._mean(vt, self.x)
-
-    def steepness(self) -> Array:
-        """Return the slope of the curve at the points (M,), in units of the air-gap line's."""
-        vt = self.points.vt
-        rise = self._mean(vt + DIFFERENCE, self.x) - self._mean(vt - DIFFERENCE, self.x)
-        return np.asarray(rise / (2.0 * DIFFERENCE * self.x[BASE]))
-
-    def _mean(self, vt: Array, x: Array) -> Array:
-        return np.asarray(x[BASE] * self.unsaturated_and_excess(vt, x) + x[OFFSET])
+        return np.asarray(x[BASE] * self._without_offset(vt, x) + x[OFFSET])
 
     @cached_property
     def _loop(self) -> Array:
@@ -247,15 +238,13 @@ def fitted(form: SaturationForm, points: CurvePoints) -> FormFit:
     """Return a form at its best match to points, more than the parameters that it has."""
     fit = at_minimum(start_of(form, points))
     for _ in range(REWEIGHTED):
-        fit = at_minimum(weighted(fit))
+        base = float(fit.x[BASE])
+        above, below = (fit.mean(points.vt + step, fit.x) for step in (DIFFERENCE, -DIFFERENCE))
+        slope = (above - below) / (2.0 * DIFFERENCE * fit.x[BASE])  # in those of the air-gap line
+        weight = np.sqrt(2.0 / (1.0 + slope**2))
+        prior = float(np.sqrt(fit.variance)) / (REMANENCE * base)
+        fit = at_minimum(replace(fit, weight=weight, prior=prior))
     return fit
-
-
-def weighted(fit: FormFit) -> FormFit:
-    """Return the fit with the weights that its slopes and its errors give."""
-    remanence = REMANENCE * float(fit.x[BASE])
-    weight = np.sqrt(2.0 / (1.0 + fit.steepness() ** 2))
-    return replace(fit, weight=weight, prior=float(np.sqrt(fit.variance)) / remanence)
 
 
 def at_minimum(fit: FormFit) -> FormFit:

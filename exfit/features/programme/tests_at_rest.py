@@ -1,6 +1,7 @@
 """Tests at rest: their points, given in the programme or in a file, and what they measure."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -10,33 +11,70 @@ from numpy.typing import NDArray
 
 from exfit.case.schema import Unknown
 from exfit.errors import CaseError, RecordError
-from exfit.features.programme.case.schema_at_rest import (
+from exfit.features.programme.programme_schema import (
     CURVE_SIGNALS,
     POINT_SIGNALS,
     PointColumn,
     SaturationTest,
     SteadyTest,
 )
-from exfit.features.programme.steady.fields_on_load import (
+from exfit.features.programme.results_at_rest import SaturationResult, VCurve
+from exfit.features.programme.saturation import FieldWinding, saturation_curve
+from exfit.features.programme.v_curve import (
     FieldMeasurement,
     PointsOnLoad,
     base_of,
     field_on_load,
+    v_curve,
 )
-from exfit.features.programme.steady.points import Points, given_points, read_points
-from exfit.features.programme.steady.saturation import FieldWinding, saturation_curve
-from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
-from exfit.features.programme.steady.v_curve import v_curve
-from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
-from exfit.records.units import needs_base
+from exfit.records.formats import open_table
+from exfit.records.formats.table import column_error
+from exfit.records.units import alike, needs_base
 from exfit.signals import FIELDS, TERMINALS
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 FARTHEST_BASE = 4.0  # times the base that fits best at the start: as far as one without bounds goes
+DEFAULT_UNITS = MappingProxyType({"vt": "pu", "ifd": "A", "efd": "V"})  # of a saturation test
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Columns (M,) of points by signal, in the units that they were read in.
+
+    ``units`` are those that the source itself gives.
+    """
+
+    columns: Mapping[str, Array]
+    units: Mapping[str, str]
+    source: Path
+
+
+def points_of(test: SaturationTest | SteadyTest, folder: Path) -> Points:
+    """Return the points of a test, by signal; its file, of any kind of a record, is in a folder.
+
+    Raises RecordError for a file that cannot be read, a column that is missing or in another unit,
+    or a cell that is no number.
+    """
+    if test.file is None:
+        signals = CURVE_SIGNALS if isinstance(test, SaturationTest) else POINT_SIGNALS
+        rows = np.array(test.points or ()).T
+        return Points(dict(zip(signals, rows, strict=False)), {}, Path(test.name))
+    names = {signal: column.column or signal for signal, column in test.columns.items()}
+    table = open_table(folder / test.file, test.sheet)
+    numbers, units = table.numbers(dict.fromkeys(names.values())), dict[str, str]()
+    for signal, column in test.columns.items():
+        in_file = table.units.get(names[signal])
+        if in_file is not None:
+            units[signal] = in_file
+            if column.unit is not None and not alike(in_file, column.unit):
+                text = f"in {in_file} as the file says, not in {column.unit}"
+                raise column_error(table.path, names[signal], text)
+    columns = {signal: numbers[name] for signal, name in names.items()}
+    return Points(columns, units, folder / test.file)
 
 
 def steady(
@@ -52,13 +90,13 @@ def steady(
     of some of them and of bases, for which the intervals allow. Raises ExfitError for input that
     cannot be used.
     """
-    columns = {signal: column_of(test, points, signal) for signal in points.columns}
+    columns = {signal: _column_of(test, points, signal) for signal in points.columns}
     numbers = {signal: points.columns[signal] * columns[signal].scale for signal in columns}
-    p, q, vt = (numbers[signal] / given_base(columns[signal]) for signal in TERMINALS)
+    p, q, vt = (numbers[signal] / _given_base(columns[signal]) for signal in TERMINALS)
     start = {**data, **{symbol: free.start for symbol, free in test.free.items()}}
     ifd = field_on_load(machine, start, p, q, vt)
     measurements = {
-        signal: measurement_of(signal, columns[signal], numbers[signal], ifd)
+        signal: _measurement(signal, columns[signal], numbers[signal], ifd)
         for signal in FIELDS
         if signal in numbers
     }
@@ -68,12 +106,7 @@ def steady(
     return v_curve(machine, data, PointsOnLoad(p, q, vt, measurements), free, limit, std_errors)
 
 
-def given_base(column: PointColumn) -> float:
-    """Read the base of a column, 1 where it is not given as a number."""
-    return column.base if isinstance(column.base, float) else 1.0
-
-
-def column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
+def _column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
     """Complete the conversion of a signal to per unit; raises RecordError for an unknown one."""
     column = test.columns.get(signal) or PointColumn()
     unit = column.unit or points.units.get(signal) or "pu"
@@ -82,16 +115,18 @@ def column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
     return column.model_copy(update={"unit": unit})
 
 
-def measurement_of(
-    signal: str, column: PointColumn, measured: Array, ifd: Array
-) -> FieldMeasurement:
+def _given_base(column: PointColumn) -> float:
+    return column.base if isinstance(column.base, float) else 1.0
+
+
+def _measurement(signal: str, column: PointColumn, measured: Array, ifd: Array) -> FieldMeasurement:
     """Return the readings of a field signal (M,), of which the model has ``ifd`` (M,) at the start.
 
     A base that is found starts from its own start or, with ``auto``, from the one that fits best.
     """
     unit, base = column.unit or "pu", column.base
     if not isinstance(base, Unknown):
-        return FieldMeasurement(measured, unit, given_base(column), column.noise)
+        return FieldMeasurement(measured, unit, _given_base(column), column.noise)
     start = float(ifd @ measured / (ifd @ ifd)) if base.start == "auto" else base.start
     if not (isfinite(start) and start > 0.0):
         raise CaseError([f"columns.{signal}.base: {start:g} {unit} fits best, which is no base"])
@@ -101,18 +136,18 @@ def measurement_of(
     return FieldMeasurement(measured, unit, free.start, column.noise, free)
 
 
-DEFAULT_UNITS = MappingProxyType({"vt": "pu", **dict(zip(FIELDS, ("A", "V"), strict=True))})
-
-
 def saturation(test: SaturationTest, points: Points, machine: Machine | None) -> SaturationResult:
     """Evaluate a saturation test of a machine, whose model decides which form is used.
 
     Raises ExfitError for input that cannot be used.
     """
-    units = {signal: _unit(test, points, signal) for signal in CURVE_SIGNALS}
+    given = {signal: column.unit for signal, column in test.columns.items()}
+    units = {
+        signal: given.get(signal) or points.units.get(signal) or default
+        for signal, default in DEFAULT_UNITS.items()
+    }
     vt = points.columns["vt"]
-    section = test.columns.get("vt")
-    base = None if section is None else section.base
+    base = test.columns["vt"].base if "vt" in test.columns else None
     if base is None and needs_base(units["vt"]):
         text = f"columns.vt.base: is missing: what is 1 pu in {units['vt']}, the unit of the file?"
         raise RecordError(f"{points.source}: {text}")
@@ -126,49 +161,4 @@ def saturation(test: SaturationTest, points: Points, machine: Machine | None) ->
         efd_unit=units["efd"],
         winding=FieldWinding(winding.resistance, winding.temperature, winding.hot),
         exciter=test.brushless,
-    )
-
-
-def machine_values(result: SaturationResult) -> Mapping[str, MeasuredValue]:
-    """Select S10 and S12 for the machine's section; nothing of a brushless unit.
-
-    They enter it with ``sources: measured``.
-    """
-    if result.exciter:
-        return {}
-    return {"S10": result.curve.S10, "S12": result.curve.S12}
-
-
-def channel_bases(result: SaturationResult) -> Mapping[str, tuple[MeasuredValue, str]]:
-    """Collect the bases of ifd and, where it is known, of efd, each with its unit.
-
-    It is the base of channels of later records that are in that unit and give none.
-    """
-    if result.exciter:
-        return {}
-    bases = {"ifd": (result.curve.ifd_base, result.unit)}
-    if result.efd_base is not None:
-        bases["efd"] = (result.efd_base, result.efd_unit)
-    return bases
-
-
-def _unit(test: SaturationTest, points: Points, signal: str) -> str:
-    section = test.columns.get(signal)
-    given = None if section is None else section.unit
-    return given or points.units.get(signal) or DEFAULT_UNITS[signal]
-
-
-def points_of(test: SaturationTest | SteadyTest, folder: Path) -> Points:
-    """Return the points of a test, by signal; its file lies in a folder. Raises RecordError."""
-    if test.file is None:
-        signals = CURVE_SIGNALS if isinstance(test, SaturationTest) else POINT_SIGNALS
-        return given_points(test.points or (), signals, Path(test.name))
-    names = {signal: column.column or signal for signal, column in test.columns.items()}
-    units = {names[signal]: column.unit for signal, column in test.columns.items()}
-    read = read_points(folder / test.file, units, test.sheet)
-    return Points(
-        {signal: read.columns[name] for signal, name in names.items()},
-        {signal: read.units[name] for signal, name in names.items() if name in read.units},
-        read.source,
-        read.sha256,
     )

@@ -1,17 +1,24 @@
-"""The sections of a programme about tests at rest: points that were read from instruments."""
+"""The sections of a programme: all tests of a unit, of which each feeds the later ones."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, WrapSerializer
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    WrapSerializer,
+)
 
+from exfit.case.schema import CaseDocument, FreeSection, Recording
 from exfit.case.schema.estimate import Limit
 from exfit.case.schema.plants import SaturationName
 from exfit.case.schema.values import (
     FILE_NAME,
     Findable,
-    FreeSection,
     Frozen,
     Number,
     Positive,
@@ -23,25 +30,39 @@ from exfit.case.schema.values import (
 from exfit.signals import FIELDS, TERMINALS
 from exfit.util.file_names import LONGEST_NAME
 
+SATURATION: Final = "saturation"
+STEADY: Final = "steady"
+REJECTION: Final = "rejection"
+BUMP: Final = "bump"
+ORDER = (SATURATION, STEADY, REJECTION, BUMP)  # what measures the machine before what needs it
+
 MOST_POINTS = 1000  # of a list; a longer one is a file
 POINT_SIGNALS = (*TERMINALS, *FIELDS)
+CURVE_SIGNALS = ("vt", *FIELDS)
 
 if TYPE_CHECKING:
     PointSignal = str
+    CurveSignal = str
 else:
     PointSignal = Literal[POINT_SIGNALS]
+    CurveSignal = Literal[CURVE_SIGNALS]
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+Columns = Annotated[Mapping[Key, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
 
 
-def _column(value: Any) -> Any:
-    return {"column": value} if isinstance(value, str) else value
-
-
-class PointColumn(Section):
-    """A column of points and its conversion to per unit: column / base * scale."""
+class Column(Section):
+    """A column of points."""
 
     column: Text | None = Field(
         default=None, description="Name of the column; none with points in place of a file."
     )
+
+
+class PointColumn(Column):
+    """A column of points and its conversion to per unit: column / base * scale."""
+
     unit: Text | None = Field(
         default=None,
         description="Unit of the column, such as MW, Mvar, kV, A, V, pu or %; default: that of the "
@@ -61,10 +82,37 @@ class PointColumn(Section):
     )
 
 
-class SteadyTest(Section):
-    """Points of the V-curves: field current, or voltage, of the machine at rest on load."""
+class CurveColumn(Column):
+    """A column of the points of a saturation curve."""
 
-    kind: Literal["steady"] = Field(description="Kind of test.")
+    unit: Text | None = Field(
+        default=None,
+        description="Unit of the column, such as kV, A, V; default: that of the file, else pu for "
+        "vt, A for ifd, V for efd.",
+    )
+    base: Positive | None = Field(
+        default=None,
+        description="Value of 1 pu of vt in that unit, the rated voltage; ifd and efd have none: "
+        "the test measures it.",
+    )
+
+
+def _named(value: Any) -> Any:
+    return {"column": value} if isinstance(value, str) else value
+
+
+GivenPointColumn = Annotated[
+    PointColumn, BeforeValidator(_named, json_schema_input_type=Text | PointColumn)
+]
+GivenCurveColumn = Annotated[
+    CurveColumn, BeforeValidator(_named, json_schema_input_type=Text | CurveColumn)
+]
+
+
+class AtRest(Section):
+    """A test at rest: points that were read from instruments."""
+
+    kind: str = Field(description="Kind of test.")
     name: str = Field(
         pattern=FILE_NAME,
         max_length=LONGEST_NAME,
@@ -76,6 +124,12 @@ class SteadyTest(Section):
     sheet: Text | None = Field(
         default=None, description="Sheet of a workbook; default: the only one with a table."
     )
+
+
+class SteadyTest(AtRest):
+    """Points of the V-curves: field current, or voltage, of the machine at rest on load."""
+
+    kind: Literal["steady"] = Field(description="Kind of test.")
     points: (
         Annotated[tuple[tuple[Number, ...], ...], Field(min_length=1, max_length=MOST_POINTS)]
         | None
@@ -83,16 +137,7 @@ class SteadyTest(Section):
         default=None,
         description="In place of a file: [p, q, vt, ifd] or [p, q, vt, ifd, efd] of each point.",
     )
-    columns: Annotated[
-        Mapping[
-            PointSignal,
-            Annotated[
-                PointColumn, BeforeValidator(_column, json_schema_input_type=Text | PointColumn)
-            ],
-        ],
-        AfterValidator(MappingProxyType),
-        WrapSerializer(thawed),
-    ] = Field(
+    columns: Columns[PointSignal, GivenPointColumn] = Field(
         default_factory=nothing,
         description="Columns of p, q, vt and of ifd, efd or both: a name, or a mapping. p and q "
         "are positive where the machine gives power and is overexcited.",
@@ -106,32 +151,6 @@ class SteadyTest(Section):
         default=None,
         description="Limit of the rms difference of each field signal, pu; beyond it the points "
         "are not matched. Default: 2 % of its rms, or 3 times its noise where that is larger.",
-    )
-
-
-CURVE_SIGNALS = ("vt", *FIELDS)
-
-if TYPE_CHECKING:
-    CurveSignal = str
-else:
-    CurveSignal = Literal[CURVE_SIGNALS]
-
-
-class CurveColumn(Section):
-    """A column of the points of a saturation curve."""
-
-    column: Text | None = Field(
-        default=None, description="Name of the column; none with points in place of a file."
-    )
-    unit: Text | None = Field(
-        default=None,
-        description="Unit of the column, such as kV, A, V; default: that of the file, else pu for "
-        "vt, A for ifd, V for efd.",
-    )
-    base: Positive | None = Field(
-        default=None,
-        description="Value of 1 pu of vt in that unit, the rated voltage; ifd and efd have none: "
-        "the test measures it.",
     )
 
 
@@ -153,38 +172,21 @@ class FieldWindingSection(Section):
     )
 
 
-class SaturationTest(Section):
+class SaturationTest(AtRest):
     """The open-circuit saturation curve: terminal voltage over field current at rated speed."""
 
     kind: Literal["saturation"] = Field(description="Kind of test.")
-    name: str = Field(
-        pattern=FILE_NAME,
-        max_length=LONGEST_NAME,
-        description="Name of letters, digits, - _ and .; files are named after it.",
-    )
     file: Text | None = Field(
         default=None,
         description="File of the points, in any format of a record, in the order in which they "
         "were taken.",
-    )
-    sheet: Text | None = Field(
-        default=None, description="Sheet of a workbook; default: the only one with a table."
     )
     points: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MOST_POINTS)] | None = Field(
         default=None,
         description="In place of a file: [vt, ifd] or [vt, ifd, efd] of each point, in the order "
         "in which they were taken.",
     )
-    columns: Annotated[
-        Mapping[
-            CurveSignal,
-            Annotated[
-                CurveColumn, BeforeValidator(_column, json_schema_input_type=Text | CurveColumn)
-            ],
-        ],
-        AfterValidator(MappingProxyType),
-        WrapSerializer(thawed),
-    ] = Field(
+    columns: Columns[CurveSignal, GivenCurveColumn] = Field(
         default_factory=nothing,
         description="Columns of vt, ifd and, where it was measured, efd: a name, or a mapping.",
     )
@@ -202,3 +204,56 @@ class SaturationTest(Section):
         default_factory=FieldWindingSection,
         description="Resistance and temperature of the field winding, for the base of efd.",
     )
+
+
+class RecordedBump(Recording):
+    """A bump test of a programme; all that are fitted are fitted together, as records are."""
+
+    kind: Literal["bump"] = Field(default=BUMP, description="Kind of test.")
+    use: Literal["fit", "validate"] = Field(
+        default="fit",
+        description="Whether it is fitted, or the result of the others is validated on it.",
+    )
+
+
+class RecordedRejection(Recording):
+    """A test of a programme that determines data of the machine before the bump tests."""
+
+    kind: Literal["rejection"] = Field(description="Kind of test.")
+    free: Annotated[Frozen[FreeSection], Field(min_length=1)] = Field(
+        description="Machine data that it is fitted for, as under parameters.free; nothing else "
+        "is fitted."
+    )
+
+
+def _kind_of_test(value: Any) -> str:
+    kind = value.get("kind", BUMP) if isinstance(value, dict) else getattr(value, "kind", BUMP)
+    return f"[{kind}]"
+
+
+TestOfProgramme = Annotated[
+    Annotated[SaturationTest, Tag(f"[{SATURATION}]")]
+    | Annotated[SteadyTest, Tag(f"[{STEADY}]")]
+    | Annotated[RecordedRejection, Tag(f"[{REJECTION}]")]
+    | Annotated[RecordedBump, Tag(f"[{BUMP}]")],
+    Discriminator(_kind_of_test),
+]
+
+
+class ProgrammeSection(Section):
+    """The section that makes a case file a programme."""
+
+    not_of_a_case: ClassVar[str] = (
+        "makes this a programme of several tests, not a case: exfit run runs it"
+    )
+    programme: tuple[TestOfProgramme, ...] = Field(
+        default=(),
+        alias="tests",
+        min_length=1,
+        description="In place of test, record, records and validate: the tests of a programme, "
+        "of which each feeds the later ones.",
+    )
+
+
+class ProgrammeDocument(CaseDocument, ProgrammeSection):
+    """The file of a programme: what its tests share, as in a case, and the tests."""

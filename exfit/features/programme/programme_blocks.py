@@ -4,9 +4,8 @@ from collections.abc import Iterator, Sequence
 from math import inf, isfinite
 
 from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
+from exfit.features.programme.results_at_rest import MeasuredValue, SaturationResult, VCurve
 from exfit.features.programme.run import CheckedStep
-from exfit.features.programme.steady.saturation_result import MeasuredValue, SaturationResult
-from exfit.features.programme.steady.v_curve_result import VCurve
 from exfit.results.model import FitResult
 from exfit.show import checks, fits
 from exfit.show.blocks import (
@@ -25,6 +24,8 @@ from exfit.show.blocks import (
 )
 from exfit.signals import TERMINALS
 from exfit.workflows.model_check import Check
+
+COMPARED = ("measured", "simulated", "differs")  # columns of a field signal
 
 
 def programme(result: ProgrammeResult) -> Iterator[Block]:
@@ -105,47 +106,41 @@ def values_table(values: Sequence[EnteredValue]) -> Table:
 def saturation(result: SaturationResult) -> Iterator[Block]:
     """Yield the numbers of the curve that is used, those of each form, and what limits them."""
     no_interval = result.verdict.in_place_of_interval
-    quantities = [*_quantities(result)]
-    rows = [
-        row(
-            name,
-            value.rounded(value.value),
-            no_interval or interval(value.interval, value.rounded),
-            unit,
-        )
-        for name, value, unit in quantities
-    ]
+    curve, unit = result.curve, result.unit
+    field = "exciter field current" if result.exciter else "base of ifd"
+    residual = result.residual
+    given: tuple[tuple[str, MeasuredValue | None, str], ...] = (
+        (f"{field}, 1 pu on the air-gap line", curve.ifd_base, unit),
+        ("base of efd", result.efd_base, result.efd_unit),
+        ("resistance of the field", result.resistance, f"{result.efd_unit}/{unit}"),
+        ("S(1.0)", curve.S10, "pu"),
+        ("S(1.2)", curve.S12, "pu"),
+        ("field current beside a line through zero", curve.offset, "pu"),
+        ("hysteresis, rising less falling", curve.hysteresis, "pu"),
+        (
+            "residual voltage",
+            None if residual is None else MeasuredValue(residual, None, (None, None)),
+            "pu",
+        ),
+    )
+    rows, reasons = [], []
+    for name, value, of_unit in given:
+        if value is not None:
+            limits = no_interval or interval(value.interval, value.rounded)
+            rows.append(row(name, value.rounded(value.value), limits, of_unit))
+            reasons += [f"{name}: {value.why}"] if value.why and not no_interval else []
     heads = ("value", "95 %")
     title = f"saturation curve, form {result.form}"
     yield Table(columns("", *heads, "unit", numbers=heads), tuple(rows), title)
-    if not no_interval:
-        yield from remarks("-", (f"{n}: {value.why}" for n, value, _ in quantities if value.why))
+    yield from remarks("-", reasons)
     rows = []
-    for curve in result.curves:
-        values = (curve.ifd_base, curve.S10, curve.S12)
-        cells = (value.rounded(value.value) for value in values)
-        words = ["used"] * (curve.form == result.form) + ["refuted"] * curve.refuted
-        rows.append(row(curve.form, *cells, f"{curve.rms:.2g}", ", ".join(words)))
-    forms = (f"base ({result.unit})", "S(1.0)", "S(1.2)", "rms (pu)")
+    for each in result.curves:
+        cells = (value.rounded(value.value) for value in (each.ifd_base, each.S10, each.S12))
+        words = ["used"] * (each.form == result.form) + ["refuted"] * each.refuted
+        rows.append(row(each.form, *cells, f"{each.rms:.2g}", ", ".join(words)))
+    forms = (f"base ({unit})", "S(1.0)", "S(1.2)", "rms (pu)")
     yield Table(columns("form", *forms, "", numbers=forms), tuple(rows), "forms of the curve")
     yield from notes(result.notes)
-
-
-def _quantities(result: SaturationResult) -> Iterator[tuple[str, MeasuredValue, str]]:
-    curve = result.curve
-    name = "exciter field current" if result.exciter else "base of ifd"
-    yield f"{name}, 1 pu on the air-gap line", curve.ifd_base, result.unit
-    if result.efd_base is not None:
-        yield "base of efd", result.efd_base, result.efd_unit
-    if result.resistance is not None:
-        yield "resistance of the field", result.resistance, f"{result.efd_unit}/{result.unit}"
-    yield "S(1.0)", curve.S10, "pu"
-    yield "S(1.2)", curve.S12, "pu"
-    yield "field current beside a line through zero", curve.offset, "pu"
-    if curve.hysteresis is not None:
-        yield "hysteresis, rising less falling", curve.hysteresis, "pu"
-    if result.residual is not None:
-        yield "residual voltage", MeasuredValue(result.residual, None, (None, None)), "pu"
 
 
 def v_curve(result: VCurve) -> Iterator[Block]:
@@ -166,15 +161,8 @@ def v_curve(result: VCurve) -> Iterator[Block]:
 
 def points_table(result: VCurve) -> Table:
     """Make the table of points: power, voltage, and each field signal, measured and simulated."""
-    heads = (
-        "point",
-        *TERMINALS,
-        *(
-            f"{signal} {words}"
-            for signal in result.readings
-            for words in ("measured", "simulated", "differs")
-        ),
-    )
+    compared = [f"{s} {word}" for s in result.readings for word in COMPARED]
+    heads = ("point", *TERMINALS, *compared)
     rows = []
     for k in range(len(result.p)):
         cells = [f"{value:.3f}" for value in (result.p[k], result.q[k], result.vt[k])]
@@ -207,7 +195,7 @@ def parameters_table(result: VCurve) -> Table:
         for name, parameter in result.parameters.items()
     ]
     heads = ("start", "fitted", "95 % interval")
-    last = [""] if remark else []
     meaning = TableColumn("meaning", folds=True, expendable=1)
-    heading = (*columns("parameter", *heads, "unit", numbers=heads), meaning, *columns(*last))
+    last = columns("") if remark else ()
+    heading = (*columns("parameter", *heads, "unit", numbers=heads), meaning, *last)
     return Table(heading, tuple(rows), "fitted to the points on load")

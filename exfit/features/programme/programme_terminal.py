@@ -8,8 +8,7 @@ from rich.live import Live
 from rich.text import Text
 
 from exfit.estimate import Progress
-from exfit.features.programme.case.programme import ProgrammeStep
-from exfit.features.programme.result import FinishedTest
+from exfit.features.programme.result import FinishedTest, ProgrammeStep
 from exfit.results.model import FitResult, Iteration
 from exfit.results.verdict import NOT_CONVERGED
 from exfit.show.live import BRIEF, progress_words

@@ -1,0 +1,132 @@
+"""The report of a programme: the form, the tests of its machine, the fit of its bump tests."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from exfit.features.programme.programme_blocks import saturation, v_curve, values_table
+from exfit.features.programme.result import FinishedTest, ProgrammeResult
+from exfit.features.programme.results_at_rest import FieldReading, SaturationResult, VCurve
+from exfit.features.report.charts import COLOURS, TALL
+from exfit.features.report.form import (
+    form_table,
+    form_without_bumps,
+    signatures,
+    unit_without_bumps,
+)
+from exfit.features.report.matches import fitted_matches
+from exfit.features.report.model import findings, parameters
+from exfit.features.report.page import FORM, Headline, Page, ReportSection, fit_page
+from exfit.show.blocks import (
+    Block,
+    Cell,
+    Chart,
+    Mark,
+    Panel,
+    Series,
+    Table,
+    TableColumn,
+    columns,
+    remarks,
+    row,
+)
+
+HIGHEST_LINE = 1.05  # pu: as far as the air-gap line is drawn
+MILLI = 1e3
+
+
+def programme_page(result: ProgrammeResult, folder: Path) -> Page:
+    """Build the page of a programme."""
+    sections = [ReportSection("programme", "Test programme", tuple(_overview(result)))]
+    for number, test in enumerate(result.tests, 1):
+        if test.result is not result.fit:
+            sections += _of_test(test, f"test-{number}")
+    if result.fit is not None:
+        page = fit_page(result.fit, folder)
+        form, *others = page.sections
+        return replace(page, sections=(form, *sections, *others))
+    form = ReportSection("form", FORM, tuple(form_table(form_without_bumps(result))))
+    unit = ReportSection("test", "Unit and test", tuple(unit_without_bumps(result)))
+    signed = ReportSection("signatures", "Revision and signatures", tuple(signatures(result)))
+    words = "; ".join(f"{test.name}: {test.verdict}" for test in result.tests)
+    word = "All tests are matched" if result.holds else "Not all tests are matched"
+    headline = Headline(f"{word}.", f"{words}.", result.holds, ())
+    return Page(f"Programme {result.name}", headline, (form, *sections, unit, signed))
+
+
+def _overview(result: ProgrammeResult) -> Iterator[Block]:
+    """Yield the outcome of each test, and the values that tests gave to those after them."""
+    rows: list[tuple[Cell, ...]] = []
+    for test in result.tests:
+        tests = f"\n{', '.join(test.tests)}" if len(test.tests) > 1 else ""
+        mark: Mark = "" if test.holds else "doubt"
+        rows.append(row(test.name + tests, test.kind, test.verdict, test.reason, mark=mark))
+    rows += [row(name, "", "failed", why, mark="doubt") for name, why in result.failed.items()]
+    heads = (*columns("test", "kind", "verdict"), TableColumn("why", folds=True))
+    yield Table(heads, tuple(rows), "Tests in the order in which one feeds the next")
+    if result.values:
+        yield values_table(result.values)
+    yield from remarks("", result.warnings, "", "warning")
+
+
+def _of_test(test: FinishedTest, key: str) -> Iterator[ReportSection]:
+    """Yield the sections of a test that is not among the bump tests."""
+    result, name = test.result, test.name
+    if isinstance(result, SaturationResult):
+        blocks = (*saturation(result), _saturation_chart(result, key))
+        yield ReportSection(key, f"Saturation test {name}", blocks)
+    elif isinstance(result, VCurve):
+        charts = (_v_curve_chart(result, reading, key) for reading in result.readings.values())
+        yield ReportSection(key, f"Points on load {name}", (*v_curve(result), *charts))
+    else:  # of data of the machine
+        yield ReportSection(key, f"Test {name}: record", tuple(fitted_matches(result, f"{key}-")))
+        for what, of_fit in (("parameters", parameters(result)), ("findings", findings(result))):
+            yield ReportSection(f"{key}-{what}", f"Test {name}: {what}", tuple(of_fit))
+
+
+def _saturation_chart(result: SaturationResult, key: str) -> Chart:
+    """Draw the voltage over the field current: points, curve, air-gap line."""
+    curve = result.curve
+    base, offset = curve.ifd_base.value, curve.offset.value
+    line = np.array([0.0, HIGHEST_LINE])
+    points = tuple(
+        Series(f"points, {name} voltage", result.ifd[own], result.vt[own], style, dots=True)
+        for name, sign, style in (("rising", 1, "p0"), ("falling", -1, "p3"))
+        if (own := result.direction == sign).any()
+    )
+    lines = (
+        Series("curve", base * (curve.ifd + offset), curve.vt, "simulated"),
+        Series("air-gap line", base * (line + offset), line, "p4 dash1"),
+    )
+    return Chart(
+        f"{key}-curve",
+        "Open-circuit saturation curve",
+        f"Terminal voltage over field current: the points, the curve in the form {result.form}, "
+        f"and the air-gap line, which takes {base:.4g} {result.unit} at 1 pu.",
+        f"field current ({result.unit})",
+        (Panel("vt (pu)", (*lines, *points), TALL),),
+    )
+
+
+def _v_curve_chart(result: VCurve, reading: FieldReading, key: str) -> Chart:
+    """Draw a field signal over reactive power at each level of power, and its residuals."""
+    curves, dots, residuals = [], [], []
+    for k, level in enumerate(result.levels):
+        own, style = np.array(level.points, dtype=np.int64), f"p{k % COLOURS}"
+        q, errors = result.q[own], MILLI * reading.residuals[own]
+        curves.append(Series(f"p = {level.p:.2f} pu", level.q, level.ifd, style))
+        dots.append(Series("", q, reading.measured[own], style, dots=True))
+        residuals.append(Series("", q, errors, style, dots=True))
+    return Chart(
+        f"{key}-{reading.signal}",
+        f"V-curves: {reading.signal}",
+        f"{reading.signal} over reactive power: the points, and the machine's model as lines; "
+        f"below, simulated less measured, {reading.rms:.2e} pu rms.",
+        "q (pu)",
+        (
+            Panel(f"{reading.signal} (pu)", (*curves, *dots), TALL),
+            Panel("simulated - measured (1e-3 pu)", tuple(residuals), TALL / 2.0),
+        ),
+    )

@@ -1,1 +1,0 @@
-"""Tests at rest: what points that were read from instruments say of a machine."""
