@@ -52,7 +52,7 @@ Value = TypeVar("Value")
 Columns = Annotated[Mapping[Key, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
 
 
-class Column(Section):
+class NamedColumn(Section):
     """A column of points."""
 
     column: Text | None = Field(
@@ -60,7 +60,7 @@ class Column(Section):
     )
 
 
-class PointColumn(Column):
+class PointColumn(NamedColumn):
     """A column of points and its conversion to per unit: column / base * scale."""
 
     unit: Text | None = Field(
@@ -82,7 +82,7 @@ class PointColumn(Column):
     )
 
 
-class CurveColumn(Column):
+class CurveColumn(NamedColumn):
     """A column of the points of a saturation curve."""
 
     unit: Text | None = Field(
@@ -109,7 +109,7 @@ GivenCurveColumn = Annotated[
 ]
 
 
-class AtRest(Section):
+class TestAtRest(Section):
     """A test at rest: points that were read from instruments."""
 
     kind: str = Field(description="Kind of test.")
@@ -126,7 +126,7 @@ class AtRest(Section):
     )
 
 
-class SteadyTest(AtRest):
+class SteadyTest(TestAtRest):
     """Points of the V-curves: field current, or voltage, of the machine at rest on load."""
 
     kind: Literal["steady"] = Field(description="Kind of test.")
@@ -172,7 +172,7 @@ class FieldWindingSection(Section):
     )
 
 
-class SaturationTest(AtRest):
+class SaturationTest(TestAtRest):
     """The open-circuit saturation curve: terminal voltage over field current at rated speed."""
 
     kind: Literal["saturation"] = Field(description="Kind of test.")

@@ -354,20 +354,20 @@ def causes_of(fields: FieldsOnLoad, values: Values, problem: PointProblem) -> tu
     return tuple(each.cause for each in better if each.cost <= AS_GOOD * better[0].cost)
 
 
-class Trial(NamedTuple):
+class TrialOfPoints(NamedTuple):
     """The cost at which one thing more matches the points, and what that would mean."""
 
     cost: float
     cause: Cause = REVERSED
 
 
-def _reversed(fields: FieldsOnLoad, problem: PointProblem) -> Trial:
+def _reversed(fields: FieldsOnLoad, problem: PointProblem) -> TrialOfPoints:
     fields = replace(fields, points=fields.points._replace(q=-fields.points.q))
     better = _minimum(replace(problem, errors=fields.errors))
-    return Trial(inf if better is None else fields.cost(better))
+    return TrialOfPoints(inf if better is None else fields.cost(better))
 
 
-def _trial(fields: FieldsOnLoad, problem: PointProblem, names: Sequence[str]) -> Trial:
+def _trial(fields: FieldsOnLoad, problem: PointProblem, names: Sequence[str]) -> TrialOfPoints:
     """Fit some values as well, each between half and twice of what it is."""
     given, rows = problem.given, {row.symbol: row for row in fields.machine.sheet}
     freed = []
@@ -378,14 +378,14 @@ def _trial(fields: FieldsOnLoad, problem: PointProblem, names: Sequence[str]) ->
         freed.append(FreeParameter(name, given[name], low, high, logarithmic=True))
     better = _minimum(replace(problem, free=(*freed, *problem.free)))
     if better is None:
-        return Trial(inf)
+        return TrialOfPoints(inf)
     words = " and ".join(f"{name} = {better[name]:.4g}" for name in names)
     instead = " and ".join(f"{given[name]:.4g}" for name in names)
     cause = Cause(
         f"the points are matched much better by {words} than by {instead}",
         f"check {'it' if names[0] in rows else 'the base'}, or let it be fitted",
     )
-    return Trial(fields.cost(better), cause)
+    return TrialOfPoints(fields.cost(better), cause)
 
 
 def _minimum(problem: PointProblem) -> Values | None:
