@@ -182,17 +182,29 @@ def other_levels(
     comparison: Comparison, steady: float, far: float = FAR_FROM_BASE
 ) -> Iterator[Cause]:
     """Yield the signals of a comparison that start elsewhere than their record, ``far`` off."""
-    for signal, overlay in comparison.overlays.items():
-        before = (comparison.time < steady) & np.isfinite(overlay.error)
-        if signal == "vt" or not before.any():
+    for signal in comparison.overlays:
+        levels = None if signal == "vt" else levels_at_rest(comparison, signal, steady)
+        if levels is None:
             continue
-        measured = float(np.mean(overlay.measured[before]))
-        simulated = float(np.mean(overlay.simulated[before]))
+        measured, simulated = levels
         if abs(measured - simulated) > far * max(abs(simulated), LEAST_LEVEL):
             yield Cause(
                 f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu",
                 "check its base, and the data and the power that the case gives the machine",
             )
+
+
+def levels_at_rest(
+    comparison: Comparison, signal: str, until: float | None
+) -> tuple[float, float] | None:
+    """Levels of a signal before an instant (s), measured and simulated; None if unseen."""
+    overlay = comparison.overlays.get(signal)
+    if overlay is None or until is None:
+        return None
+    before = (comparison.time < until) & np.isfinite(overlay.error)
+    if not before.any():
+        return None
+    return float(np.mean(overlay.measured[before])), float(np.mean(overlay.simulated[before]))
 
 
 def unsteady_signals(

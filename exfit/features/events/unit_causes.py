@@ -18,7 +18,7 @@ from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
 from exfit.results.verdict import Cause
 from exfit.verdict.causes.evidence import Evidence, Suspicion, likelihood, suspected
-from exfit.verdict.causes.trials import Trial, always, freed_within, refitted, tried, with_freed
+from exfit.verdict.causes.trials import freed_within, refitted, tried, with_freed
 from exfit.verdict.causes.unit import STRUCTURE
 
 LARGEST_FACTOR = 4.0  # of the inertia
@@ -90,7 +90,7 @@ def other_swing(evidence: Evidence) -> Iterator[Suspicion]:
         f"where the record is that of a simulator in which {FORMS[form]}, write swing: {form}",
     )
     residuals = of_case(evidence, with_plant_keys(evidence.case, swing=form))
-    yield from tried(evidence, residuals, 0, always(cause))
+    yield from tried(evidence, residuals, cause)
 
 
 def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
@@ -152,20 +152,16 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
             FreeParameter(lead, 2.0, 0.1, 50.0, logarithmic=True),
         ]
 
-        def cause(trial: Trial, heard: str = heard) -> Cause:
+        if trial := refitted(evidence, with_freed(of_case(evidence, other), freed)):
             amplification = trial.values[gain] * trial.values[washout]
-            return Cause(
+            cause = Cause(
                 f"a stabiliser that the case lacks: one that hears {heard}, with a gain of "
                 f"{amplification:.2g}, would match",
                 "if it was in service, give the unit's own: stabiliser: {model: ..., "
                 f"inputs: [{heard}], parameters: {{...}}}}, or its output as channel vs",
             )
-
-        def prior(trial: Trial) -> float:
-            return of_stand_in(evidence, trial.cost)
-
-        residuals = with_freed(of_case(evidence, other), freed)
-        yield from tried(evidence, residuals, len(freed), cause, prior)
+            prior = of_stand_in(evidence, trial.cost)
+            yield from suspected(evidence, trial.cost, len(freed), cause, prior)
 
 
 def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
@@ -182,7 +178,7 @@ def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
             f"was it in service? If it was not, leave out the section {kind}",
         )
         residuals = of_case(evidence, with_control(case, prefix))
-        yield from tried(evidence, residuals, 0, always(cause))
+        yield from tried(evidence, residuals, cause)
 
 
 def other_motion(evidence: Evidence) -> Iterator[Suspicion]:
@@ -217,26 +213,20 @@ def other_transformer(evidence: Evidence) -> Iterator[Suspicion]:
             f"the place of p and q: power_at: {place} would match (the case has {own})",
             "check on which side of the step-up transformer they are recorded",
         )
-        yield from tried(evidence, other, 0, always(cause))
+        yield from tried(evidence, other, cause)
         return
 
-    def cause_of(trial: Trial) -> Cause:
-        return Cause(
+    if trial := refitted(evidence, with_freed(other, [freed])):
+        text = (
             f"vt is recorded behind a transformer, p and q at the {place}: network.X "
-            f"{trial.values[REACTANCE]:.3g} with power_at: {place} would match",
-            check,
+            f"{trial.values[REACTANCE]:.3g} with power_at: {place} would match"
         )
-
-    yield from tried(evidence, with_freed(other, [freed]), 2, cause_of)
+        yield from suspected(evidence, trial.cost, 2, Cause(text, check))
 
 
 def _other_number(evidence: Evidence, freed: FreeParameter, check: str) -> Iterator[Suspicion]:
     """Suspect a fixed number, if another one would match."""
     given = evidence.residuals.fixed[freed.name]
-
-    def cause(trial: Trial) -> Cause:
-        return Cause(
-            f"{freed.name} {trial.values[freed.name]:.3g} would match (given {given:g})", check
-        )
-
-    yield from tried(evidence, with_freed(evidence.residuals, [freed]), 1, cause)
+    if trial := refitted(evidence, with_freed(evidence.residuals, [freed])):
+        text = f"{freed.name} {trial.values[freed.name]:.3g} would match (given {given:g})"
+        yield from suspected(evidence, trial.cost, 1, Cause(text, check))

@@ -13,7 +13,15 @@ from math import inf, isfinite
 from exfit.case.case import Case
 from exfit.registry import parts
 from exfit.results.verdict import Cause
-from exfit.verdict.causes.channels import clipped_channel, wrong_offset, wrong_scale, wrong_start
+from exfit.verdict.causes.channels import (
+    clipped_channel,
+    unsteady_record,
+    wrong_levels,
+    wrong_offset,
+    wrong_scale,
+    wrong_start,
+    wrong_voltage,
+)
 from exfit.verdict.causes.evidence import (
     Evidence,
     FittedRecord,
@@ -23,7 +31,6 @@ from exfit.verdict.causes.evidence import (
     Suspicion,
 )
 from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
-from exfit.verdict.causes.rest import unsteady_record, wrong_levels, wrong_voltage
 from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
 from exfit.verdict.causes.unit import (
     fixed_values,
@@ -81,7 +88,17 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     recognisers = recognisers_of(evidence.case)
     if nothing_to_explain:
         recognisers = {**ALWAYS, **_of_features("CAUSES_AT_REST")}
-    found = _found(evidence, recognisers)
+    pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
+    try:
+        for done, recognise in enumerate(recognisers.values()):
+            found[recognise] = []
+            pace.counts(done, len(recognisers), evidence.cost)
+            for suspicion in recognise(evidence):
+                found[recognise].append(suspicion)
+        pace.ended()
+    except (KeyboardInterrupt, OutOfTime) as ending:
+        left = (*recognisers,)[max(len(found) - 1, 0) :]
+        pace.stopped(left, isinstance(ending, KeyboardInterrupt))
     suspicions = sorted(_credible(evidence, found), key=lambda each: -each.likelihood)
     if not nothing_to_explain:
         suspicions = likely(with_model(evidence, suspicions))
@@ -121,21 +138,3 @@ def likely(suspicions: Sequence[Suspicion]) -> list[Suspicion]:
         each for each in compared[2:] if each.likelihood < compared[0].likelihood - FAR_LESS_LIKELY
     ]
     return [each for each in suspicions if each not in left_out]
-
-
-def _found(
-    evidence: Evidence, recognisers: Mapping[str, Recogniser]
-) -> dict[Recogniser, list[Suspicion]]:
-    """Run each recogniser, until an interruption or the pace ends it."""
-    pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
-    try:
-        for done, recognise in enumerate(recognisers.values()):
-            found[recognise] = []
-            pace.counts(done, len(recognisers), evidence.cost)
-            for suspicion in recognise(evidence):
-                found[recognise].append(suspicion)
-        pace.ended()
-    except (KeyboardInterrupt, OutOfTime) as ending:
-        left = (*recognisers,)[max(len(found) - 1, 0) :]
-        pace.stopped(left, isinstance(ending, KeyboardInterrupt))
-    return found

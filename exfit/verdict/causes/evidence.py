@@ -11,7 +11,7 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
 from exfit.estimate import Progress
-from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.noise import noise_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -100,19 +100,14 @@ class FittedRecord:
     comparison: Comparison
 
     @property
-    def begins_at_rest(self) -> bool:
-        """Flag of a simulation that starts with its record, from rest."""
-        return self.setup.test.begin is None
-
-    @property
     def steady_until(self) -> float | None:
         """The instant (s) until which the record should be at rest; None where it never is."""
-        return self.setup.test.steady if self.begins_at_rest else None
+        return self.setup.test.steady if self.setup.test.begin is None else None
 
     @property
     def given_vt0(self) -> float | None:
         """The voltage (pu) before the first step that the case gives; None where it is fitted."""
-        vt0 = self.setup.test.vt0 if self.begins_at_rest else None
+        vt0 = self.setup.test.vt0 if self.setup.test.begin is None else None
         return None if isinstance(vt0, Unknown) else vt0
 
 
@@ -164,13 +159,26 @@ class Evidence:
 
         Errors that are weighted by the noise of what drives them are as large as that foretells.
         """
-        if any(each.whitening is not None for each in self.residuals.experiments):
+        if self.weighted_by_noise:
             return 0.5 * self.residuals.count * self.residuals.noise**2
         squares = (
             channel.samples * (channel.weight * noise_of(channel)) ** 2
             for channel in self.residuals.channels
         )
         return 0.5 * sum(squares)
+
+    @property
+    def tests(self) -> Iterator[tuple[int, FittedRecord, Experiment]]:
+        """The records of the fit by number, with the experiments that it simulates."""
+        pairs = zip(self.records, self.residuals.experiments, strict=True)
+        return ((number, record, experiment) for number, (record, experiment) in enumerate(pairs))
+
+    @property
+    def channels(self) -> Iterator[tuple[int, FittedRecord, Experiment, Channel]]:
+        """The channels of these experiments."""
+        for number, record, experiment in self.tests:
+            for channel in experiment.channels:
+                yield number, record, experiment, channel
 
     def name_of(self, number: int) -> str:
         """Name a record of several as a sentence does; "" where there is only one."""

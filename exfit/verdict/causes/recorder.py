@@ -12,25 +12,29 @@ from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.quality import SPIKE_LIMIT
 from exfit.dsp.step_detection import first_step
 from exfit.fitting.channels import finds_instant, with_averages
-from exfit.fitting.experiment import Channel
+from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
+from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
 from exfit.util.sorting import median
-from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, suspected
-from exfit.verdict.causes.lines import delay_found
+from exfit.verdict.causes.evidence import (
+    CERTAIN,
+    LAST,
+    Evidence,
+    FittedRecord,
+    Suspicion,
+    suspected,
+)
+from exfit.verdict.causes.steps import delay_found
 from exfit.verdict.causes.trials import (
-    LinearFit,
     Opened,
-    Trial,
-    blocks,
     linear_fit,
-    tried,
+    refitted,
     with_experiment,
     with_opened,
 )
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FEWEST_AT_REST = 20  # samples from which a drift at rest is taken
@@ -40,6 +44,7 @@ MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
 CLOCKS = {1e3: "ms", 1e6: "microseconds", 60.0: "minutes", 50.0: "cycles of 50 Hz"}
 WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
+LATE = Nuisance("cause.delay", "delay")
 
 
 class ChannelErrors(NamedTuple):
@@ -59,11 +64,9 @@ class ChannelErrors(NamedTuple):
 
 def errors_of_channels(evidence: Evidence) -> Iterator[ChannelErrors]:
     """Yield the errors of each channel whose samples are compared one by one."""
-    for number, places in enumerate(blocks(evidence)):
-        experiment = evidence.residuals.experiments[number]
-        time = evidence.records[number].setup.record.time
-        for channel, rows in zip(experiment.channels, places, strict=True):
-            yield ChannelErrors(number, channel, rows, time[channel.kept])
+    rows = iter(slices(evidence.residuals.sizes))
+    for number, record, _, channel in evidence.channels:
+        yield ChannelErrors(number, channel, next(rows), record.setup.record.time[channel.kept])
 
 
 UNSTEADY = "check the recorder, and whether speed and voltage were steady; use a shorter window"
@@ -78,7 +81,7 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
     if linear is None:
         return
     for own in errors_of_channels(evidence):
-        frequency = _line(own, linear)
+        frequency = _line(own, linear.errors[own.rows])
         if frequency is None:
             continue
         phase = 2.0 * np.pi * frequency * own.time
@@ -93,9 +96,8 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
         yield from suspected(evidence, explained.cost, 3, cause)
 
 
-def _line(own: ChannelErrors, linear: LinearFit) -> float | None:
+def _line(own: ChannelErrors, errors: Array) -> float | None:
     """Return the frequency (Hz) at which the errors of a channel have most, None if too few."""
-    errors = linear.errors[own.rows]
     if len(errors) < FEWEST_PERIODS:
         return None
     step, length = float(median(np.diff(own.time))), FINER * len(errors)
@@ -121,23 +123,18 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
         explained = linear.with_columns(columns)
         change = float(explained.coefficients[0])
         of_event = evidence.case.kind.finds_rest  # its phasors hold no ripple of the mains
-        folding = "" if of_event else _folding(1.0 / float(median(np.diff(own.time))))
+        rate = 1.0 / float(median(np.diff(own.time)))
+        cycles = [mains / rate for mains in MAINS]
+        folded = any(abs(each - round(each)) < FOLDED and each > 0.5 for each in cycles)
+        folding = ", or ripple of the mains that its sampling folds," if folded else ""
         cause = Cause(
-            f"a drift{folding} of {own.channel.signal}{evidence.name_of(own.number)}: "
-            f"{change:+.1e} pu from start to end",
+            f"a drift{'' if of_event else folding} of "
+            f"{own.channel.signal}{evidence.name_of(own.number)}: {change:+.1e} pu from start to "
+            "end",
             MOVED_IN_EVENT if of_event else UNSTEADY,
         )
-        errors = linear.errors[own.rows]
-        prior = 0.0 if _shows_at_rest(evidence, own, errors, change) else LAST
-        yield from suspected(evidence, explained.cost, 2, cause, prior)
-
-
-def _folding(rate: float) -> str:
-    """Word the doubt that a rate (Hz) of samples folds a ripple to what looks like a drift."""
-    folds = any(
-        abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5 for mains in MAINS
-    )
-    return ", or ripple of the mains that its sampling folds," if folds else ""
+        shown = _shows_at_rest(evidence, own, linear.errors[own.rows], change)
+        yield from suspected(evidence, explained.cost, 2, cause, 0.0 if shown else LAST)
 
 
 def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change: float) -> bool:
@@ -158,33 +155,27 @@ def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect channels with spikes, which count as errors of the model."""
     if evidence.residuals.robust is not None:
         return
-    for number, record in enumerate(evidence.records):
-        for channel in evidence.residuals.experiments[number].channels:
-            error = record.comparison.overlays[channel.signal].error
-            kept = np.isfinite(error)
-            time, own = record.comparison.time[kept], error[kept]
-            places = _spikes(own)
-            if not len(places):
-                continue
-            square = channel.weight**2 * float(np.sum(own[places] ** 2))
-            at = f"{time[places[0]]:.4g} s" + (" and later" if len(places) > 1 else "")
-            cause = Cause(
-                f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} are spikes, "
-                f"at {at}",
-                f"outliers: {SPIKE_LIMIT:g} on the channel leaves them out",
-            )
-            cost = max(evidence.cost - 0.5 * square, 0.0)
-            yield from suspected(evidence, cost, len(places), cause)
-
-
-def _spikes(errors: Array) -> Places:
-    """Return the places of errors (M,) far beyond the noise, if these are few and alone."""
-    if len(errors) < NEIGHBOURS:
-        return np.zeros(0, np.intp)
-    far = np.abs(errors - median(errors)) > SPIKE_LIMIT * noise(errors)
-    places = np.flatnonzero(far)
-    alone = not np.any(far[1:-1] & far[:-2] & far[2:])
-    return places if alone and len(places) <= MOST_SPIKES * len(errors) else places[:0]
+    for number, record, _, channel in evidence.channels:
+        error = record.comparison.overlays[channel.signal].error
+        kept = np.isfinite(error)
+        time, own = record.comparison.time[kept], error[kept]
+        if len(own) < NEIGHBOURS:
+            continue
+        far = np.abs(own - median(own)) > SPIKE_LIMIT * noise(own)
+        places = np.flatnonzero(far)
+        # far beyond the noise, few and alone
+        alone = not np.any(far[1:-1] & far[:-2] & far[2:])
+        if not alone or not 0 < len(places) <= MOST_SPIKES * len(own):
+            continue
+        square = channel.weight**2 * float(np.sum(own[places] ** 2))
+        at = f"{time[places[0]]:.4g} s" + (" and later" if len(places) > 1 else "")
+        cause = Cause(
+            f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} are spikes, "
+            f"at {at}",
+            f"outliers: {SPIKE_LIMIT:g} on the channel leaves them out",
+        )
+        cost = max(evidence.cost - 0.5 * square, 0.0)
+        yield from suspected(evidence, cost, len(places), cause)
 
 
 def averaging(evidence: Evidence) -> Iterator[Suspicion]:
@@ -192,63 +183,59 @@ def averaging(evidence: Evidence) -> Iterator[Suspicion]:
 
     Where the fit finds the instant of the step, that makes up for the delay of averages.
     """
-    for number, experiment in enumerate(evidence.residuals.experiments):
+    for number, record, experiment in evidence.tests:
         if any(channel.filtering is not None for channel in experiment.channels):
             continue
-        window = _likeliest_window(evidence, number)
+        window = _likeliest_window(evidence, record, experiment)
         if window is None:
             continue
-        delay = experiment.simulator.delay
         averaged = with_averages(experiment, window)
-        changed = with_experiment(evidence.residuals, number, averaged)
-        late = Nuisance("cause.delay", "delay")
-        found = finds_instant(experiment)
-        opened = (
-            [] if found else [Opened(late, delay + 0.5 * window, delay - window, delay + window)]
-        )
-
-        def cause(trial: Trial, window: float = window, number: int = number) -> Cause:
-            late = trial.values.get("cause.delay")
-            after = "" if late is None else f", and is {1e3 * late:.0f} ms late"
-            delay = "" if late is None else f", {delay_found(late, window)}"
-            return Cause(
+        residuals = with_experiment(evidence.residuals, number, averaged)
+        delay = experiment.simulator.delay
+        late = Opened(LATE, delay + 0.5 * window, delay - window, delay + window)
+        opened = [] if finds_instant(experiment) else [late]
+        if trial := refitted(evidence, with_opened(residuals, number, opened)):
+            after, found = "", ""
+            if opened:
+                delay = trial.values[LATE.name]
+                after = f", and is {1e3 * delay:.0f} ms late"
+                found = f", {delay_found(delay, window)}"
+            cause = Cause(
                 f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
                 f"{after}",
-                f"averaged: {window:.3g} on its channels{delay}",
+                f"averaged: {window:.3g} on its channels{found}",
             )
+            yield from suspected(evidence, trial.cost, 1 + len(opened), cause)
 
-        yield from tried(evidence, with_opened(changed, number, opened), 1 + len(opened), cause)
 
-
-def _likeliest_window(evidence: Evidence, number: int) -> float | None:
+def _likeliest_window(
+    evidence: Evidence, record: FittedRecord, experiment: Experiment
+) -> float | None:
     """Return the window (s) of the average that matches best, by linear theory."""
-    experiment = evidence.residuals.experiments[number]
-    time = evidence.records[number].setup.record.time
+    time = record.setup.record.time
     step = float(median(np.diff(time)))
-    found = finds_instant(experiment)
-    costs = {}
+    found, costs = finds_instant(experiment), dict[float, float]()
     for window in sorted({step, *(window for window in WINDOWS if window > step)}):
         if not window < 0.1 * (time[-1] - time[0]):
             continue
         averaged = with_averages(experiment, window)
         values, moves = evidence.values, [*evidence.residuals.moves(evidence.solution.x)]
         if not found:
-            nuisance = Nuisance("cause.delay", "delay")
-            averaged = replace(averaged, nuisances=(*averaged.nuisances, nuisance))
-            values = {**values, "cause.delay": experiment.simulator.delay + 0.5 * window}
-            moves.append({"cause.delay": 1.0})
+            averaged = replace(averaged, nuisances=(*averaged.nuisances, LATE))
+            values = {**values, LATE.name: experiment.simulator.delay + 0.5 * window}
+            moves.append({LATE.name: 1.0})
         errors, slopes = averaged.tangents(values, moves)
         if not np.isfinite(slopes).all():
             return None
         coefficients, *_ = np.linalg.lstsq(slopes, errors, rcond=None)
         left = errors - slopes @ coefficients
         costs[window] = float(left @ left)
-    return min(costs, key=lambda window: costs[window]) if costs else None
+    return min(costs, key=lambda window: costs[window], default=None)
 
 
 def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect another unit of the time, by the instant at which the record shows the first step."""
-    for number, record in enumerate(evidence.records):
+    for number, record, _ in evidence.tests:
         overlay = record.comparison.overlays.get("vt")
         instants = record.setup.test.instants
         if overlay is None or not instants or instants[0] <= 0.0:
@@ -258,11 +245,9 @@ def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
             continue
         for factor, unit in CLOCKS.items():
             if abs(detected.at / (factor * instants[0]) - 1.0) < NEAREST_RATIO:
-                yield Suspicion(
-                    Cause(
-                        f"the time column{evidence.name_of(number)} may be in {unit}: it shows the "
-                        f"step at {detected.at:.4g}, the case has it at {instants[0]:g} s",
-                        f"time: {{column: ..., unit: {unit}}}",
-                    ),
-                    CERTAIN,
+                cause = Cause(
+                    f"the time column{evidence.name_of(number)} may be in {unit}: it shows the "
+                    f"step at {detected.at:.4g}, the case has it at {instants[0]:g} s",
+                    f"time: {{column: ..., unit: {unit}}}",
                 )
+                yield Suspicion(cause, CERTAIN)

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
@@ -12,20 +11,18 @@ from exfit.fitting.nuisances import Nuisance
 from exfit.results.verdict import Cause
 from exfit.simulation.inputs import InputStep
 from exfit.simulation.simulator import Simulator
-from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion
-from exfit.verdict.causes.lines import delay_found, step_found
+from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, suspected
 from exfit.verdict.causes.trials import (
     LinearFit,
     Opened,
-    Trial,
-    always,
+    between,
     linear_fit,
+    refitted,
     tried,
     with_experiment,
     with_opened,
+    within,
 )
-
-Array = NDArray[np.float64]
 
 LARGEST_FACTOR = 5.0  # of the size of a step
 LEAST_CHANGE = 0.02  # of the size of a step: no one errs by less
@@ -38,76 +35,58 @@ LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
 def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the sign of the steps."""
-    for number, record in enumerate(evidence.records):
-        experiment = evidence.residuals.experiments[number]
-        way = moves_by(record)
-        if way is None or not experiment.simulator.inputs.steps:
+    for number, record, experiment in evidence.tests:
+        own, features = experiment.simulator, record.comparison.features
+        measured, simulated = features.measured, features.simulated
+        if measured is None or simulated is None or not own.inputs.steps:
             continue
-        steps = tuple(step._replace(step=-step.step) for step in experiment.simulator.inputs.steps)
-        simulator = experiment.simulator.with_inputs(steps, experiment.simulator.delay)
-        turned = replace(experiment, simulator=simulator)
+        way = measured.final_value - measured.initial_value
+        if not way * (simulated.final_value - simulated.initial_value) < 0.0:
+            continue
+        steps = tuple(step._replace(step=-step.step) for step in own.inputs.steps)
+        turned = replace(experiment, simulator=own.with_inputs(steps, own.delay))
         cause = Cause(
             f"the record{evidence.name_of(number)} goes the other way ({way:+.2g} pu) than the "
             "response",
             "turn the sign of the step, or check the polarity of vt",
         )
-        residuals = with_experiment(evidence.residuals, number, turned)
-        yield from tried(evidence, residuals, 0, always(cause))
-
-
-def moves_by(record: FittedRecord) -> float | None:
-    """Change of vt in a record, pu; None unless its response goes the other way."""
-    measured = record.comparison.features.measured
-    simulated = record.comparison.features.simulated
-    if measured is None or simulated is None:
-        return None
-    way = measured.final_value - measured.initial_value
-    return way if way * (simulated.final_value - simulated.initial_value) < 0.0 else None
+        yield from tried(evidence, with_experiment(evidence.residuals, number, turned), cause)
 
 
 def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the size of the steps of a record."""
-    for number, experiment in enumerate(evidence.residuals.experiments):
+    for number, _, experiment in evidence.tests:
         free = {nuisance.step for nuisance in experiment.nuisances if nuisance.kind == "step"}
         opened = [
-            Opened(Nuisance(f"cause.step{place}", "step", place), step.step, *_sizes(step.step))
-            for place, step in enumerate(experiment.simulator.inputs.steps)
-            if place not in free and step.step
+            Opened.within(Nuisance(f"cause.step{k}", "step", k), step.step, LARGEST_FACTOR)
+            for k, step in enumerate(experiment.simulator.inputs.steps)
+            if k not in free and step.step
         ]
         if not opened:
             continue
-
-        def cause(
-            trial: Trial, opened: list[Opened] = opened, number: int = number
-        ) -> Cause | None:
-            changes = [trial.values[each.nuisance.name] / each.start - 1.0 for each in opened]
-            if max(map(abs, changes)) < LEAST_CHANGE:
-                return None
-            sizes = ", ".join(f"{trial.values[each.nuisance.name]:+.4g}" for each in opened)
-            given = ", ".join(f"{each.start:+.4g}" for each in opened)
-            return Cause(
-                f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
-                f"has {given} pu",
-                correct_step([trial.values[each.nuisance.name] for each in opened]),
-            )
-
-        residuals = with_opened(evidence.residuals, number, opened)
-
-        def prior(trial: Trial, opened: list[Opened] = opened) -> float:
-            changes = [trial.values[each.nuisance.name] / each.start - 1.0 for each in opened]
-            return -RARE if max(map(abs, changes)) < USUAL_CHANGE else 0.0
-
-        yield from tried(evidence, residuals, len(opened), cause, prior)
-
-
-def _sizes(size: float) -> tuple[float, float]:
-    low, high = sorted((size / LARGEST_FACTOR, size * LARGEST_FACTOR))
-    return low, high
+        trial = refitted(evidence, with_opened(evidence.residuals, number, opened))
+        if trial is None:
+            continue
+        found = [trial.values[each.nuisance.name] for each in opened]
+        pairs = zip(found, opened, strict=True)
+        change = max(abs(size / each.start - 1.0) for size, each in pairs)
+        if change < LEAST_CHANGE:
+            continue
+        sizes = ", ".join(f"{size:+.4g}" for size in found)
+        given = ", ".join(f"{each.start:+.4g}" for each in opened)
+        cause = Cause(
+            f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
+            f"has {given} pu",
+            correct_step(found),
+        )
+        prior = -RARE if change < USUAL_CHANGE else 0.0
+        yield from suspected(evidence, trial.cost, len(opened), cause, prior)
 
 
 def correct_step(sizes: Sequence[float]) -> str:
     """Word the remedy for steps of other sizes, those that would match."""
-    return f"correct step, or let the fit find it, {', '.join(map(step_found, sizes))}"
+    lines = (f"under vref: `step: {within(size, LARGEST_FACTOR)}`" for size in sizes)
+    return f"correct step, or let the fit find it, {', '.join(lines)}"
 
 
 def correct_instant(delay: float) -> str:
@@ -116,37 +95,38 @@ def correct_instant(delay: float) -> str:
     return f"correct at, or let the fit find it, under vref: `at: {{start: auto}}`; or {line}"
 
 
+def delay_found(delay: float, farthest: float) -> str:
+    """Write the line that leaves the delay of a recorder (s) to the fit."""
+    return f"under record: `delay: {between(delay, delay - farthest, delay + farthest)}`"
+
+
 def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect a record of being earlier or later than the case says."""
-    for number, record in enumerate(evidence.records):
-        experiment = evidence.residuals.experiments[number]
+    for number, record, experiment in evidence.tests:
         if any(nuisance.kind in ("at", "shift", "delay") for nuisance in experiment.nuisances):
             continue
-        delay = experiment.simulator.delay
+        delay, of_record = experiment.simulator.delay, evidence.name_of(number)
         start = delay + float(np.clip(_detected_delay(record), -FARTHEST_DELAY, FARTHEST_DELAY))
-        opened = Opened(
-            Nuisance("cause.delay", "delay"), start, start - FARTHEST_DELAY, start + FARTHEST_DELAY
+        opened = Opened.around(Nuisance("cause.delay", "delay"), start, FARTHEST_DELAY)
+        trial = refitted(evidence, with_opened(evidence.residuals, number, [opened]))
+        if trial is None:
+            continue
+        late = trial.values["cause.delay"] - delay
+        size = f"{1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'}"
+        cause = Cause(
+            f"the instant of the step{of_record}, or a delay of the recorder: the record is {size} "
+            "than the case",
+            correct_instant(delay + late),
         )
-
-        def cause(trial: Trial, delay: float = delay, number: int = number) -> Cause:
-            late = trial.values["cause.delay"] - delay
-            size = f"{1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'}"
-            if evidence.case.kind.finds_rest:
-                compared = f"what is compared{evidence.name_of(number)} is recorded {size}"
-                return Cause(
-                    f"the clocks: {compared} than what drives the unit",
-                    "put all channels on one clock, or let the fit find it: "
-                    f"{delay_found(delay + late, FARTHEST_DELAY)}; phasors and powers may be "
-                    "filtered differently",
-                )
-            return Cause(
-                f"the instant of the step{evidence.name_of(number)}, or a delay of the recorder: "
-                f"the record is {size} than the case",
-                correct_instant(delay + late),
+        if evidence.case.kind.finds_rest:
+            cause = Cause(
+                f"the clocks: what is compared{of_record} is recorded {size} than what drives the "
+                "unit",
+                "put all channels on one clock, or let the fit find it: "
+                f"{delay_found(delay + late, FARTHEST_DELAY)}; phasors and powers may be "
+                "filtered differently",
             )
-
-        residuals = with_opened(evidence.residuals, number, [opened])
-        yield from tried(evidence, residuals, 1, cause)
+        yield from suspected(evidence, trial.cost, 1, cause)
 
 
 def _detected_delay(record: FittedRecord) -> float:
@@ -167,49 +147,39 @@ def further_step(evidence: Evidence) -> Iterator[Suspicion]:
     if linear is None:
         return
     offset = 0
-    for number, experiment in enumerate(evidence.residuals.experiments):
+    for number, _, experiment in evidence.tests:
         rows = slice(offset, offset + sum(experiment.sizes))
         offset = rows.stop
-        steps = experiment.simulator.inputs.steps
+        own = experiment.simulator
+        steps = own.inputs.steps
         if not any(step.signal == "vref" for step in steps):
             continue
-        at = _likeliest_instant(evidence, linear, number, rows)
+        spacing = float(own.times[-1] - own.times[0]) / INSTANTS
+        at = _likeliest_instant(evidence, linear, experiment, rows, spacing)
         if at is None:
             continue
-        place, name = len(steps), ("cause.at", "cause.step")
-        size = max(abs(step.step) for step in steps)
-        own = experiment.simulator
+        place, size = len(steps), max(abs(step.step) for step in steps)
         inputs = replace(own.inputs, steps=(*steps, InputStep(at, 0.0, smooth=True)))
         simulator = Simulator(own.system, inputs, own.times, own.step, own.least, own.delay)
-        near = 2.0 * _spacing(experiment)
         opened = [
-            Opened(Nuisance(name[0], "at", place), at, at - near, at + near),
-            Opened(Nuisance(name[1], "step", place), 0.02 * size, -size, size),
+            Opened.around(Nuisance("cause.at", "at", place), at, 2.0 * spacing),
+            Opened(Nuisance("cause.step", "step", place), 0.02 * size, -size, size),
         ]
-
-        def cause(trial: Trial, number: int = number) -> Cause:
-            return Cause(
+        changed = replace(experiment, simulator=simulator)
+        residuals = with_experiment(evidence.residuals, number, changed)
+        if trial := refitted(evidence, with_opened(residuals, number, opened)):
+            cause = Cause(
                 f"a further step{evidence.name_of(number)} that the case does not have: "
                 f"{trial.values['cause.step']:+.2g} pu at {trial.values['cause.at']:.4g} s",
                 "add it under vref, or end the record before it: window",
             )
-
-        changed = replace(experiment, simulator=simulator)
-        residuals = with_experiment(evidence.residuals, number, changed)
-        yield from tried(evidence, with_opened(residuals, number, opened), 2, cause)
-
-
-def _spacing(experiment: Experiment) -> float:
-    """Distance (s) of the instants at which a further step is tried."""
-    times = experiment.simulator.times
-    return float(times[-1] - times[0]) / INSTANTS
+            yield from suspected(evidence, trial.cost, 2, cause)
 
 
 def _likeliest_instant(
-    evidence: Evidence, linear: LinearFit, number: int, rows: slice
+    evidence: Evidence, linear: LinearFit, experiment: Experiment, rows: slice, spacing: float
 ) -> float | None:
     """Find the instant of a further step that explains most, by the response to the first one."""
-    experiment = evidence.residuals.experiments[number]
     first = experiment.simulator.inputs.steps[0]
     unit = replace(experiment, nuisances=(*experiment.nuisances, Nuisance("cause.unit", "step", 0)))
     try:
@@ -220,21 +190,15 @@ def _likeliest_instant(
     times = experiment.simulator.times
     lowest, instant = evidence.cost, None
     for at in np.linspace(times[0], times[-1], INSTANTS + 1)[1:]:
-        if at < first.at + _spacing(experiment) or at > times[-1] - LEAST_REST * np.ptp(times):
+        if at < first.at + spacing or at > times[-1] - LEAST_REST * np.ptp(times):
             continue
+        by, moved = float(at - first.at), []
+        for k, channel in enumerate(experiment.channels):
+            later = np.interp(times - by, times, slopes[:, k, 0], left=0.0)
+            moved.append(channel.weight * channel.slopes(samples[:, k], later[:, None])[:, 0])
         column = np.zeros((len(linear.errors), 1))
-        column[rows, 0] = _moved(experiment, times, slopes[:, :, 0], samples, float(at - first.at))
+        column[rows, 0] = np.concatenate(moved)
         cost = linear.with_columns(column).cost
         if cost < lowest:
             lowest, instant = cost, float(at)
     return instant
-
-
-def _moved(experiment: Experiment, times: Array, slopes: Array, samples: Array, by: float) -> Array:
-    """Return weighted responses (errors,) to a unit step, made so much later (s)."""
-    columns = []
-    for k, channel in enumerate(experiment.channels):
-        later = np.interp(times - by, times, slopes[:, k], left=0.0)
-        filtered = channel.slopes(samples[:, k], later[:, None])
-        columns.append(channel.weight * filtered[:, 0])
-    return np.concatenate(columns)

@@ -1,7 +1,8 @@
 """One thing more left open, by a fit or in the linear model: what would match the record."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
+from exfit.util.text import yaml_number
 from exfit.verdict.causes.evidence import Evidence, Suspicion, suspected
 
 Array = NDArray[np.float64]
@@ -24,6 +26,7 @@ MOST_ITERATIONS = 25  # of each phase: to compare causes, not to print digits
 AT_NOISE = 1.2  # times the cost of the noise: a descent that ends so low needs no other
 TOLERANCE = 1e-3  # of a step and of the gradient, in the units of the search
 Mask = NDArray[np.bool_]
+DIGITS = 3  # of a number in a line for the case
 DEPENDENT = 1e-9  # of the longest column: a column that is shorter without the others is none
 
 
@@ -34,6 +37,16 @@ class Opened(NamedTuple):
     start: float
     low: float
     high: float
+
+    @classmethod
+    def around(cls, nuisance: Nuisance, start: float, farthest: float) -> "Opened":
+        """Leave open what may be so far off."""
+        return cls(nuisance, start, start - farthest, start + farthest)
+
+    @classmethod
+    def within(cls, nuisance: Nuisance, start: float, factor: float) -> "Opened":
+        """Leave open what may be wrong by a factor."""
+        return cls(nuisance, start, *sorted((start / factor, start * factor)))
 
 
 class Trial(NamedTuple):
@@ -69,13 +82,10 @@ def with_freed(residuals: Residuals, freed: Sequence[FreeParameter]) -> Residual
     return replace(residuals, free=[*residuals.free, *freed], fixed=fixed, counter=None)
 
 
-def freed_within(
-    name: str, value: float, factor: float, start: float | None = None
-) -> FreeParameter:
+def freed_within(name: str, value: float, factor: float) -> FreeParameter:
     """Return a fixed value as a parameter that may change by a factor."""
-    first = value if start is None else start
     low, high = sorted((value / factor, value * factor))
-    return FreeParameter(name, min(max(first, low), high), low, high, logarithmic=value > 0.0)
+    return FreeParameter(name, value, low, high, logarithmic=value > 0.0)
 
 
 def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
@@ -92,45 +102,31 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
         [own.get(free.name, x) for free, x in zip(residuals.free, start, strict=True)]
     )
     ends = list[estimate.Result]()
+
+    def watch(line: estimate.SolverIteration) -> None:
+        evidence.pace.goes_on(line.cost)
+
     for point in (start, np.clip(solution, low, high)):
-        if not ends or ends[0].cost > AT_NOISE * evidence.noise_cost:
-            end = _descended(evidence, residuals, point)
-            ends += [] if end is None else [end]
+        if ends and ends[0].cost <= AT_NOISE * evidence.noise_cost:
+            break
+        evidence.pace.goes_on()
+        end = short_descent(residuals, point, MOST_ITERATIONS, watch, TOLERANCE)
+        if end is not None and end.stop is estimate.Stop.INTERRUPTED:
+            raise KeyboardInterrupt
+        if end is not None and np.isfinite(end.cost):
+            ends.append(end)
     if not ends:
         return None
     best = min(ends, key=lambda end: end.cost)
     return Trial(best.cost, residuals.values(best.x))
 
 
-def _descended(evidence: Evidence, residuals: Residuals, start: Array) -> estimate.Result | None:
-    evidence.pace.goes_on()
-
-    def watch(line: estimate.SolverIteration) -> None:
-        evidence.pace.goes_on(line.cost)
-
-    end = short_descent(residuals, start, MOST_ITERATIONS, watch, TOLERANCE)
-    if end is not None and end.stop is estimate.Stop.INTERRUPTED:
-        raise KeyboardInterrupt
-    return end if end is not None and np.isfinite(end.cost) else None
-
-
-def always(cause: Cause) -> Callable[[Trial], Cause]:
-    """Return the cause of a trial that is the same whatever it finds."""
-    return lambda _: cause
-
-
 def tried(
-    evidence: Evidence,
-    residuals: Residuals,
-    numbers: int,
-    cause: Callable[[Trial], Cause | None],
-    prior: Callable[[Trial], float] = lambda _: 0.0,
+    evidence: Evidence, residuals: Residuals, cause: Cause, numbers: int = 0
 ) -> Iterator[Suspicion]:
-    """Suspect the cause of other residuals, if the record is matched better by them."""
-    trial = refitted(evidence, residuals)
-    likely = None if trial is None else cause(trial)
-    if trial is not None and likely is not None:
-        yield from suspected(evidence, trial.cost, numbers, likely, prior(trial))
+    """Suspect a cause, if the record is matched better by other residuals."""
+    if trial := refitted(evidence, residuals):
+        yield from suspected(evidence, trial.cost, numbers, cause)
 
 
 class Explained(NamedTuple):
@@ -189,3 +185,15 @@ def blocks(evidence: Evidence) -> list[list[slice]]:
     """Places of the errors of each channel of each record among all of them."""
     places = iter(slices(evidence.residuals.sizes))
     return [[next(places) for _ in each.channels] for each in evidence.residuals.experiments]
+
+
+def within(start: float, factor: float, limits: tuple[float, float] = (-inf, inf)) -> str:
+    """Write the entry in a case of a value that is fitted within a factor of its start."""
+    low, high = sorted((start / factor, start * factor))
+    return between(start, max(low, limits[0]), min(high, limits[1]))
+
+
+def between(start: float, low: float, high: float) -> str:
+    """Write the entry in a case of a value that is fitted between bounds."""
+    numbers = (yaml_number(float(f"{number:.{DIGITS}g}")) for number in (start, low, high))
+    return "{{start: {}, min: {}, max: {}}}".format(*numbers)

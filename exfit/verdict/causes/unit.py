@@ -15,18 +15,26 @@ from exfit.plants import MACHINE
 from exfit.results.influences import DEVIATION, first_of, moved_parameters
 from exfit.results.verdict import Cause
 from exfit.simulation.limits import Extreme, extremes
-from exfit.verdict.causes.evidence import CERTAIN, LAST, Evidence, Suspicion, likelihood
-from exfit.verdict.causes.lines import freeing
+from exfit.util.text import dotted
+from exfit.verdict.causes.evidence import (
+    CERTAIN,
+    LAST,
+    Evidence,
+    Suspicion,
+    likelihood,
+    suspected,
+)
 from exfit.verdict.causes.trials import (
     DEPENDENT,
-    Trial,
     freed_within,
     linear_fit,
-    tried,
+    refitted,
     with_freed,
+    within,
 )
 
 LARGEST_FACTOR = 4.0  # of a fixed value
+FACTOR = 4.0  # from the start of a freed value to its bounds
 WIDER = 10.0  # times: how much farther a bound is put
 MOST_FIXED = 2  # values that are tried, those that would explain most
 MOST_LIMITS = 4  # that are tried, those that were met first
@@ -56,53 +64,43 @@ def fixed_values(evidence: Evidence) -> Iterator[Suspicion]:
     names = [
         name
         for name, value in fixed.items()
-        if value > 0.0 and name in rows and not _is_limit(name) and name not in own
+        if value > 0.0 and name in rows and name not in own
+        if "MAX" not in name and "MIN" not in name  # those are limits
     ]
-    for name in _most_explaining(evidence, names):
-        yield from _other_values(evidence, [name], RARE)
-
-
-def _is_limit(name: str) -> bool:
-    return "MAX" in name or "MIN" in name
-
-
-def _most_explaining(evidence: Evidence, names: list[str]) -> list[str]:
-    """Return the fixed values that would explain most, the first first."""
     linear = linear_fit(evidence)
     if linear is None or not names:
-        return []
-    freed = [freed_within(name, evidence.residuals.fixed[name], LARGEST_FACTOR) for name in names]
+        return
+    freed = [freed_within(name, fixed[name], LARGEST_FACTOR) for name in names]
     residuals = with_freed(evidence.residuals, freed)
     theta = np.append(evidence.solution.x, [each.scaled(each.start) for each in freed])
     try:
         _, slopes = residuals.errors(theta)
     except SimulationError:
-        return []
-    own = slopes[:, -len(freed) :]
-    sizes = np.linalg.norm(own, axis=0)
+        return
+    columns = slopes[:, -len(freed) :]
+    sizes = np.linalg.norm(columns, axis=0)
     costs = {
-        name: linear.with_columns(own[:, [k]]).cost
+        name: linear.with_columns(columns[:, [k]]).cost
         for k, name in enumerate(names)
         if np.isfinite(sizes[k]) and sizes[k] > DEPENDENT * np.nanmax(sizes)
     }
-    return sorted(costs, key=lambda name: costs[name])[:MOST_FIXED]
+    for name in sorted(costs, key=lambda name: costs[name])[:MOST_FIXED]:
+        yield from _other_values(evidence, [name], RARE)
 
 
 def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> Iterator[Suspicion]:
     fixed = evidence.residuals.fixed
     freed = [freed_within(name, fixed[name], LARGEST_FACTOR) for name in names]
+    trial = refitted(evidence, with_freed(evidence.residuals, freed))
+    if trial is None:
+        return
     part = "machine data" if of_machine(names) else "fixed values"
-
-    def cause(trial: Trial) -> Cause:
-        pairs = [f"{name} {trial.values[name]:.3g} (given {fixed[name]:g})" for name in names]
-        starts = {name: trial.values[name] for name in names}
-        return Cause(f"the {part}: {listed(pairs)} would match", remedy_of(evidence.case, starts))
-
-    def prior(trial: Trial) -> float:
-        ratios = [log(trial.values[name] / fixed[name]) for name in names]
-        return -0.5 * sum((ratio / USUAL_ERROR) ** 2 for ratio in ratios) - rare
-
-    yield from tried(evidence, with_freed(evidence.residuals, freed), len(names), cause, prior)
+    starts = {name: trial.values[name] for name in names}
+    pairs = [f"{name} {start:.3g} (given {fixed[name]:g})" for name, start in starts.items()]
+    cause = Cause(f"the {part}: {listed(pairs)} would match", remedy_of(evidence.case, starts))
+    ratios = [log(start / fixed[name]) for name, start in starts.items()]
+    prior = -0.5 * sum((ratio / USUAL_ERROR) ** 2 for ratio in ratios) - rare
+    yield from suspected(evidence, trial.cost, len(names), cause, prior)
 
 
 def of_machine(names: Sequence[str]) -> bool:
@@ -111,96 +109,99 @@ def of_machine(names: Sequence[str]) -> bool:
 
 
 def remedy_of(case: Case, starts: Mapping[str, float]) -> str:
-    """Word the remedy for values that may be wrong; a fit of them begins with ``starts``."""
-    sources = "nameplate and test reports" if of_machine([*starts]) else "the data sheet"
-    return ", ".join(filter(None, [f"check {sources}", freeing(case, starts)]))
+    """Word the remedy for values that may be wrong; a fit of them begins with ``starts``.
+
+    Where their part may have free values it gives the lines that free them.
+    """
+    names = [*starts]
+    check = f"check {'nameplate and test reports' if of_machine(names) else 'the data sheet'}"
+    part = next(
+        part
+        for part in reversed(case.parts.all)
+        if names[0].startswith(part.prefix) and names[0].removeprefix(part.prefix) in part.symbols
+    )
+    if part.free is None:
+        return check
+    values = case.values()
+    given = {symbol: values[part.prefix + symbol] for symbol in part.symbols}
+    freed = {name.removeprefix(part.prefix): start for name, start in starts.items()}
+    if any(part.check(given | freed)):  # what matches best may be no machine's
+        freed = {symbol: given[symbol] for symbol in freed}
+    ranges, lines = {row.symbol: row.domain for row in part.sheet}, list[str]()
+    for symbol, start in freed.items():
+        found = within(start, FACTOR, ranges[symbol])
+        # below 0 there is no log scale
+        lines.append(f"`{symbol}: {found if start > 0.0 else f'{found[:-1]}, scale: linear}}'}`")
+    places = f"under {dotted(part.free)}, in place of {dotted(part.fixed)}"
+    return f"{check}, or free {listed(names)}: {places}, {', '.join(lines)}"
 
 
 def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect limits: met too early, or never although those of the unit are."""
     fixed = evidence.residuals.fixed
-    for number, record in enumerate(evidence.records):
-        experiment = evidence.residuals.experiments[number]
+    for _, record, experiment in evidence.tests:
         at = record.setup.with_start_values(evidence.values)
         try:
             reached = extremes(experiment.with_inputs(at), experiment.parameters(at))
         except SimulationError:
             continue
-        nearest = sorted(reached, key=lambda extreme: -extreme.share)
-        by_limit = {extreme.limit: extreme for extreme in reversed(nearest)}
-        names = dict.fromkeys(extreme.limit for extreme in nearest)
-        for name in [name for name in names if fixed.get(name, 0.0) != 0.0][:MOST_LIMITS]:
-            yield from _other_limit(evidence, by_limit[name])
+        farthest: dict[str, Extreme] = {}
+        for extreme in sorted(reached, key=lambda extreme: -extreme.share):
+            if fixed.get(extreme.limit, 0.0) != 0.0:
+                farthest.setdefault(extreme.limit, extreme)
+        for extreme in [*farthest.values()][:MOST_LIMITS]:
+            yield from _other_limit(evidence, extreme)
 
 
 def _other_limit(evidence: Evidence, extreme: Extreme) -> Iterator[Suspicion]:
     name = extreme.limit
     given = evidence.residuals.fixed[name]
-    met = extreme.share >= 1.0
-    start = given if met else CUT * extreme.share * given
+    start = given if extreme.share >= 1.0 else CUT * extreme.share * given
     low, high = sorted((start / LARGEST_FACTOR, LARGEST_FACTOR * max(given / start, 1.0) * start))
     freed = FreeParameter(name, start, low, high, logarithmic=given > 0.0)
-
-    def cause(trial: Trial) -> Cause:
+    if trial := refitted(evidence, with_freed(evidence.residuals, [freed])):
         value = trial.values[name]
-        if abs(value) < abs(given):
-            return Cause(
-                f"a limit that the case does not have: {name} {value:.3g} would match (given "
-                f"{given:g})",
-                f"check {name} in the data sheet and the settings",
-            )
-        return Cause(
+        text = (
             f"the limit {name} {given:g}, which the response meets and the record does not: "
-            f"{value:.3g} or more would match",
-            f"check {name} in the data sheet and the settings",
+            f"{value:.3g} or more would match"
         )
-
-    yield from tried(evidence, with_freed(evidence.residuals, [freed]), 1, cause)
+        if abs(value) < abs(given):
+            text = f"a limit that the case does not have: {name} {value:.3g} would match"
+            text += f" (given {given:g})"
+        cause = Cause(text, f"check {name} in the data sheet and the settings")
+        yield from suspected(evidence, trial.cost, 1, cause)
 
 
 def narrow_bound(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect bounds that hold parameters although the record asks for more."""
-    residuals = evidence.residuals
-    sides = {
-        parameter.name: side
-        for parameter in residuals.free
-        if (side := parameter.bound(evidence.values[parameter.name])) is not None
-    }
+    residuals, sides, wider = evidence.residuals, dict[str, str](), list[FreeParameter]()
+    for each in residuals.free:
+        side = each.bound(evidence.values[each.name])
+        low, high = each.low, each.high
+        if side is not None:
+            sides[each.name] = side
+            more = WIDER * (high - low)
+            low, high = (
+                (low / WIDER, high * WIDER) if each.logarithmic else (low - more, high + more)
+            )
+        wider.append(replace(each, low=low, high=high))
     if not sides:
         return
-    wider = [
-        _widened(parameter) if parameter.name in sides else parameter
-        for parameter in residuals.free
-    ]
-
-    def cause(trial: Trial) -> Cause:
+    if trial := refitted(evidence, replace(residuals, free=wider, counter=None)):
         held = [f"{name} on its {side}" for name, side in sides.items()]
         values = [f"{name} {trial.values[name]:.3g}" for name in sides]
-        return Cause(
+        cause = Cause(
             f"the bounds: {listed(held)}; beyond, {listed(values)} would match",
             "widen the bounds where the data sheet allows it",
         )
-
-    yield from tried(evidence, replace(residuals, free=wider, counter=None), len(sides), cause)
-
-
-def _widened(parameter: FreeParameter) -> FreeParameter:
-    if parameter.logarithmic:
-        return replace(parameter, low=parameter.low / WIDER, high=parameter.high * WIDER)
-    more = WIDER * (parameter.high - parameter.low)
-    return replace(parameter, low=parameter.low - more, high=parameter.high + more)
+        yield from suspected(evidence, trial.cost, len(sides), cause)
 
 
 def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the iterations of a case of being too few."""
     if evidence.solution.stop in (Stop.ITERATIONS, Stop.EVALUATIONS):
-        yield Suspicion(
-            Cause(
-                "the search had too few iterations",
-                "increase estimate.iterations, or use the default search",
-            ),
-            CERTAIN,
-        )
+        remedy = "increase estimate.iterations, or use the default search"
+        yield Suspicion(Cause("the search had too few iterations", remedy), CERTAIN)
 
 
 def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:

@@ -12,8 +12,7 @@ from tiers import few_of
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
 from exfit.verdict.causes.channels import check_zero
-from exfit.verdict.causes.lines import delay_found
-from exfit.verdict.causes.steps import correct_instant, correct_step
+from exfit.verdict.causes.steps import correct_instant, correct_step, delay_found
 from exfit.verdict.causes.unit import remedy_of
 from exfit.verdict.score_tests import parameters_of
 from exfit.workflows import fit
