@@ -116,7 +116,7 @@ class Inspection:
             return (
                 *_clock_findings(self),
                 *filter(None, (self.flagged, *lacking)),
-                *_angle_findings(self),
+                *self._angle_findings(),
             )
         of_channels = (finding for channel in self.channels for finding in channel.findings)
         opening = self.opening
@@ -128,6 +128,15 @@ class Inspection:
             *contradictions(self.channels, of_reference),
             *base_findings(self.channels),
         )
+
+    def _angle_findings(self) -> Iterator[str]:
+        """Find what speaks against the angle of a PMU: its turns, and the frequency beside it."""
+        pmu = self.pmu
+        if pmu is not None and pmu.voltage.angle_unit is not None:
+            angle = pmu.voltage.angles[0]
+            frequency = None if pmu.frequency is None else self.samples[pmu.frequency]
+            radians = in_radians(self.samples[angle], pmu.voltage.angle_unit)
+            yield from angle_findings(self.time, angle, radians, frequency)
 
     @property
     def foremost(self) -> tuple[InspectedChannel, ...]:
@@ -187,7 +196,8 @@ def inspect(
     units = {name: _unit(table, name) for name in samples}
     stated = {name: unit for name, (unit, _) in units.items() if unit}
     pmu = pmu_content(samples, stated, table.names)
-    plain = samples if pmu is None else pmu.without_phasors(samples)
+    of_pmu = frozenset() if pmu is None else pmu.columns.intersection(samples)
+    plain = {name: column for name, column in samples.items() if name not in of_pmu}
     groups = tuple(_phase_groups(time, plain, stated))
 
     signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
@@ -196,7 +206,7 @@ def inspect(
         inspect_channel(name, units[name], time, column, found.channels[name], found.steps)
         for name, column in samples.items()
     ]
-    channels = identified(inspected, found.steps, groups, {*samples} - {*plain})
+    channels = identified(inspected, found.steps, groups, of_pmu)
     opening = breaker_opening(time, samples, channels)
     return Inspection(
         path=table.path,
@@ -220,13 +230,12 @@ def _clock_of(
     table: RecordTable, columns: Sequence[str] | None, unit: str | None
 ) -> tuple[Clock, Array]:
     """Find the clock of a file and its time (M,) in s, which need not increase."""
-    columns = tuple(columns or table.clock)
-    if not columns:
+    clock = Clock(tuple(columns or table.clock), unit)
+    if not clock.columns:
         raise RecordError(
             f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
         )
-    clock = Clock(columns, unit)
-    stamps = table.instants(columns, unit)
+    stamps = table.instants(clock.columns, unit)
     if len(stamps) < FEWEST_SAMPLES:
         raise RecordError(
             f"{table.path}: {len(stamps)} samples; at least {FEWEST_SAMPLES} are needed"
@@ -243,17 +252,31 @@ def _columns_of_numbers(
 
     Raises RecordError where there is none.
     """
+
+    def numbers(names: Sequence[str]) -> dict[str, Array]:
+        columns = table.numbers(names, frozenset(names))
+        refuse_uneven(table.path, {clock.columns[0]: stamps, **columns})
+        for name, column in columns.items():
+            huge = np.isfinite(column) & (np.abs(column) > LARGEST)
+            if huge.any():
+                row = int(huge.argmax())
+                what = f"{column[row]} {why_unusable(column[row])}"
+                raise column_error(table.place(row), name, what)
+        return columns
+
     names = [name for name in table.names if name not in clock.columns]
     refused: dict[str, str] = {}
     try:
-        columns = _numbers(table, names, clock, stamps)
+        columns = numbers(names)
     except StoppedError:
         raise
     except RecordError:
         columns = {}
         for name in names:
             try:
-                columns |= _numbers(table, [name], clock, stamps)
+                columns |= numbers([name])
+            except StoppedError:
+                raise
             except RecordError as fault:
                 refused[name] = str(fault)
     if not columns:
@@ -261,26 +284,11 @@ def _columns_of_numbers(
     return columns, refused
 
 
-def _numbers(
-    table: RecordTable, names: Sequence[str], clock: Clock, stamps: Array
-) -> dict[str, Array]:
-    columns = table.numbers(names, frozenset(names))
-    refuse_uneven(table.path, {clock.columns[0]: stamps, **columns})
-    for name, column in columns.items():
-        huge = np.isfinite(column) & (np.abs(column) > LARGEST)
-        if huge.any():
-            row = int(huge.argmax())
-            raise column_error(table.place(row), name, f"{column[row]} {why_unusable(column[row])}")
-    return columns
-
-
 def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
     """Find the unit of a column and its source."""
     stated = table.units.get(name)
-    if stated is not None:
-        return usual(stated), "file"
-    unit = unit_in(name)
-    return (None, "") if unit is None else (usual(unit), "name")
+    unit = unit_in(name) if stated is None else stated
+    return (None, "") if unit is None else (usual(unit), "name" if stated is None else "file")
 
 
 def _recognised(
@@ -327,17 +335,6 @@ def _flagged(table: RecordTable, pmu: PmuContent | None) -> str:
         f"{pmu.status}: {count} not valid, the first at {table.place(first.row)}: {first.flag}, "
         f"{first.why}"
     )
-
-
-def _angle_findings(inspection: Inspection) -> Iterator[str]:
-    """Find what speaks against the angle of a PMU: its turns, and the frequency beside it."""
-    pmu = inspection.pmu
-    if pmu is None or pmu.voltage.angle_unit is None:
-        return
-    (angle, *_), unit = pmu.voltage.angles, pmu.voltage.angle_unit
-    frequency = None if pmu.frequency is None else inspection.samples[pmu.frequency]
-    radians = in_radians(inspection.samples[angle], unit)
-    yield from angle_findings(inspection.time, angle, radians, frequency)
 
 
 def _clock_findings(inspection: Inspection) -> Iterator[str]:

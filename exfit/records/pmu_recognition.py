@@ -73,10 +73,6 @@ class PmuContent:
         others = (self.frequency, self.rate, self.status)
         return frozenset((*named, *(name for name in others if name is not None)))
 
-    def without_phasors(self, samples: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the other columns."""
-        return {name: column for name, column in samples.items() if name not in self.columns}
-
 
 @dataclass(frozen=True)
 class _Pair:

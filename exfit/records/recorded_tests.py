@@ -1,7 +1,7 @@
 """The tests that a recorder's file holds: each step, or steps and their return, with a window."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, inf
 
@@ -61,17 +61,30 @@ class DetectedTest:
 
 def tests_of(inspection: Inspection) -> tuple[DetectedTest, ...]:
     """Return the tests of a record in order of time; none where it shows no step."""
-    if not inspection.steps:
+    steps = inspection.steps
+    if not steps:
         return ()
-    settled = _settled(inspection)
-    tests = [
-        replace(test, window=_window(test, before, after))
-        for test, before, after in _groups(inspection, settled)
-    ]
-    begins = [test.window[0] for test in tests[1:]]
+    settled, tests = _settled(inspection), list[DetectedTest]()
+    before, last = float(inspection.time[0]), float(inspection.time[-1])
+    begins = [k for k, step in enumerate(steps) if k == 0 or step.at - settled[k - 1] >= LEAST_REST]
+    for begin, end in zip(begins, [*begins[1:], len(steps)], strict=True):
+        own = steps[begin:end]
+        after = steps[end].at - INSTANT_WITHIN - steps[end].error if end < len(steps) else last
+        response = settled[end - 1] - own[-1].at
+        rest = min(max(REST[0], REST[1] * response), LONGEST_REST)
+        shown = max(SHORTEST_SHOWN, response + min(response, LONGEST_AFTERWARDS))
+        start, stop = max(before, own[0].at - rest), min(after, own[-1].at + shown)
+        window = (
+            start if start == before else ceil(10.0 * start) / 10.0,
+            stop if stop == after else floor(10.0 * stop) / 10.0,
+        )
+        changes = tuple(_change(inspection, step) for step in own)
+        tests.append(DetectedTest(own, window, changes))
+        before = min(settled[end - 1], after)
+    begins_at = [test.window[0] for test in tests[1:]]
     return tuple(
         replace(test, window=(test.window[0], min(test.window[1], begin)))
-        for test, begin in zip(tests, [*begins, inf], strict=True)
+        for test, begin in zip(tests, [*begins_at, inf], strict=True)
     )
 
 
@@ -94,58 +107,29 @@ def unique_names(names: Sequence[str], tests: Sequence[DetectedTest]) -> list[st
     ]
 
 
-def _groups(
-    inspection: Inspection, settled: Sequence[float]
-) -> Iterator[tuple[DetectedTest, float, float]]:
-    """Yield each test, still without its window, and between what instants that may lie."""
-    steps, first, last = inspection.steps, float(inspection.time[0]), float(inspection.time[-1])
-    begins = [k for k, step in enumerate(steps) if k == 0 or step.at - settled[k - 1] >= LEAST_REST]
-    before = first
-    for begin, end in zip(begins, [*begins[1:], len(steps)], strict=True):
-        own = steps[begin:end]
-        after = steps[end].at - INSTANT_WITHIN - steps[end].error if end < len(steps) else last
-        changes = tuple(_change(inspection, step) for step in own)
-        yield DetectedTest(own, (first, settled[end - 1]), changes), before, after
-        before = min(settled[end - 1], after)
-
-
-def _window(test: DetectedTest, before: float, after: float) -> tuple[float, float]:
-    """Return the window of a test whose own ends where it has settled; between two instants."""
-    response = test.window[1] - test.steps[-1].at
-    rest = min(max(REST[0], REST[1] * response), LONGEST_REST)
-    shown = max(SHORTEST_SHOWN, response + min(response, LONGEST_AFTERWARDS))
-    start, end = max(before, test.at - rest), min(after, test.steps[-1].at + shown)
-    return (
-        start if start == before else ceil(10.0 * start) / 10.0,
-        end if end == after else floor(10.0 * end) / 10.0,
-    )
-
-
 def _settled(inspection: Inspection) -> list[float]:
     """Find when the response to each step has settled, s; where the next begins at most."""
     present = present_samples(inspection.time, _voltage(inspection))
     block = max(round(SMOOTHED_OVER / inspection.sampling.step), 1)
     time, response = block_medians(*present, block)
     ends = [*(step.at for step in inspection.steps[1:]), float(inspection.time[-1])]
-    return [
-        _settled_at(time, response, step.at, min(end, step.at + LONGEST_RESPONSE))
-        for step, end in zip(inspection.steps, ends, strict=False)
-    ]
-
-
-def _settled_at(time: Array, response: Array, start: float, end: float) -> float:
-    """Find when a response to a step at ``start`` is near its end for good."""
-    first, last = np.searchsorted(time, [start, end])
-    if last - first < FEWEST_SMOOTHED:
-        return start
-    t, scatter = time[first:last], noise(response[first:last])
-    y = running_median(response[first:last])
-    before, level = (float(np.median(part)) for part in np.array_split(y, QUARTERS)[-2:])
-    far = max(SETTLED * float(np.max(np.abs(y - level))), NOISE_OF_SETTLED * scatter)
-    if abs(level - before) > far:
-        return end
-    away = np.flatnonzero(np.abs(y - level) > far)
-    return float(t[min(away[-1] + 1, len(t) - 1)]) if len(away) else start
+    settled = []
+    for step, next_at in zip(inspection.steps, ends, strict=True):
+        end = min(next_at, step.at + LONGEST_RESPONSE)
+        first, last = np.searchsorted(time, [step.at, end])
+        if last - first < FEWEST_SMOOTHED:
+            settled.append(step.at)
+            continue
+        t, scatter = time[first:last], noise(response[first:last])
+        y = running_median(response[first:last])
+        before, level = (float(np.median(part)) for part in np.array_split(y, QUARTERS)[-2:])
+        far = max(SETTLED * float(np.max(np.abs(y - level))), NOISE_OF_SETTLED * scatter)
+        away = np.flatnonzero(np.abs(y - level) > far)
+        if abs(level - before) > far:
+            settled.append(end)
+        else:
+            settled.append(float(t[min(away[-1] + 1, len(t) - 1)]) if len(away) else step.at)
+    return settled
 
 
 def _voltage(inspection: Inspection) -> Array:

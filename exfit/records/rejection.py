@@ -83,31 +83,38 @@ def breaker_opening(
     if not loads:
         return None if voltage is None else _jump(time, samples[voltage.name], voltage)
     opening = _fall(time, samples, loads)
-    if opening is None or voltage is None:
-        return opening
-    return opening if _goes_on(time, samples[voltage.name], opening) else None
-
-
-def _goes_on(time: Array, voltage: Array, opening: BreakerOpening) -> bool:
-    """Check for a voltage after the opening, as before."""
-    begin, end = opening.at - opening.error, opening.at + opening.error
-    before = voltage[(time < begin) & (time >= begin - LOOKED_AT_AFTER)]
-    after = voltage[(time > end) & (time <= end + LOOKED_AT_AFTER)]
-    low = STILL_EXCITED * abs(float(np.nanmedian(before)))
-    return abs(float(np.nanmedian(after))) > low
+    if opening is not None and voltage is not None:
+        begin, end = opening.at - opening.error, opening.at + opening.error
+        u = samples[voltage.name]
+        before = float(np.nanmedian(u[(time < begin) & (time >= begin - LOOKED_AT_AFTER)]))
+        after = float(np.nanmedian(u[(time > end) & (time <= end + LOOKED_AT_AFTER)]))
+        if not abs(after) > STILL_EXCITED * abs(before):
+            return None
+    return opening
 
 
 def _fall(
     time: Array, samples: Mapping[str, Array], loads: Mapping[str, InspectedChannel]
 ) -> BreakerOpening | None:
     """Find the fall of powers and currents to zero, None where any of them does not."""
-    smooth = {
-        signal: _smoothed(*present_samples(time, samples[channel.name]))
+    times, smooth, largest = dict[str, Array](), dict[str, Array](), dict[str, float]()
+    for signal, channel in loads.items():
+        t, y = present_samples(time, samples[channel.name])
+        few = len(y) < 4 * FEWEST_BESIDE
+        times[signal], smooth[signal] = (t[:0], y[:0]) if few else (t, running_median(y))
+        largest[signal] = float(np.max(np.abs(smooth[signal]), initial=0.0))
+    power = max((largest[signal] for signal in POWERS if signal in largest), default=0.0)
+    zeros = {  # what counts as zero; powers have one scale
+        signal: max(
+            NEAR_ZERO * (largest[signal] if signal == CURRENT else power),
+            NOISE_OF_ZERO * channel.noise,
+        )
         for signal, channel in loads.items()
     }
-    zeros = _zeros({signal: y for signal, (_, y) in smooth.items()}, loads)
-    falls = {signal: _fall_of(*smooth[signal], zeros[signal]) for signal in loads}
-    certain = [signal for signal in loads if falls[signal].is_certain(zeros[signal])]
+    falls = {signal: _fall_of(times[signal], smooth[signal], zeros[signal]) for signal in loads}
+    certain = [
+        signal for signal in loads if abs(falls[signal].level) > CERTAIN_FALL * zeros[signal]
+    ]
     if not certain or any(fall.remains for fall in falls.values()):
         return None
     first = min(map(falls.__getitem__, certain), key=attrgetter("start"))
@@ -119,26 +126,6 @@ def _fall(
     )
 
 
-def _smoothed(time: Array, samples: Array) -> tuple[Array, Array]:
-    """Return the instants and running medians (M,); none of a few samples."""
-    if len(samples) < 4 * FEWEST_BESIDE:
-        return np.zeros(0), np.zeros(0)
-    return time, running_median(samples)
-
-
-def _zeros(smooth: Mapping[str, Array], loads: Mapping[str, InspectedChannel]) -> dict[str, float]:
-    """Level of each signal that counts as zero; powers have one scale."""
-    largest = {signal: float(np.max(np.abs(y), initial=0.0)) for signal, y in smooth.items()}
-    power = max((largest[signal] for signal in POWERS if signal in largest), default=0.0)
-    return {
-        signal: max(
-            NEAR_ZERO * (largest[signal] if signal == CURRENT else power),
-            NOISE_OF_ZERO * loads[signal].noise,
-        )
-        for signal in smooth
-    }
-
-
 class _Fall(NamedTuple):
     """The last fall of a signal to zero: its level before, the two samples between, its end."""
 
@@ -146,10 +133,6 @@ class _Fall(NamedTuple):
     start: float = 0.0
     end: float = 0.0
     remains: bool = False
-
-    def is_certain(self, zero: float) -> bool:
-        """Check whether the level is well above what counts as zero."""
-        return abs(self.level) > CERTAIN_FALL * zero
 
 
 def _fall_of(time: Array, smooth: Array, zero: float) -> _Fall:

@@ -103,24 +103,20 @@ def steps_of_record(
         heard = own
     combined = combined_steps({name: channel.changes for name, channel in heard.items()})
     responding = {name: signals[name] for name, channel in heard.items() if channel.responds}
-    steps = tuple(_sharpened(time, responding, combined))
     moving = {name: y for name, y in signals.items() if own[name].frequency is None}
     noises = {name: channel.noise for name, channel in own.items()}
-    steps = with_sizes(steps, moving, noises, time)
-    return StepsOfRecord(steps, {name: _lasting(name, own[name], steps) for name in own})
+    steps = with_sizes([*_sharpened(time, responding, combined)], moving, noises, time)
+    for name, channel in own.items():
+        changes = []
+        for change in channel.changes:  # the size that lasts, where it does
+            step = min(steps, key=lambda step: abs(step.at - change.at))
+            changes.append(replace(change, size=step.sizes.get(name, change.size)))
+        own[name] = replace(channel, changes=tuple(changes))
+    return StepsOfRecord(steps, own)
 
 
 def _some_step(channels: Mapping[str, ChannelSteps]) -> bool:
     return any(channel.changes for channel in channels.values())
-
-
-def _lasting(name: str, channel: ChannelSteps, steps: Sequence[RecordedStep]) -> ChannelSteps:
-    """Give the steps of a channel the size that lasts, where it does."""
-    changes = []
-    for change in channel.changes:
-        step = min(steps, key=lambda step: abs(step.at - change.at))
-        changes.append(replace(change, size=step.sizes.get(name, change.size)))
-    return replace(channel, changes=tuple(changes))
 
 
 def bounds_of_instant(at: float, time: Array) -> tuple[float, float]:
@@ -146,10 +142,22 @@ def _steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSt
     frequency = mains_frequency(t, y)
     if frequency:
         return ChannelSteps(remark=f"a waveform of {frequency:.4g} Hz", frequency=frequency)
-    if _switches(y):
-        if reference:
-            return ChannelSteps(tuple(_jumps(t, y)))
-        return ChannelSteps(remark="switches between a few levels")
+    jumps = np.flatnonzero(np.diff(y))
+    levels = np.diff([-1, *jumps, len(y) - 1])  # how many samples each has
+    if len(jumps) < MOST_LEVELS and np.min(levels) >= SAMPLES_AT_REST:  # as a recorded reference
+        if not reference:
+            return ChannelSteps(remark="switches between a few levels")
+        changes = tuple(
+            DetectedStep(
+                at=float(t[k] + t[k + 1]) / 2.0,
+                error=float(t[k + 1] - t[k]) / 2.0,
+                size=float(y[k + 1] - y[k]),
+                level=float(y[k]),
+                jumps=True,
+            )
+            for k in jumps
+        )
+        return ChannelSteps(changes)
     noise, block = noise_of(y), -(-len(y) // COARSE_SAMPLES)
     try:
         steps = find_steps(*block_medians(t, y, block))
@@ -158,24 +166,6 @@ def _steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSt
         return ChannelSteps(remark=str(fault), moves_from_start=early, responds=True, noise=noise)
     changes = tuple(_refined(t, y, step, block) for step in steps)
     return ChannelSteps(changes, responds=True, noise=noise)
-
-
-def _switches(samples: Array) -> bool:
-    """Check whether a channel jumps between a few levels, as a recorded reference does."""
-    jumps = np.flatnonzero(np.diff(samples)) + 1
-    ends = np.concatenate([[0], jumps, [len(samples)]])
-    return 0 < len(jumps) < MOST_LEVELS and bool(np.min(np.diff(ends)) >= SAMPLES_AT_REST)
-
-
-def _jumps(time: Array, samples: Array) -> Iterator[DetectedStep]:
-    for k in np.flatnonzero(np.diff(samples)):
-        yield DetectedStep(
-            at=float(time[k] + time[k + 1]) / 2.0,
-            error=float(time[k + 1] - time[k]) / 2.0,
-            size=float(samples[k + 1] - samples[k]),
-            level=float(samples[k]),
-            jumps=True,
-        )
 
 
 def _refined(time: Array, samples: Array, coarse: DetectedStep, block: int) -> DetectedStep:
@@ -231,23 +221,6 @@ def combined_steps(changes: Mapping[str, Sequence[DetectedStep]]) -> tuple[Recor
     return tuple(_combined(group) for group in groups)
 
 
-def _close(change: DetectedStep, others: Iterable[DetectedStep]) -> bool:
-    """Check whether a channel may show the step that one of the others shows."""
-    return any(
-        change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
-        for other in others
-    )
-
-
-def _returns(name: str, change: DetectedStep, group: Mapping[str, DetectedStep]) -> bool:
-    """Check whether a channel only returns from its first move, as a field voltage does."""
-    first = group.get(name)
-    if first is None or change.jumps or change.size * first.size > 0.0:
-        return False
-    still_moving = any(change.at < other.until for key, other in group.items() if key != name)
-    return still_moving and abs(change.size) <= abs(first.size)
-
-
 def _combined(group: Mapping[str, DetectedStep]) -> RecordedStep:
     """Combine what channels show of one step.
 
@@ -266,6 +239,23 @@ def _combined(group: Mapping[str, DetectedStep]) -> RecordedStep:
         from_start=all(change.from_start for change in group.values()),
         recorded=any(change.jumps for change in group.values()),
     )
+
+
+def _close(change: DetectedStep, others: Iterable[DetectedStep]) -> bool:
+    """Check whether a channel may show the step that one of the others shows."""
+    return any(
+        change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
+        for other in others
+    )
+
+
+def _returns(name: str, change: DetectedStep, group: Mapping[str, DetectedStep]) -> bool:
+    """Check whether a channel only returns from its first move, as a field voltage does."""
+    first = group.get(name)
+    if first is None or change.jumps or change.size * first.size > 0.0:
+        return False
+    still_moving = any(change.at < other.until for key, other in group.items() if key != name)
+    return still_moving and abs(change.size) <= abs(first.size)
 
 
 def _first_of(intervals: Sequence[Onset]) -> Onset:
