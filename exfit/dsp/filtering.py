@@ -1,5 +1,6 @@
 """Filters that a recorded signal and its simulation both pass before they are compared."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +21,7 @@ BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice
 FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
 FEWEST_AVERAGED = 2  # samples of a line
 FEWEST_IN_WINDOW = 16  # samples: lines through fewer err by 1 % of what an average does, or more
+NODES = 8  # of a window, by Gauss and Legendre: exact for polynomials of order 15
 OUTLIER_WINDOW = 7  # samples, of which the middle one is compared with the rest; 3 may be spikes
 
 
@@ -80,10 +82,25 @@ class Filtering:
     def __post_init__(self) -> None:
         if not self.kept.any():
             raise ValueError("no sample is kept")
+        count = len(self.time)
         if isinstance(self.filter, LowPass):
-            _check_filter(self.time, self.filter.cutoff)
+            if count < FEWEST_FILTERED:
+                raise ValueError(
+                    f"{count} samples: the low-pass filter needs at least {FEWEST_FILTERED}"
+                )
+            step = even_step(self.time, "the low-pass filter")
+            cutoff, lowest = self.filter.cutoff, LOWEST_CUTOFF / step
+            if not lowest <= cutoff < 0.5 / step:
+                raise ValueError(
+                    f"cutoff of {cutoff:g} Hz: it must lie between {lowest:g} Hz and half the "
+                    f"sampling rate, {0.5 / step:g} Hz"
+                )
         if self.averaged is not None:
-            _check_average(self.time, self.averaged.window)
+            if count < FEWEST_AVERAGED:
+                raise ValueError(f"{count} samples: an average needs at least {FEWEST_AVERAGED}")
+            window, length = self.averaged.window, self.time[-1] - self.time[0]
+            if window > length:
+                raise ValueError(f"an average over {window:g} s: the record is {length:g} s long")
 
     def as_recorded(self, simulated: Array) -> Array:
         """Return simulated values (M, ...) as the record shows them: averaged, where it is so.
@@ -109,25 +126,20 @@ class Filtering:
 
     def apply(self, samples: Array) -> Array:
         """Filter a signal (M,) as it is compared, one number for each kept sample."""
-        if self._nothing_to_do:
-            return samples
-        whole = self._bridged(samples)
-        if isinstance(self.filter, LowPass):
-            whole = self._low_passed(whole)
-        elif isinstance(self.filter, Median):
-            whole = whole[_picked(whole, self.filter.samples)]
-        return np.asarray(whole[self.kept])
+        return self.tangents(samples, samples)
 
     def tangents(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives (kept, N) of ``apply`` at a signal of derivatives (M, N).
 
         Where the median may pick one of several equal samples, it is that of one of them.
         """
-        if self._nothing_to_do:
+        if self.filter is None and bool(self.kept.all()):
             return slopes
         whole = self._bridged(slopes)
         if isinstance(self.filter, LowPass):
-            whole = self._low_passed(whole)
+            from scipy.signal import sosfiltfilt
+
+            whole = np.asarray(sosfiltfilt(self._sections, whole, axis=0))
         elif isinstance(self.filter, Median):
             whole = whole[_picked(self._bridged(samples), self.filter.samples)]
         return np.asarray(whole[self.kept])
@@ -144,10 +156,6 @@ class Filtering:
         """The window (s) of averages, of which the samples hold too few for lines; else 0."""
         few = self.averaged is not None and self.smooth_over < FEWEST_IN_WINDOW
         return self.averaged.window if few and self.averaged is not None else 0.0
-
-    @cached_property
-    def _nothing_to_do(self) -> bool:
-        return self.filter is None and bool(self.kept.all())
 
     @cached_property
     def _windows(self) -> tuple[tuple[Places, Array], tuple[Places, Array]]:
@@ -191,11 +199,6 @@ class Filtering:
         rate = 1.0 / float(np.mean(np.diff(self.time)))
         return np.asarray(butter(BUTTERWORTH_ORDER, self.filter.cutoff, fs=rate, output="sos"))
 
-    def _low_passed(self, values: Array) -> Array:
-        from scipy.signal import sosfiltfilt
-
-        return np.asarray(sosfiltfilt(self._sections, values, axis=0))
-
 
 def outliers(time: Array, samples: Array, limit: float, scatter: float | None = None) -> Mask:
     """Find the samples (M,) that lie off the line through the medians of their neighbours.
@@ -219,51 +222,19 @@ def outliers(time: Array, samples: Array, limit: float, scatter: float | None = 
         raise ValueError(
             f"{len(samples)} samples: spikes are found among at least {OUTLIER_WINDOW}"
         )
-    from_line = _from_lines(
-        sliding_window_view(time, OUTLIER_WINDOW), sliding_window_view(samples, OUTLIER_WINDOW)
-    )
+    t, y = (sliding_window_view(values, OUTLIER_WINDOW) for values in (time, samples))
+    slopes = []  # of the repeated median: of the slopes to the others from each sample
+    for k in range(OUTLIER_WINDOW):
+        rest = np.flatnonzero(np.arange(OUTLIER_WINDOW) != k)
+        slopes.append(median((y[:, rest] - y[:, [k]]) / (t[:, rest] - t[:, [k]]), axis=1))
+    slope = median(slopes, axis=0)
+    level = y - slope[:, None] * (t - t[:, [OUTLIER_WINDOW // 2]])
+    from_line = np.asarray(level - median(level, axis=1, keepdims=True))
     place = np.arange(len(samples))
     window = np.clip(place - OUTLIER_WINDOW // 2, 0, len(samples) - OUTLIER_WINDOW)
     away = np.abs(from_line[window, place - window])
     scale = np.maximum(spread(from_line), noise(samples) if scatter is None else scatter)
     return np.asarray(away > limit * scale[window])
-
-
-def _from_lines(time: Array, samples: Array) -> Array:
-    """Distance of each sample of each row from the row's repeated-median line."""
-    others = [np.flatnonzero(np.arange(OUTLIER_WINDOW) != k) for k in range(OUTLIER_WINDOW)]
-    slopes = [
-        median((samples[:, rest] - samples[:, [k]]) / (time[:, rest] - time[:, [k]]), axis=1)
-        for k, rest in enumerate(others)
-    ]
-    slope = median(slopes, axis=0)
-    level = samples - slope[:, None] * (time - time[:, [OUTLIER_WINDOW // 2]])
-    return np.asarray(level - median(level, axis=1, keepdims=True))
-
-
-def _check_filter(time: Array, cutoff: float) -> None:
-    """Raise a ValueError where a low-pass filter cannot work."""
-    if len(time) < FEWEST_FILTERED:
-        raise ValueError(
-            f"{len(time)} samples: the low-pass filter needs at least {FEWEST_FILTERED}"
-        )
-    step = even_step(time, "the low-pass filter")
-    lowest = LOWEST_CUTOFF / step
-    if not lowest <= cutoff < 0.5 / step:
-        raise ValueError(
-            f"cutoff of {cutoff:g} Hz: it must lie between {lowest:g} Hz and half the sampling "
-            f"rate, {0.5 / step:g} Hz"
-        )
-
-
-def _check_average(time: Array, window: float) -> None:
-    """Raise a ValueError where a moving average has nothing to average."""
-    if len(time) < FEWEST_AVERAGED:
-        raise ValueError(f"{len(time)} samples: an average needs at least {FEWEST_AVERAGED}")
-    if window > time[-1] - time[0]:
-        raise ValueError(
-            f"an average over {window:g} s: the record is {time[-1] - time[0]:g} s long"
-        )
 
 
 def _picked(samples: Array, width: int) -> Places:
@@ -272,3 +243,42 @@ def _picked(samples: Array, width: int) -> Places:
     around = np.clip(around, 0, len(samples) - 1)
     middle = np.argpartition(samples[around], width // 2, axis=1)[:, [width // 2]]
     return np.asarray(np.take_along_axis(around, middle, axis=1)[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class Averages:
+    """Where a simulation is read about each sample, and what of that each signal shows.
+
+    ``offsets`` (n,) are s from the sample, ``weights`` (signals, n).
+    """
+
+    offsets: Array
+    weights: Array
+
+    def times(self, samples: Array) -> Array:
+        """Return the instants (M n,) at which a simulation is read for samples at (M,) s."""
+        return np.ravel(samples[:, None] + self.offsets)
+
+    def of(self, read: Array, axis: int = 0) -> Array:
+        """Return averages (..., M, signals, ...) of what was read, (..., M n, signals, ...)."""
+        shape = (*read.shape[:axis], -1, len(self.offsets), *read.shape[axis + 1 :])
+        parts = np.moveaxis(read.reshape(shape), [axis, axis + 1, axis + 2], [0, 1, 2])
+        means = np.einsum("mns...,sn->ms...", parts, self.weights)
+        return np.moveaxis(means, [0, 1], [axis, axis + 1])
+
+
+def averages_of(filterings: Sequence[Filtering | None]) -> Averages | None:
+    """Return the averages of signals whose windows hold few samples, None where none has such."""
+    windows = [0.0 if each is None else each.window_between for each in filterings]
+    if not any(windows):
+        return None
+    distinct = sorted({*windows} - {0.0})
+    nodes, shares = np.polynomial.legendre.leggauss(NODES)
+    offsets = np.concatenate([[0.0], *(0.5 * window * nodes for window in distinct)])
+    weights = np.zeros((len(windows), len(offsets)))
+    for own, window in zip(weights, windows, strict=True):
+        if window:
+            own[1 + NODES * distinct.index(window) :][:NODES] = 0.5 * shares
+        else:
+            own[0] = 1.0
+    return Averages(offsets, weights)

@@ -108,23 +108,18 @@ def stuck(samples: Array) -> tuple[tuple[int, int], ...]:
         return ((0, len(samples) - 1),)
     if np.max(lengths) <= FEWEST_STUCK:
         return ()
-    repeats = _repeats(samples, starts, lengths)
+    longest = int(np.argmax(lengths))
+    others = np.delete(samples, slice(starts[longest], starts[longest] + lengths[longest]))
+    _, counts = np.unique(others, return_counts=True)
+    share = float(np.max(counts)) / len(others) if np.max(counts) > 1 else 0.0
+    # that a sample repeats the one before, the longest run left out
+    repeats = max(share, float(np.sum(np.delete(lengths, longest) - 1)) / len(others))
     if repeats >= 1.0:  # two levels, as of a switch: each stays by its nature
         return ()
     chances = len(samples) * (1.0 - repeats)
     longest_by_chance = log(max(chances, 1.0)) / -log(repeats) if repeats > 0.0 else 1.0
     long = np.flatnonzero(lengths > max(STUCK_RUN * longest_by_chance, FEWEST_STUCK))
     return tuple((int(starts[k]), int(starts[k] + lengths[k] - 1)) for k in long)
-
-
-def _repeats(samples: Array, starts: Places, lengths: Places) -> float:
-    """Probability that a sample repeats the one before, the longest run left out."""
-    longest = int(np.argmax(lengths))
-    others = np.delete(samples, slice(starts[longest], starts[longest] + lengths[longest]))
-    _, counts = np.unique(others, return_counts=True)
-    share = float(np.max(counts)) / len(others)
-    runs = np.delete(lengths, longest)
-    return max(share if np.max(counts) > 1 else 0.0, float(np.sum(runs - 1)) / len(others))
 
 
 def mains_frequency(time: Array, samples: Array) -> float | None:

@@ -1,11 +1,12 @@
-"""The clock of a record: how evenly it runs, where it jumps, repeats or goes back."""
+"""The samples of a record: how evenly its clock runs, where it jumps; few points that show many."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.util.sorting import median
+from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -13,6 +14,7 @@ Mask = NDArray[np.bool_]
 GAP_STEPS = 3.0  # median steps: a longer one is a gap
 MOST_UNEVEN = 0.01  # of a sampling step: steps that differ by more are uneven
 FEWEST_STAMPS = 2  # that have a step between them
+PIXELS = 2000  # a figure has no more dots across
 
 
 @dataclass(frozen=True)
@@ -100,3 +102,31 @@ def sampling_of(time: Array) -> Sampling:
     smallest, largest = (float(np.min(usual)), float(np.max(usual))) if len(usual) else (0.0, 0.0)
     backward = tuple(int(k) for k in np.flatnonzero(~forward))
     return Sampling(float(valid[0]), float(valid[-1]), step, smallest, largest, gaps, backward)
+
+
+def envelope(x: Array, y: Array, bins: int = PIXELS) -> tuple[Array, Array]:
+    """Return a line (M,) thinned to the least and greatest value of each of the bins.
+
+    A line with no more points than that stays as it is; a gap (nan) as long as a bin stays one.
+    """
+    rows = kept_rows([y], bins)
+    return x[rows], y[rows]
+
+
+def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
+    """Return the rows that hold the least and greatest of each signal (M,) in each of the bins.
+
+    The first and last row are always among them, and all where they are not many more than these.
+    """
+    count = len(signals[0])
+    if count <= 2 * bins * len(signals):
+        return np.arange(count)
+    size = -(-count // bins)
+    starts = np.arange(0, count, size)
+    rows = [np.array([0, count - 1])]
+    for signal in signals:
+        for pick, beyond in ((np.argmin, np.inf), (np.argmax, -np.inf)):
+            filled = np.full(len(starts) * size, beyond)
+            filled[:count] = np.where(np.isnan(signal), beyond, signal)
+            rows.append(starts + pick(filled.reshape(-1, size), axis=1))
+    return distinct(np.concatenate(rows))

@@ -224,8 +224,18 @@ def _left_rest(time: Array, samples: Array) -> _LeftRest:
             f"{len(samples)} samples: a step is detected in at least {2 * SAMPLES_AT_REST}"
         )
     scatter, smooth = noise(samples), running_median(samples)
-    far = _departure(smooth, scatter)
-    left, gone = _crossing(time, np.abs(smooth - median(samples[:SAMPLES_AT_REST])), far)
+    change = float(np.ptp(smooth))
+    if change <= LEAST_CHANGE * scatter:
+        raise ValueError(
+            f"no step stands out: the largest change is {change:.3g}, the noise {scatter:.3g}"
+        )
+    far = max(DEPARTURE[0] * change, DEPARTURE[1] * scatter)
+    way = np.abs(smooth - median(samples[:SAMPLES_AT_REST]))
+    gone = int(np.argmax(way > far))
+    if gone < SAMPLES_AT_REST:
+        raise _early(time)
+    near = np.flatnonzero(way[:gone] <= DEPARTURE_BEGUN * far)
+    left = int(near[-1]) if len(near) else 0
     level = float(median(samples[max(left - REST_TIMES * (gone - left), 0) : left + 1]))
     return _LeftRest(smooth, scatter, level, far, left, gone)
 
@@ -297,16 +307,6 @@ def _early(time: Array) -> MovesFromStartError:
     )
 
 
-def _departure(smooth: Array, scatter: float) -> float:
-    """Distance from its level at which a response moves; raises ValueError where it does not."""
-    change = float(np.ptp(smooth))
-    if change <= LEAST_CHANGE * scatter:
-        raise ValueError(
-            f"no step stands out: the largest change is {change:.3g}, the noise {scatter:.3g}"
-        )
-    return max(DEPARTURE[0] * change, DEPARTURE[1] * scatter)
-
-
 def running_median(samples: Array) -> Array:
     """Running median (M,) of samples, mirrored at the ends."""
     padded = np.pad(samples, MEDIAN_SAMPLES // 2, mode="reflect")
@@ -322,18 +322,6 @@ def block_medians(time: Array, samples: Array, block: int) -> tuple[Array, Array
         np.mean(time[:whole].reshape(-1, block), axis=1),
         np.median(samples[:whole].reshape(-1, block), axis=1),
     )
-
-
-def _crossing(time: Array, way: Array, far: float) -> tuple[int, int]:
-    """Find where a way from rest is last near it, and where it is first farther than ``far``.
-
-    Raises a ValueError where it is so from the beginning.
-    """
-    gone = int(np.argmax(way > far))
-    if gone < SAMPLES_AT_REST:
-        raise _early(time)
-    near = np.flatnonzero(way[:gone] <= DEPARTURE_BEGUN * far)
-    return (int(near[-1]) if len(near) else 0), gone
 
 
 def _settled(rest: _LeftRest) -> tuple[int, int, int]:
@@ -376,11 +364,15 @@ def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) 
         window = slice(max(min(first, rest_end - FEWEST_RESTING), 0), end + 1)
         block = -(-(window.stop - window.start) // MOST_SAMPLES)
         t, y = _block_means(time[window], block), _block_means(samples[window], block)
-        earliest = time[rest_end] - SOUGHT_BEFORE * rise
-        interval, fits = _compared(t, y, max(float(earliest), t[0]), scatter / sqrt(block))
+        lowest = max(float(time[rest_end] - SOUGHT_BEFORE * rise), t[0])
+        instants = np.linspace(lowest, t[-1], TRIED_INSTANTS, endpoint=False)
+        costs = _costs(t, y, instants)
+        least, freedom = float(np.min(costs)), max(len(y) - FITTED_VALUES, 1)
+        left, known = least / freedom, max(scatter / sqrt(block), NOISELESS * float(np.ptp(y))) ** 2
+        interval = interval_below(instants, costs, least + CHI_SQUARE * max(known, left))
         margin = SHAPE_ERROR * rise + CLOCK_ERROR * float(median(np.diff(t)))
         result = Onset(interval.earliest - margin, interval.latest + margin)
-        if fits:
+        if left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom)):
             break
     return result
 
@@ -404,19 +396,6 @@ def _block_means(samples: Array, block: int) -> Array:
     if block == 1:
         return samples
     return np.asarray(np.mean(samples[len(samples) % block :].reshape(-1, block), axis=1))
-
-
-def _compared(time: Array, samples: Array, low: float, scatter: float) -> tuple[Onset, bool]:
-    """Interval without what shapes err by, and whether the best of them fits."""
-    instants = np.linspace(low, time[-1], TRIED_INSTANTS, endpoint=False)
-    costs = _costs(time, samples, instants)
-    freedom = max(len(samples) - FITTED_VALUES, 1)
-    known = max(scatter, NOISELESS * float(np.ptp(samples))) ** 2
-    left = float(np.min(costs)) / freedom
-    fits = left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom))
-    return interval_below(
-        instants, costs, float(np.min(costs)) + CHI_SQUARE * max(known, left)
-    ), fits
 
 
 def interval_below(instants: Array, costs: Array, limit: float) -> Onset:

@@ -131,10 +131,17 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSe
     if not np.isfinite(phases).all():
         at = time[~np.isfinite(phases).all(axis=1)][0]
         raise ValueError(f"a waveform has no finite number at {at:g} s; none may be missing")
-    step = _waveform_step(time)
+    step = float(np.mean(np.diff(time))) if len(time) > 1 else np.inf
+    if step > 1.0 / (FEWEST_PER_CYCLE * MAINS_FREQUENCIES[0]):
+        raise ValueError(
+            f"a sampling rate of {1.0 / step:.4g} Hz: a waveform needs at least "
+            f"{FEWEST_PER_CYCLE} samples a cycle"
+        )
+    step = even_step(time, "the phasor of a waveform")
     clock: Array = step * np.arange(len(time), dtype=np.float64)
     vector: Complex = phases @ SPACE_VECTOR
-    frequency = _checked(_frequency(clock, vector), step, len(time), cycles)
+    frequency = _frequency(clock, vector)
+    _check_frequency(frequency, step, len(time), cycles)
     # once more from what is left when the ripple is gone
     positive = _windowed(vector, clock, frequency, cycles)
     frequency += _frequency(clock[: len(positive)], positive)
@@ -144,7 +151,10 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSe
     rows = slice(half, len(time) - half)
     window = cycles / frequency
     _check_balance(time[rows], np.abs(positive), np.abs(negative))
-    drift = _drift(positive, step, round(0.5 * window / step))
+    phase = np.unwrap(np.angle(positive))
+    reach = min(round(0.5 * window / step), (len(phase) - 1) // 2)
+    inner = (phase[2 * reach :] - phase[: len(phase) - 2 * reach]) / (4.0 * pi * reach * step)
+    drift = np.asarray(np.pad(inner, reach, mode="edge"))  # of the frequency from the mean
     if np.max(np.abs(drift)) > MOST_DRIFT:
         raise ValueError(
             f"the frequency moves by {np.max(np.abs(drift)):.3g} Hz off its mean of "
@@ -160,25 +170,14 @@ def _check_columns(phases: Array) -> None:
         raise ValueError(f"phases of shape {phases.shape}: {PHASES} columns are needed")
 
 
-def _waveform_step(time: Array) -> float:
-    """Return the sampling step (s); raises ValueError where it varies, or is too long."""
-    step = float(np.mean(np.diff(time))) if len(time) > 1 else np.inf
-    if step > 1.0 / (FEWEST_PER_CYCLE * MAINS_FREQUENCIES[0]):
-        raise ValueError(
-            f"a sampling rate of {1.0 / step:.4g} Hz: a waveform needs at least "
-            f"{FEWEST_PER_CYCLE} samples a cycle"
-        )
-    return even_step(time, "the phasor of a waveform")
-
-
 def _frequency(clock: Array, vector: Complex) -> float:
     """Frequency of a vector (M,) that turns, Hz."""
     middle = clock - np.mean(clock)
     return float(middle @ np.unwrap(np.angle(vector)) / (middle @ middle) / (2.0 * pi))
 
 
-def _checked(frequency: float, step: float, count: int, cycles: int) -> float:
-    """Return a frequency (Hz); raises ValueError where it is no unit's, or badly seen."""
+def _check_frequency(frequency: float, step: float, count: int, cycles: int) -> None:
+    """Raise a ValueError where a frequency (Hz) is no unit's, or badly seen."""
     low, high = MAINS_FREQUENCIES
     if low <= -frequency <= high:
         raise ValueError(
@@ -199,7 +198,6 @@ def _checked(frequency: float, step: float, count: int, cycles: int) -> float:
             f"{count * step:.3g} s of {frequency:.4g} Hz; a window of {cycles} cycles needs "
             f"{cycles + FEWEST_CYCLES} cycles"
         )
-    return frequency
 
 
 def _windowed(vector: Complex, clock: Array, frequency: float, cycles: int) -> Complex:
@@ -246,11 +244,3 @@ def _check_balance(time: Array, positive: Array, negative: Array) -> None:
             f"one, allowed is {100 * MOST_NEGATIVE:g} %: a phase is missing, or a column is "
             "another signal"
         )
-
-
-def _drift(positive: Complex, step: float, reach: int) -> Array:
-    """Deviation of the frequency (Hz) about each sample from the mean."""
-    phase = np.unwrap(np.angle(positive))
-    reach = min(reach, (len(phase) - 1) // 2)
-    inner = (phase[2 * reach :] - phase[: len(phase) - 2 * reach]) / (4.0 * pi * reach * step)
-    return np.asarray(np.pad(inner, reach, mode="edge"))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.schema import BumpTest
-from exfit.dsp.averages import Averages, averages_of
 from exfit.errors import SimulationError
 from exfit.fitting.nuisances import OF_SYSTEM, Nuisance
 from exfit.fitting.parameters import FreeParameter
@@ -19,7 +18,7 @@ from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Response, Simulator
 
 if TYPE_CHECKING:
-    from exfit.dsp.filtering import Filtering
+    from exfit.dsp.filtering import Averages, Filtering
     from exfit.fitting.sines import Sine
     from exfit.inference.whitening import Whitening
 
@@ -191,10 +190,14 @@ class Experiment:
     # ---- what is simulated, as a recorder shows it
 
     @cached_property
-    def _averages(self) -> Averages | None:
+    def _averages(self) -> "Averages | None":
         """Short windows of averages of the simulation, None where those are its samples."""
         filterings = [channel.filtering for channel in self.channels]
-        return averages_of(filterings) if self.simulator.responder is None else None
+        if self.simulator.responder is not None or not any(filterings):
+            return None
+        from exfit.dsp.filtering import averages_of
+
+        return averages_of(filterings)
 
     @cached_property
     def _reader(self) -> Simulator:

@@ -37,7 +37,7 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
     Of more than MOST_ROWS those stay that hold the least and greatest of each column in each of
     many segments.
     """
-    from exfit.dsp.decimation import kept_rows
+    from exfit.dsp.sampling import kept_rows
 
     signals = columns[1:]
     rows = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import kept_rows
+from exfit.dsp.sampling import kept_rows
 from exfit.fitting.uncertainty import Sensitivity
 from exfit.results.comparisons import (
     Comparison,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.dsp.decimation import envelope
+from exfit.dsp.sampling import envelope
 from exfit.features.compare.curves import RECORD, Curve
 from exfit.show.figures.style import (
     COLORS,

@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import kept_rows
+from exfit.dsp.sampling import kept_rows
 from exfit.features.fleet.folder import FAILED, Fleet
 from exfit.features.fleet.sisters import OUTLIER, SisterGroup, SisterValue, missing_interval
 from exfit.features.fleet.summary import CaseSummary, SummaryCurve, SummaryParameter

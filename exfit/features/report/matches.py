@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import envelope, kept_rows
 from exfit.dsp.features import LABELS
+from exfit.dsp.sampling import envelope, kept_rows
 from exfit.features.report.charts import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.features.report.words import DASH, number
 from exfit.results.comparisons import REFERENCE, Comparison, Excursion

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.dsp.decimation import envelope
+from exfit.dsp.sampling import envelope
 from exfit.show.figures.style import SIMULATED, START, new_figure, panels, tidy
 from exfit.signals import label_of
 

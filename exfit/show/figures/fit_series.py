@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from exfit.dsp.decimation import envelope
+from exfit.dsp.sampling import envelope
 from exfit.results.comparisons import Comparison
 from exfit.show.figures.style import COLORS, MEASURED, MILLI, STYLES, logarithmic, new_figure, tidy
 from exfit.signals import label_of

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import envelope
+from exfit.dsp.sampling import envelope
 from exfit.results.comparisons import REFERENCE, Comparison, DrivingSignal, LeftOut, Overlay
 from exfit.show.figures.style import (
     LIMIT,

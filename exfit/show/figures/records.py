@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import PIXELS, envelope
+from exfit.dsp.sampling import PIXELS, envelope
 from exfit.show.figures.style import LIMIT, SIMULATED, START, new_figure, panels, short, tidy
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import envelope
+from exfit.dsp.sampling import envelope
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.show.figures.style import (
     COLORS,
