@@ -7,7 +7,7 @@ left is noise, whose way through to the features is drawn at random, with that t
 the simulated response is from.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.features import TIMES, Features, RemovedLine, features_after, figures_of
-from exfit.dsp.lines import Line, cosine_and_sine, largest_line
+from exfit.dsp.features import TIMES, Features, RemovedLine, features, features_after, figures_of
+from exfit.dsp.lines import cosine_and_sine, largest_line
 from exfit.dsp.noise import noise
 from exfit.util.sorting import distinct, median
 
@@ -110,7 +110,7 @@ def recorded_features(response: RecordedResponse) -> Features | None:
     """
     t = response.time[response.after] - response.step_at
     if len(t) < FEWEST_SMOOTHED:
-        return _as_sampled(response)
+        return features(response.time, response.measured, response.step_at, response.until)
     read = distinct(np.linspace(0, len(t) - 1, min(len(t), MOST_READ)).astype(int))
     smoothing, lines = _smoothing(response, np.flatnonzero(response.after)[read])
     guide = response.simulated[response.after][read]
@@ -157,16 +157,6 @@ def _whitened(normal: Array) -> Array:
     return np.asarray(np.linalg.solve(factor, centred.T).T)
 
 
-def _as_sampled(response: RecordedResponse) -> Features | None:
-    """Return the features of a record that is too short to be smoothed."""
-    t = response.time[response.after] - response.step_at
-    y = response.measured[response.after]
-    if len(t) < 2:
-        return None
-    before = response.measured[response.before]
-    return features_after(t, y, float(np.mean(before)) if len(before) else float(y[0]))
-
-
 def _smoothing(
     response: RecordedResponse, read: NDArray[np.intp]
 ) -> tuple[_Smoothing, tuple[RemovedLine, ...]]:
@@ -201,31 +191,22 @@ def _smoothing(
     free, of_curve = np.hstack([samples, levels]), np.hstack([curve, on_level])
     best = plain = _smoothed(error, free, rows, of_curve, read_rows)
     lines = tuple[RemovedLine, ...]()
-    for line in _candidates(time, (error, plain.left), free):
+    for left in (error, plain.left):
+        try:
+            line = largest_line(time, left, np.ones(len(time), bool), free)
+        except ValueError:  # the clock shows none
+            break
         pair = cosine_and_sine(line.frequency, time - line.about)
         turned = (time - line.about) * (pair @ [line.sine, -line.cosine])
         with_line = np.column_stack([free, pair, turned])
         no_part = np.zeros((len(curve), 3))
         other = _smoothed(error, with_line, rows, np.hstack([of_curve, no_part]), read_rows)
         by_chance = 0.5 * len(time) * float(np.sqrt(other.score / plain.score)) ** len(time)
-        is_line = by_chance < LINE_BY_CHANCE and _is_noise(other.left)
-        if is_line and other.score < best.score:
+        # what is left scatters from sample to sample as it does altogether
+        is_noise = float(np.std(other.left)) < LEFT_IS_NOISE * noise(other.left)
+        if by_chance < LINE_BY_CHANCE and is_noise and other.score < best.score:
             best, lines = other, (RemovedLine(line.frequency, line.amplitude),)
     return best, lines
-
-
-def _is_noise(left: Array) -> bool:
-    """Check whether what is left scatters from sample to sample as it does altogether."""
-    return float(np.std(left)) < LEFT_IS_NOISE * noise(left)
-
-
-def _candidates(time: Array, errors: tuple[Array, ...], free: Array) -> Iterator[Line]:
-    """Yield the largest line in each of several errors (M,); none where the clock shows none."""
-    for error in errors:
-        try:
-            yield largest_line(time, error, np.ones(len(time), bool), free)
-        except ValueError:
-            return
 
 
 def _smoothed(

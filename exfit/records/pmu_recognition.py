@@ -2,8 +2,9 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise, takewhile
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,15 +75,14 @@ class PmuContent:
         return frozenset((*named, *(name for name in others if name is not None)))
 
 
-@dataclass(frozen=True)
-class _Pair:
+class _Pair(NamedTuple):
     """A magnitude and its angle, with what their names have in common."""
 
     key: str
     magnitude: str
     angle: str
     numbered: bool
-    quantity: str | None = None
+    quantity: str | None
 
 
 def pmu_content(
@@ -92,14 +92,18 @@ def pmu_content(
 
     ``units`` are those of columns that have one, ``names`` all columns of the file.
     """
-    pairs = _with_quantities([*_pairs([*samples], units)], samples, units)
+    pairs = _pairs([*samples], units)
     taken = {name for pair in pairs for name in (pair.magnitude, pair.angle)}
-    others = {name: samples[name] for name in samples if name not in taken}
+    if len(pairs) == PAIR_OF_UNIT and not any(pair.quantity for pair in pairs):
+        # of two without names the steadier is the voltage
+        steadier, other = sorted(pairs, key=lambda pair: _swing(samples[pair.magnitude]))
+        pairs = [steadier._replace(quantity="voltage"), other._replace(quantity="current")]
     voltage = _phasor("voltage", pairs, samples, units, "")
     if voltage is None:
         return None
     current = _phasor("current", pairs, samples, units, voltage.magnitudes[0])
-    frequency = _first(others, FREQUENCY, RATE)
+    others = [name for name in samples if name not in taken]
+    frequency = _first([name for name in others if not RATE.search(folded(name))], FREQUENCY)
     return PmuContent(
         voltage,
         current,
@@ -110,69 +114,63 @@ def pmu_content(
     )
 
 
-def _pairs(names: Sequence[str], units: Mapping[str, str]) -> Iterator[_Pair]:
-    """Yield the magnitudes with their angles: by their names, by units, or as neighbours."""
-    paired = set[str]()
-    for pair in (*_named_pairs(names, units), *_neighbours(names, units)):
-        if not paired & {pair.magnitude, pair.angle}:
-            paired |= {pair.magnitude, pair.angle}
-            yield pair
+def _pairs(names: Sequence[str], units: Mapping[str, str]) -> list[_Pair]:
+    """Find the magnitudes with their angles, each column in one pair."""
+    pairs, paired = list[_Pair](), set[str]()
+    for key, magnitude, angle, by_name in _found(names, units):
+        if magnitude != angle and not paired & {magnitude, angle}:
+            paired |= {magnitude, angle}
+            numbered = by_name and "pm" in folded(magnitude)
+            quantity = _quantity(magnitude, units.get(magnitude), numbered)
+            pairs.append(_Pair(key, magnitude, angle, numbered, quantity))
+    return pairs
 
 
-def _named_pairs(names: Sequence[str], units: Mapping[str, str]) -> Iterator[_Pair]:
-    """Yield magnitudes and angles whose names differ in the word for that alone."""
-    angles = {key: name for name in names if (key := _key(name, ANGLE, units, is_angle=True))}
+def _found(names: Sequence[str], units: Mapping[str, str]) -> Iterator[tuple[str, str, str, bool]]:
+    """Yield what names have in common that differ in the word for magnitude or angle alone.
+
+    After these an angle, by its unit, right behind a voltage or a current.
+    """
+    electric = [name for name in names if quantity_of(units.get(name)) in QUANTITIES]
+    plain = {folded(bare(name)).strip(): name for name in electric}
     magnitudes = {key: name for name in names if (key := _key(name, MAGNITUDE, units))}
-    plain = {folded(bare(name)).strip(): name for name in names if _is_electric(name, units)}
+    angles = {key: name for name in names if (key := _key(name, ANGLE, units))}
     for key, angle in angles.items():
-        magnitude = magnitudes.get(key) or plain.get(key)
-        if magnitude not in (None, angle):
-            yield _Pair(key, str(magnitude), angle, "pm" in folded(str(magnitude)))
-
-
-def _neighbours(names: Sequence[str], units: Mapping[str, str]) -> Iterator[_Pair]:
-    """Yield angles, by their units, each behind a voltage or a current."""
+        if key in magnitudes or key in plain:
+            yield key, magnitudes.get(key) or plain[key], angle, True
     for before, name in pairwise(names):
-        if usual(units.get(name, "")) in ANGLE_UNITS and _is_electric(before, units):
-            yield _Pair(folded(bare(before)), before, name, numbered=False)
+        if usual(units.get(name, "")) in ANGLE_UNITS and before in electric:
+            yield folded(bare(before)), before, name, False
 
 
-def _with_quantities(
-    pairs: Sequence[_Pair], samples: Mapping[str, Array], units: Mapping[str, str]
-) -> list[_Pair]:
-    """Return pairs with what they measure; of two without names the steadier is the voltage."""
-    known = [replace(pair, quantity=_quantity(pair, units)) for pair in pairs]
-    if len(known) != PAIR_OF_UNIT or any(pair.quantity for pair in known):
-        return known
-    steadier, other = sorted(known, key=lambda pair: _swing(samples[pair.magnitude]))
-    return [replace(steadier, quantity="voltage"), replace(other, quantity="current")]
+def _quantity(name: str, unit: str | None, numbered: bool) -> str | None:
+    """Tell a voltage from a current by the unit or the name of a magnitude."""
+    quantity = quantity_of(unit)
+    if quantity in QUANTITIES or numbered:  # a number says nothing, the unit's name no more
+        return quantity
+    kinds = {KINDS.get(word) for word in words_of(bare(name))} & {*QUANTITIES}
+    text = folded(bare(name))
+    kinds |= {"voltage"} if VOLTAGE.search(text) else set()
+    kinds |= {"current"} if CURRENT.search(text) else set()
+    return str(*kinds) if len(kinds) == 1 else None
 
 
 def _swing(samples: Array) -> float:
     """Return the range of a magnitude (M,) relative to its level."""
-    present = samples[np.isfinite(samples)]
     level = _level(samples)
-    return float(np.ptp(present)) / level if level > 0.0 else np.inf
+    return float(np.ptp(samples[np.isfinite(samples)])) / level if level > 0.0 else np.inf
 
 
-def _key(
-    name: str, part: re.Pattern[str], units: Mapping[str, str], is_angle: bool = False
-) -> str | None:
+def _key(name: str, part: re.Pattern[str], units: Mapping[str, str]) -> str | None:
     """Return a name without the word for its part of a phasor; None where it has none."""
-    unit = units.get(name)
-    if is_angle and unit is not None and usual(unit) not in ANGLE_UNITS:
-        return None
-    if not is_angle and unit is not None and quantity_of(unit) not in (*QUANTITIES, None):
-        return None
-    text = folded(bare(name)).strip()
+    unit, text = units.get(name), folded(bare(name)).strip()
+    fits = usual(unit or "deg") in ANGLE_UNITS
+    if part is MAGNITUDE:
+        fits = quantity_of(unit) in (*QUANTITIES, None)
     match = part.search(text)
-    if match is None:
-        return text if is_angle and unit is not None else None
+    if not fits or match is None:
+        return text if fits and part is ANGLE and unit is not None else None
     return re.sub(r"[^a-z0-9]+", " ", text[: match.start()] + " " + text[match.end() :]).strip()
-
-
-def _is_electric(name: str, units: Mapping[str, str]) -> bool:
-    return quantity_of(units.get(name)) in QUANTITIES
 
 
 def _phasor(
@@ -216,9 +214,8 @@ def _candidates(pairs: Sequence[_Pair]) -> list[tuple[_Pair, ...]]:
 
 def _alike(name: str, other: str) -> int:
     """Return with how many letters two names begin alike."""
-    return sum(
-        1 for _ in takewhile(lambda both: both[0] == both[1], zip(name, other, strict=False))
-    )
+    both = takewhile(lambda letters: letters[0] == letters[1], zip(name, other, strict=False))
+    return len([*both])
 
 
 def _groups(pairs: Sequence[_Pair]) -> Iterator[tuple[_Pair, ...]]:
@@ -230,18 +227,6 @@ def _groups(pairs: Sequence[_Pair]) -> Iterator[tuple[_Pair, ...]]:
             if not used & {*triple}:
                 used |= {*triple}
                 yield tuple(by_key[name] for name in triple)
-
-
-def _quantity(pair: _Pair, units: Mapping[str, str]) -> str | None:
-    """Tell a voltage from a current by the unit or the name of a pair."""
-    quantity = quantity_of(units.get(pair.magnitude))
-    if quantity in QUANTITIES or pair.numbered:  # a number says nothing, the unit's name no more
-        return quantity
-    kinds = {KINDS.get(word) for word in words_of(bare(pair.magnitude))} & {*QUANTITIES}
-    text = folded(bare(pair.magnitude))
-    kinds |= {"voltage"} if VOLTAGE.search(text) else set()
-    kinds |= {"current"} if CURRENT.search(text) else set()
-    return str(*kinds) if len(kinds) == 1 else None
 
 
 def _angle_unit(name: str, angle: Array, units: Mapping[str, str]) -> tuple[str | None, str]:
@@ -256,17 +241,9 @@ def _angle_unit(name: str, angle: Array, units: Mapping[str, str]) -> tuple[str 
     return unit, "" if unit is None else "range"
 
 
-def _first(
-    names: Sequence[str] | Mapping[str, Array],
-    words: re.Pattern[str],
-    but: re.Pattern[str] | None = None,
-) -> str | None:
-    """Return the first column that words name, and no others."""
-    for name in names:
-        text = folded(name)
-        if words.search(folded(bare(name))) and not (but is not None and but.search(text)):
-            return name
-    return None
+def _first(names: Sequence[str], words: re.Pattern[str]) -> str | None:
+    """Return the first column that words name."""
+    return next((name for name in names if words.search(folded(bare(name)))), None)
 
 
 def _level(samples: Array) -> float:
