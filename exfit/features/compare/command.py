@@ -14,7 +14,6 @@ from exfit.show.blocks import Block, Table, columns, notes, number, paragraph, r
 from exfit.util.text import percentage, rounded
 
 if TYPE_CHECKING:
-    from exfit.dsp.features import Features
     from exfit.features.compare.agreement import Agreement
 
 FEWEST_CURVES = 2  # without a record
@@ -142,8 +141,8 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
     for entry in result.differences:
         value, at = entry.largest
         finals = ", ".join(number(value) for value in reversed(entry.finals))
-        cells = (f"{entry.rms:.3e}", f"{value:+.3e}", f"{at:.4g} s", finals)
-        differences.append(row(entry.signal, f"{entry.second} - {entry.first}", *cells))
+        sizes = (f"{entry.rms:.3e}", f"{value:+.3e}", f"{at:.4g} s", finals)
+        differences.append(row(entry.signal, f"{entry.second} - {entry.first}", *sizes))
     heads = ("rms", "largest", "at")
     columns_of_both = columns("signal", "pu", *heads, "final values", numbers=heads)
     yield Table(columns_of_both, tuple(differences))
@@ -159,10 +158,14 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
         f"against {whose}: f, half the sum of squares over the samples",
     )
     if result.features and result.step_at is not None:
-        rows = [
-            (label, unit, tuple(_feature(features, key) for features in result.features.values()))
-            for label, key, unit in LABELS
-        ]
+        rows = []
+        for label, key, unit in LABELS:
+            cells = []
+            for features in result.features.values():
+                half = features.errors.get(key)  # of the 95 % interval, of a record
+                text = rounded(getattr(features, key), half)
+                cells.append(text if half is None else f"{text} +- {half:.2g}")
+            rows.append((label, unit, tuple(cells)))
         title = f"{result.judged} after the step at {result.step_at:.4g} s"
         yield rows_table([*result.features], rows, title)
     if len(result.results) > 1:
@@ -176,10 +179,3 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
             f"between samples: a cubic, up to {worst.interpolation:.1e} pu from a straight line "
             f"({worst.signal})"
         )
-
-
-def _feature(features: "Features", key: str) -> str:
-    """Write a feature; of a record with half of its 95 % interval."""
-    half = features.errors.get(key)
-    text = rounded(getattr(features, key), half)
-    return text if half is None else f"{text} +- {half:.2g}"

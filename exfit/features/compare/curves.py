@@ -240,12 +240,19 @@ def differences(curves: Sequence[Curve], signals: Sequence[str]) -> list[Differe
         instants = _covered(record.time, curves)
         _refuse_apart(instants, curves)
         pairs += [(record, second, instants) for second in responses]
-    return [
-        _difference(signal, first, second, time)
-        for first, second, time in pairs
-        for signal in signals
-        if signal in first.signals and signal in second.signals
-    ]
+    found = []
+    for first, second, time in pairs:
+        for signal in signals:
+            if signal not in first.signals or signal not in second.signals:
+                continue
+            read = [_at(time, curve.time, curve.signals[signal]) for curve in (first, second)]
+            values = np.stack([samples for samples, _ in read])
+            if not np.isfinite(values).all(axis=0).any():
+                both = f"{first.path} and {second.path}"
+                raise RecordError(f"{both}: {signal}: no instant has samples of both")
+            bend = max(bend for _, bend in read)
+            found.append(Difference(signal, first.name, second.name, time, values, bend))
+    return found
 
 
 def _covered(time: Array, curves: Sequence[Curve]) -> Array:
@@ -263,16 +270,6 @@ def _refuse_apart(time: Array, curves: Sequence[Curve]) -> None:
             f"no time in common: {', '.join(spans)}; --align puts the steps together, "
             "--shift B=SECONDS moves the time of one"
         )
-
-
-def _difference(signal: str, first: Curve, second: Curve, time: Array) -> Difference:
-    """Return the difference of a signal at some instants."""
-    read = [_at(time, curve.time, curve.signals[signal]) for curve in (first, second)]
-    values = np.stack([samples for samples, _ in read])
-    if not np.isfinite(values).all(axis=0).any():
-        both = f"{first.path} and {second.path}"
-        raise RecordError(f"{both}: {signal}: no instant has samples of both")
-    return Difference(signal, first.name, second.name, time, values, max(bend for _, bend in read))
 
 
 def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.sampling import envelope
-from exfit.features.compare.curves import RECORD, Curve
+from exfit.features.compare.curves import RECORD
 from exfit.show.figures.style import (
     COLORS,
     MEASURED,
@@ -38,36 +38,28 @@ def agreement(compared: "Agreement") -> Figure:
     """
     signals = compared.signals
     responses = [curve for curve in compared.curves if not curve.measured]
-    looks = _looks([curve.name for curve in responses])
+    others = [color for color in COLORS if color not in TAKEN]
+    lines = OF_TWO + tuple((color, STYLES[k % len(STYLES)]) for k, color in enumerate(others))
+    two = len(responses) <= len(OF_TWO)
+    looks: dict[str, dict[str, Any]] = {}
+    for k, curve in enumerate(responses):  # of many the later are the narrower
+        color, style = lines[k % len(lines)]
+        width = WIDTHS[-1] if two else WIDTHS[min(k, len(WIDTHS) - 1)]
+        looks[curve.name] = {"color": color, "linestyle": style, "linewidth": width}
     figure = new_figure(1.0 + 4.2 * len(signals))
     ratios = [3.0, 1.3] * len(signals)
     axes = panels(figure, 2 * len(signals), sharex=True, height_ratios=ratios)[:, 0]
     for k, signal in enumerate(signals):
         _curves(axes[2 * k], compared, signal, looks)
-        two = len(responses) <= len(OF_TWO)
         drawn = compared.differences if two else compared.from_reference
         _differences(axes[2 * k + 1], [each for each in drawn if each.signal == signal], looks)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle("\n".join(map(_title, compared.curves)), fontsize=10)
+    titles = []
+    for curve in compared.curves:
+        moved = f", shifted by {curve.shift:.4g} s" if curve.shift else ""
+        titles.append(f"{curve.name}: {Path(curve.path.parent.name, curve.path.name)}{moved}")
+    figure.suptitle("\n".join(titles), fontsize=10)
     return figure
-
-
-def _looks(names: list[str]) -> dict[str, dict[str, Any]]:
-    """Choose the line of each response, by its name: of many the later are the narrower."""
-    others = [color for color in COLORS if color not in TAKEN]
-    lines = OF_TWO + tuple((color, STYLES[k % len(STYLES)]) for k, color in enumerate(others))
-    widths = [WIDTHS[-1]] * len(OF_TWO) if len(names) <= len(OF_TWO) else WIDTHS
-    looks = {}
-    for k, name in enumerate(names):
-        color, style = lines[k % len(lines)]
-        width = widths[min(k, len(widths) - 1)]
-        looks[name] = {"color": color, "linestyle": style, "linewidth": width}
-    return looks
-
-
-def _title(curve: Curve) -> str:
-    shifted = f", shifted by {curve.shift:.4g} s" if curve.shift else ""
-    return f"{curve.name}: {Path(curve.path.parent.name, curve.path.name)}{shifted}"
 
 
 def _curves(

@@ -167,10 +167,9 @@ class Bench:
 
     def information(self, moves: Moves, duration: float) -> Array | None:
         """Compute the information of each candidate channel (C, N, N), None beyond a limit."""
-        key = (moves, duration)
-        if key not in self.tried:
-            self.tried[key] = self._information(moves, duration)
-        return self.tried[key]
+        if (moves, duration) not in self.tried:
+            self.tried[moves, duration] = self._information(moves, duration)
+        return self.tried[moves, duration]
 
     def _information(self, moves: Moves, duration: float) -> Array | None:
         shares = [0.0, *(move.share for move in moves)]

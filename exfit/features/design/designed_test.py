@@ -9,6 +9,7 @@ Source: Atkinson, Donev & Tobias 2007, Optimum Experimental Designs, with SAS, c
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 from math import inf
 from os import PathLike
 from typing import Any
@@ -292,10 +293,16 @@ def _further_channels(
 
 
 def _at_other_values(bench: Bench, best: Stage, moves: Moves, single: Moves) -> OtherValues:
-    """Assess a test, and the single step, with other values of the parameters."""
+    """Assess a test, and the single step, with each parameter too small and too large in turn."""
     extremes: dict[str, tuple[float, float]] = {}
     ratios: dict[str, float | None] = dict.fromkeys(bench.names, 0.0)
-    for other in _benches_beside(bench):
+    free = bench.problem.free
+    limits = Limits(vt=inf, vref=bench.limits.of_vref)
+    for k, sign in product(range(len(free)), (1.0, -1.0)):
+        start = free[k].start * (1.0 + sign * SPREAD)
+        moved = replace(free[k], start=min(max(start, free[k].low), free[k].high))
+        problem = replace(bench.problem, free=[*free[:k], moved, *free[k + 1 :]])
+        other = replace(bench, problem=problem, limits=limits, tried={})
         run = other.simulator(moves, best.duration).run(other.values())
         for signal, (low, high) in extremes_of(run).items():
             before = extremes.get(signal, (low, high))
@@ -307,18 +314,6 @@ def _at_other_values(bench: Bench, best: Stage, moves: Moves, single: Moves) -> 
             worst = ratios[name]
             ratios[name] = None if ratio is None or worst is None else max(ratio, worst)
     return OtherValues(SPREAD, extremes, ratios)
-
-
-def _benches_beside(bench: Bench) -> Iterator[Bench]:
-    """Yield the bench with each parameter too small and too large, within its bounds; no limits."""
-    free = bench.problem.free
-    for k, parameter in enumerate(free):
-        for sign in (1.0, -1.0):
-            start = parameter.start * (1.0 + sign * SPREAD)
-            moved = replace(parameter, start=min(max(start, parameter.low), parameter.high))
-            problem = replace(bench.problem, free=[*free[:k], moved, *free[k + 1 :]])
-            limits = Limits(vt=inf, vref=bench.limits.of_vref)
-            yield replace(bench, problem=problem, limits=limits, tried={})
 
 
 def best_single_step(cost: Cost) -> Moves:
@@ -336,8 +331,7 @@ def best_moves(cost: Cost, fewer: Sequence[Moves], duration: float) -> list[Move
     """
     ends: list[Moves] = []
     for before in fewer:
-        families = _later(before), _earlier(before), _pulses(len(before) + 1, duration)
-        starts = [min(family, key=cost) for family in families]
+        starts = [min(family, key=cost) for family in _families(before, duration)]
         exchanged = [_exchanged(cost, start) for start in starts if cost(start) < inf]
         ends = sorted(dict.fromkeys([*ends, *exchanged]), key=cost)
         if ends and gains(cost(fewer[0]), cost(ends[0])):
@@ -345,32 +339,30 @@ def best_moves(cost: Cost, fewer: Sequence[Moves], duration: float) -> list[Move
     return ends
 
 
+def _families(fewer: Moves, duration: float) -> Iterator[list[Moves]]:
+    """Yield moves with one more behind those given, with one more before them, and pulses."""
+    first, last, count = fewer[0], fewer[-1], len(fewer) + 1
+    yield [
+        (*fewer, ReferenceMove(dwell, share))
+        for dwell in FIRST_DWELLS
+        for share in _levels(last.share)
+    ]
+    yield [
+        (ReferenceMove(0.0, share), ReferenceMove(dwell, first.share), *fewer[1:])
+        for dwell in FIRST_DWELLS
+        for share in _levels(first.share)
+    ]
+    even = max((d for d in DWELLS if d <= (duration - REST) / count), default=DWELLS[0])
+    yield [
+        tuple(ReferenceMove(dwell if k else 0.0, size * (-1) ** k) for k in range(count))
+        for dwell in (even, DWELLS[1])
+        for size in SHARES
+    ]
+
+
 def gains(before: float, after: float) -> bool:
     """Tell whether a criterion is so much smaller that an addition is worth it."""
     return after <= (1.0 - LEAST_GAIN) * before
-
-
-def _later(fewer: Moves) -> Iterator[Moves]:
-    """Yield moves with one more behind those given."""
-    for dwell in FIRST_DWELLS:
-        for share in _levels(fewer[-1].share):
-            yield (*fewer, ReferenceMove(dwell, share))
-
-
-def _earlier(fewer: Moves) -> Iterator[Moves]:
-    """Yield moves with one more before those given."""
-    first, *others = fewer
-    for dwell in FIRST_DWELLS:
-        for share in _levels(first.share):
-            yield (ReferenceMove(0.0, share), ReferenceMove(dwell, first.share), *others)
-
-
-def _pulses(count: int, duration: float) -> Iterator[Moves]:
-    """Yield moves up and down in turn."""
-    even = (duration - REST) / count
-    for dwell in (max((d for d in DWELLS if d <= even), default=DWELLS[0]), DWELLS[1]):
-        for size in SHARES:
-            yield tuple(ReferenceMove(dwell if k else 0.0, size * (-1) ** k) for k in range(count))
 
 
 def _exchanged(cost: Cost, moves: Moves) -> Moves:

@@ -236,8 +236,13 @@ def _scaled(experiment: Experiment, size: float) -> Experiment:
     Of a recorded reference it is the largest move.
     """
     old = experiment.simulator
-    largest = _largest_move(old)
-    if largest is None:
+    inputs, moves = old.inputs, old.inputs.moves("vref")
+    if "vref" in inputs.recorded:
+        grid = grid_segments(inputs, old.step)
+        largest = max(float(np.max(np.abs(inputs.input("vref", part)))) for part in grid)
+    elif moves:
+        largest = moves[0].largest
+    else:
         return experiment
     share = size / largest
     steps = tuple(
@@ -253,16 +258,6 @@ def _scaled(experiment: Experiment, size: float) -> Experiment:
     inputs = replace(old.inputs, steps=steps, recorded=recorded)
     simulator = Simulator(old.system, inputs, old.times, old.step, old.least, old.delay)
     return replace(experiment, simulator=simulator)
-
-
-def _largest_move(simulator: Simulator) -> float | None:
-    """Find the size of a test's step of the reference, pu; None where it has none."""
-    inputs = simulator.inputs
-    if "vref" in inputs.recorded:
-        grid = grid_segments(inputs, simulator.step)
-        return max(float(np.max(np.abs(inputs.input("vref", part)))) for part in grid)
-    moves = inputs.moves("vref")
-    return moves[0].largest if moves else None
 
 
 def _longer(experiment: Experiment) -> Experiment:

@@ -183,7 +183,11 @@ def picture(letters: Letters) -> Picture:
     heights = {e: _height(part, parts, rows) for e, part in parts.items()}
     grid = replace(grid, rows=rows, heights=heights)
     placed = tuple(PlacedPart(part, grid.middles[e], heights[e]) for e, part in parts.items())
-    words, bars = [], []
+    words, bars, dots = [], [], []
+    for row, column in letters.dots:
+        upright = grid.upright_at(column, row)
+        if upright is not None:
+            dots.append((upright, rows[row]))
     for part in placed:
         left = part.x - formulas.width(part.part.pieces) / 2.0
         for piece in part.part.pieces:
@@ -203,7 +207,7 @@ def picture(letters: Letters) -> Picture:
         placed,
         tuple(_stroke(line, grid) for line in letters.lines),
         tuple(bars),
-        tuple(_dots(grid)),
+        tuple(dots),
         (*words, *_signs(grid)),
     )
 
@@ -420,13 +424,6 @@ def _stroke(line: Wire, grid: DiagramGrid) -> Stroke:
         y = grid.rows[line.along]
         first, last = ((grid.across(line, end), y) for end in line.ends)
     return Stroke(first, last, (line.ends[0].arrow, line.ends[1].arrow))
-
-
-def _dots(grid: DiagramGrid) -> Iterator[Point]:
-    for row, column in grid.letters.dots:
-        x = grid.upright_at(column, row)
-        if x is not None:
-            yield x, grid.rows[row]
 
 
 def _signs(grid: DiagramGrid) -> Iterator[Word]:

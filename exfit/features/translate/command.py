@@ -99,39 +99,33 @@ def blocks_of(result: "Translation") -> Iterator[Block]:
         if parameter.undetermined:
             words += "; hardly shown by the steps"
         doubtful = parameter.undetermined or parameter.origin == "typical"
-        cells = (name, number(parameter.value), parameter.unit, words)
-        rows.append(row(*cells, mark="doubt" if doubtful else ""))
+        value = number(parameter.value)
+        texts = (name, value, parameter.unit, words)
+        rows.append(row(*texts, mark="doubt" if doubtful else ""))
     heads = columns("parameter", "value", "unit", f"from {result.source}", numbers=("value",))
     yield Table(heads, tuple(rows))
-    yield _steps(result)
+    steps = []
+    for step in result.steps:
+        vt, efd = step.errors["vt"], step.errors["efd"]
+        errors = (vt.rmse_percent, vt.largest_percent, efd.largest_percent)
+        cells = (
+            f"{100.0 * step.step:+g} %",
+            step.plant,
+            *(f"{value:.2g} %" if value < 100.0 else f"{value:.0f} %" for value in errors),
+            " ".join(step.source_limits),
+            " ".join(step.target_limits),
+        )
+        steps.append(row(*cells, mark="" if step.fitted else "faint"))
+    numbers = ("step", "rms vt", "max vt", "max efd")
+    heads = columns("step", "plant", *numbers[1:], numbers=numbers)
+    limits = (TableColumn(f"{model} at", folds=True) for model in (result.source, result.target))
+    yield Table((*heads, *limits), tuple(steps))
     if result.loops:
         yield _loops(result)
     if result.lost:
         lost = ", ".join(f"{name}{NO_BREAK}{value:g}" for name, value in result.lost.items())
         yield paragraph(f"no counterpart in {result.target}: {lost}")
     yield from notes(result.notes)
-
-
-def _steps(result: "Translation") -> Table:
-    """Make the table of errors: of vt in percent of the step, of efd in percent of its range."""
-    rows = []
-    for step in result.steps:
-        vt, efd = step.errors["vt"], step.errors["efd"]
-        errors = (vt.rmse_percent, vt.largest_percent, efd.largest_percent)
-        rows.append(
-            row(
-                f"{100.0 * step.step:+g} %",
-                step.plant,
-                *(f"{value:.2g} %" if value < 100.0 else f"{value:.0f} %" for value in errors),
-                " ".join(step.source_limits),
-                " ".join(step.target_limits),
-                mark="" if step.fitted else "faint",
-            )
-        )
-    numbers = ("step", "rms vt", "max vt", "max efd")
-    heads = columns("step", "plant", *numbers[1:], numbers=numbers)
-    limits = (TableColumn(f"{model} at", folds=True) for model in (result.source, result.target))
-    return Table((*heads, *limits), tuple(rows))
 
 
 def _loops(result: "Translation") -> Table:
