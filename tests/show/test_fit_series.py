@@ -7,7 +7,7 @@ from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
 from exfit.show import figures as plots
-from exfit.show.figures.fit_series import MOST_CASES
+from exfit.show.figures.responses import MOST_CASES
 
 STRATEGIES = ["dgn", "lm", "gn"]
 

@@ -109,7 +109,7 @@ def _figures(ranking: Ranking) -> PlannedFigures:
 
 def ranking_figure(ranking: Ranking) -> "Figure":
     """Return the first fitted record and the first unseen one with the responses of the best."""
-    from exfit.show.figures.fit_series import responses_beside
+    from exfit.show.figures.responses import responses_beside
     from exfit.show.figures.style import new_figure
 
     least = min(result.rmse for result in ranking.results.values())

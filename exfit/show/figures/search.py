@@ -1,28 +1,39 @@
-"""The progress of a search: its iterations, its starts."""
+"""How a fit came about, and how well its records determine the parameters."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from exfit.dsp.sampling import envelope
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult, Minima
 from exfit.show.figures.style import (
+    COLORS,
     GREEN,
     LIMIT,
     MEASURED,
+    MILLI,
     SIMULATED,
     START,
+    STYLES,
     logarithmic,
     new_figure,
     panels,
     short,
     tidy,
 )
+from exfit.signals import label_of
 from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE
+from exfit.workflows.profiles import Profiles
+
+Array = NDArray[np.float64]
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
@@ -30,12 +41,21 @@ COLOURS: Mapping[str, str] = {
     FROM_FURTHER_STARTS: LIMIT,
     WEIGHTED_BY_NOISE: LIMIT,
 }
-
 WAYS = {
     "strategy": ("the case's start", "D"),
     "linear": ("by way of the linear phase", "o"),
     "direct": ("other starts", "^"),
 }  # what a descent began with: its label and its mark
+FADING = LinearSegmentedColormap.from_list("fading", ["#b9d2ee", START, "#5b2a86", SIMULATED])
+BAR_OF_ITERATIONS = 0.025  # width of the colour bar, of that of the axes
+MOST_TICKS = 12  # of that colour bar
+EARLY = 0.5  # power of the place: most of the way is made in the first iterations
+PERCENT = 1e-2
+OTHER_MINIMA = COLORS[4]
+SUBDIVIDED = 8  # parts of a profile between two points
+COLOUR_MAP, SHADES = "RdBu_r", 40  # of correlations
+BAR = 0.05  # width of the colour bar, of that of the map
+ERROR = "simulated\n- measured\n(1e-3 pu)"
 
 
 def convergence(result: FitResult) -> Figure:
@@ -112,7 +132,10 @@ def trajectories(result: FitResult) -> Figure:
 
 
 def waterfall(search: Minima, title: str) -> Figure:
-    """Return the costs that all descents led to, in rising order, with those they began at."""
+    """Return the costs that all descents led to, in rising order, with those they began at.
+
+    Those ends are refuted whose minimum, the one at or next below them, is.
+    """
     figure = new_figure(4.2)
     axes = panels(figure, 1)[0, 0]
     ended = np.flatnonzero(np.isfinite(search.end_costs))
@@ -121,7 +144,9 @@ def waterfall(search: Minima, title: str) -> Figure:
     axes.plot(ranks, search.start_costs[order], "_", color=MEASURED, markersize=7, label="start")
     axes.step(ranks, ends, where="mid", color=MEASURED, linewidth=0.8)
     ways = np.array(search.ways or ("direct",) * search.starts)[order]
-    refuted = refuted_ends(search, ends)
+    minima = sorted(search.minima, key=lambda minimum: minimum.cost)
+    places = np.searchsorted([minimum.cost for minimum in minima], ends, side="right") - 1
+    refuted = np.array([bool(minima[max(k, 0)].refuted) for k in places], dtype=np.bool_)
     for way, (label, marker) in WAYS.items():
         for verdict, color in ((False, GREEN), (True, SIMULATED)):
             own = (ways == way) & (refuted == verdict)
@@ -133,17 +158,173 @@ def waterfall(search: Minima, title: str) -> Figure:
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=8)
-    best = search.minima[0].starts
-    axes.set_title(
-        f"{best} of {search.starts} descents led to the lowest minimum", fontsize=9, loc="right"
-    )
+    lowest = f"{search.minima[0].starts} of {search.starts} descents led to the lowest minimum"
+    axes.set_title(lowest, fontsize=9, loc="right")
     tidy(axes)
     figure.suptitle(f"{title}: where {search.starts} descents ended", fontsize=11)
     return figure
 
 
-def refuted_ends(search: Minima, ends: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark the ends that the records refute: those of the minima at or next below them."""
-    minima = sorted(search.minima, key=lambda minimum: minimum.cost)
-    places = np.searchsorted([minimum.cost for minimum in minima], ends, side="right") - 1
-    return np.array([bool(minima[max(place, 0)].refuted) for place in places], dtype=np.bool_)
+def iterations(result: FitResult) -> Figure:
+    """Return the record and the response after each iteration, with the error, record by record.
+
+    The colour shows the iteration, from the start in pale blue to the fit in red. Where a fit kept
+    no responses the figure is empty but for its title.
+    """
+    recorded = [
+        (comparison, comparison.iteration_responses)
+        for comparison in result.comparisons
+        if comparison.iteration_responses is not None
+    ]
+    count = len(recorded)
+    figure = new_figure(1.0 + 4.4 * max(count, 1))
+    figure.suptitle(f"{result.name}: the response after each iteration", fontsize=11)
+    if not recorded:
+        return figure
+    widths, heights = [1.0, BAR_OF_ITERATIONS], [3.0, 1.2] * count
+    grid = figure.add_gridspec(2 * count, 2, width_ratios=widths, height_ratios=heights)
+    for k, (comparison, responses) in enumerate(recorded):
+        upper = figure.add_subplot(grid[2 * k, 0])
+        lower = figure.add_subplot(grid[2 * k + 1, 0], sharex=upper)
+        upper.tick_params(labelbottom=False)
+        _after_each(upper, lower, responses)
+        if count > 1:
+            upper.set_title(f"{comparison.name}: {comparison.record}", fontsize=9, loc="left")
+    lower.set_xlabel("time (s)")
+    numbers = sorted({number for _, responses in recorded for number in responses.numbers})
+    if len(numbers) > 1:  # a single one needs no bar
+        bar, last = figure.add_subplot(grid[:, 1]), len(numbers) - 1
+        shades, extent = np.array(_colours(numbers))[:, np.newaxis, :], (0.0, 1.0, -0.5, last + 0.5)
+        bar.imshow(shades, aspect="auto", extent=extent, origin="lower")
+        every = -(-len(numbers) // MOST_TICKS)
+        # the fit is always named: what would be right beside it gives way
+        ticks = [k for k in range(0, last, every) if 2 * (last - k) >= every] + [last]
+        bar.set_xticks([])
+        bar.set_yticks(ticks, [str(numbers[k]) for k in ticks])
+        bar.tick_params(length=0)
+        bar.set_ylabel("iteration")
+    return figure
+
+
+def _colours(numbers: Sequence[int]) -> list[tuple[float, float, float, float]]:
+    """Return a colour for each iteration, by its place among them."""
+    places = np.linspace(0.0, 1.0, max(len(numbers), 2)) ** EARLY
+    return [FADING(place) for place in places[: len(numbers)]]
+
+
+def _after_each(upper: Axes, lower: Axes, responses: IterationResponses) -> None:
+    """Draw the responses after some iterations, and their errors."""
+    time, measured, last = responses.time, responses.measured, len(responses.numbers) - 1
+    upper.plot(time, measured, ".", color=MEASURED, markersize=3, label="measured")
+    lower.axhline(0.0, color="black", linewidth=0.6)
+    labels = {0: "start" if responses.numbers[0] == 0 else f"iteration {responses.numbers[0]}"}
+    labels[last] = f"iteration {responses.numbers[last]}" if last else labels[0]
+    colours = _colours(responses.numbers)
+    for k, (samples, colour) in enumerate(zip(responses.samples, colours, strict=True)):
+        width = 1.6 if k in labels else 1.0
+        upper.plot(time, samples, "-", color=colour, linewidth=width, label=labels.get(k))
+        lower.plot(time, MILLI * (samples - measured), color=colour, linewidth=0.8)
+    upper.set_ylabel(label_of(responses.signal))
+    upper.legend(loc="best", frameon=False)
+    lower.set_ylabel(ERROR)
+    tidy(upper)
+    tidy(lower)
+
+
+def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
+    """Draw the change of each signal over time for 1 % more of each parameter.
+
+    What belongs to a record is left out.
+    """
+    responses = analysis.sensitivity
+    labels = {effect.parameter: effect.label for effect in analysis.effects}
+    figure = new_figure(1.2 + 3.0 * len(responses))
+    column = panels(figure, len(responses))[:, 0]
+    for axes, response in zip(column, responses, strict=True):
+        for place, (name, change) in enumerate(response.moved.items()):
+            axes.plot(
+                *envelope(response.time, PERCENT * MILLI * change),
+                STYLES[place // len(COLORS) % len(STYLES)],
+                color=COLORS[place % len(COLORS)],
+                linewidth=1.3,
+                label=labels.get(name, name),
+            )
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
+        tidy(axes)
+    column[-1].set_xlabel("time (s)")
+    handles, texts = column[0].get_legend_handles_labels()
+    figure.legend(handles, texts, loc="outside right upper", frameon=False)
+    figure.suptitle(f"{title}: what each parameter does to the response", fontsize=11)
+    return figure
+
+
+def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
+    """Return the correlations of the estimates as a map; what has none is left blank."""
+    names, values = analysis.confidence.names, analysis.confidence.correlation.matrix
+    side = max(4.2, 1.6 + 0.62 * len(names))
+    figure = new_figure(side, side + 0.8)
+    axes, bar = panels(figure, 1, 2, width_ratios=[1.0, BAR])[0]
+    axes.imshow(values, cmap=COLOUR_MAP, vmin=-1.0, vmax=1.0, aspect="auto")
+    places = range(len(names))
+    axes.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
+    axes.set_yticks(places, names)
+    for row, line in enumerate(values):
+        for column, value in enumerate(line):
+            if np.isfinite(value):
+                color = "white" if abs(value) > 0.7 else "black"
+                axes.text(
+                    column, row, f"{value:.2f}", ha="center", va="center", color=color, fontsize=8
+                ).set_in_layout(False)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(length=0)
+    shades = np.linspace(-1.0, 1.0, SHADES)[:, np.newaxis]
+    bar.imshow(shades, cmap=COLOUR_MAP, aspect="auto", extent=(0.0, 1.0, -1.0, 1.0), origin="lower")
+    bar.set_xticks([])
+    bar.set_ylabel("correlation of the estimates")
+    figure.suptitle(f"{title}: which parameters move together", fontsize=11)
+    return figure
+
+
+def smooth(at: Array, rise: Array) -> tuple[Array, Array]:
+    """Return a profile with points in between: the root of the rise is nearly linear."""
+    places = np.arange(len(at), dtype=np.float64)
+    between = np.linspace(0.0, places[-1], SUBDIVIDED * (len(at) - 1) + 1)
+    roots = np.sqrt(rise) if len(at) > 1 else np.zeros(len(at))
+    return np.interp(between, places, at), np.interp(between, places, roots) ** 2
+
+
+def profiles(profiled: Profiles) -> Figure:
+    """Return the profile of each parameter: the rise of the cost in units of that at the limit."""
+    columns = min(3, len(profiled.profiles))
+    rows = -(-len(profiled.profiles) // columns)
+    figure = new_figure(1.1 + 2.4 * rows)
+    grid = figure.add_gridspec(rows, columns)
+    axes = None
+    for k, profile in enumerate(profiled.profiles):
+        axes = figure.add_subplot(grid[divmod(k, columns)], sharey=axes)
+        axes.tick_params(labelleft=k % columns == 0)
+        branches = [(profile.at, profile.costs, SIMULATED)]
+        branches += [(*branch, OTHER_MINIMA) for branch in profile.others]
+        for at, costs, color in branches:
+            rise = np.maximum(costs - profiled.cost, 0.0) / profile.rise
+            axes.plot(at, rise, "o", color=color, markersize=3)
+            axes.plot(*smooth(at, rise), color=color, linewidth=1.3)
+        if not profiled.verdict.misfit:
+            axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
+        for limit in (profile.low, profile.high):
+            if limit is not None:
+                axes.axvline(limit, color=LIMIT, linewidth=1.0)
+        axes.plot([profile.value], [0.0], "s", color=START, markersize=5)
+        axes.set_xlabel(f"{profile.name} ({profile.unit})" if profile.unit else profile.name)
+        axes.set_ylim(-0.05, 1.5)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+        tidy(axes)
+    figure.supylabel("rise of the cost / rise at the 95 % limit", fontsize=10)
+    why = profiled.verdict.misfit
+    figure.suptitle(
+        f"{profiled.name}: the cost along each parameter, the others fitted"
+        f"{f'; no interval: {why}' if why else ''}",
+        fontsize=11,
+    )
+    return figure
