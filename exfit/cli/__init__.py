@@ -45,12 +45,12 @@ OF_CORE = {
     "validate": _command(
         "examine", "Compare fitted values with records that were not fitted.", "responses:validate"
     ),
-    "check": _command("examine", "Check a case before its fit.", "fitting:check"),
-    "show": _command("examine", "Print a stored result again.", "stored:show"),
+    "check": _command("examine", "Check a case before its fit.", "examining:check"),
+    "show": _command("examine", "Print a stored result again.", "examining:show"),
     "profile": _command(
         "examine",
         "Find the intervals of parameters by their profile likelihood.",
-        "profiling:profile",
+        "examining:profile",
     ),
     "models": _command("reference", "List the models, or describe one.", "catalogue:models"),
     "schema": _command("reference", "Print the JSON Schema of a case file.", "catalogue:schema"),

@@ -1,5 +1,7 @@
-"""The commands fit and check."""
+"""The command fit: of one case, again whenever it changes, or of several cases and strategies."""
 
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,21 +10,29 @@ import click
 from exfit.cli.options import (
     NOT_CONVERGED,
     Given,
+    Interruption,
     Output,
-    case_argument,
+    Refusal,
     cases_argument,
     output_options,
     parameters_option,
     print_json,
+    refuse_own_files,
     set_option,
+    warn,
 )
-from exfit.cli.streams import echo
-from exfit.registry import parts
+from exfit.cli.streams import echo, output_is_lost
+from exfit.errors import CaseError, ExfitError, FileError
+from exfit.runs.runner import FitSettings
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
     from exfit.results.model import FitResult
+    from exfit.runs.fits import FitRun, FitSeries, PlannedFit
+    from exfit.show.figure_files import FigureFiles
+
+SERIES = "fits"  # the folder of a series by default
 
 
 @click.command()
@@ -82,8 +92,6 @@ def fit(
     --parameters changes, and shows the former values beside the new ones; a case with a fault
     waits for the next change. Ctrl-C ends that with exit code 0.
     """
-    from exfit.cli.live_fit import fit_again_and_again, fit_live
-    from exfit.cli.several_fits import fit_several
     from exfit.show import run_folder
 
     given = Given(parameters, changes)
@@ -92,15 +100,15 @@ def fit(
         raise click.UsageError("--verbose shows one fit: not with several, --quiet or --json.")
     if watch and several:
         raise click.UsageError("--watch fits one case with one strategy.")
+    if watch and not output.shown:
+        raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
     if several:
         fit_several(cases, given, strategies, search, output)
         return
-    (case,), strategy = cases, strategies[0] if strategies else None
+    (case,), settings = cases, FitSettings(next(iter(strategies), None), search)
     if watch:
-        if not output.shown:
-            raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
         folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
-        fit_again_and_again(case, given, folder, strategy, search, output, verbose)
+        fit_again_and_again(case, given, folder, settings, output, verbose)
         return
     from exfit.verdict.causes.before_fit import case_warnings, event_warnings
 
@@ -108,53 +116,187 @@ def fit(
     for warning in (*case_warnings(loaded), *event_warnings(loaded)):
         echo(f"warning: {warning}", err=True)
     folder = output.folder_of(loaded, "fit", run_folder.OF_FIT, after_records=True)
-    if output.shown:
-        result = fit_live(loaded, folder, strategy, search, output, verbose)
-    else:
-        result = _fit(loaded, folder, strategy, search, output)
-    if not result.holds:
+    if not fit_one(loaded, folder, settings, output, verbose).holds:
         raise SystemExit(NOT_CONVERGED)
 
 
-def _fit(
-    case: "Case", folder: Path, strategy: str | None, search: str | None, output: Output
+def fit_one(
+    case: "Case",
+    folder: Path,
+    settings: FitSettings,
+    output: Output,
+    verbose: bool = False,
+    before: "FitResult | None" = None,
 ) -> "FitResult":
-    """Fit a case, write its files, and print JSON or nothing."""
+    """Fit a case, show its iterations and its result beside a former one, write its files.
+
+    The figures come last: the result is written and shown before they are drawn.
+    """
     from exfit import workflows
     from exfit.show import run_folder
 
-    result = workflows.fit(case, strategy, search=search)
+    strategy, search = settings
+    if not output.shown:
+        result = workflows.fit(case, strategy, search=search)
+    else:
+        from exfit.show import fits, live, terminal
+
+        console, most = terminal.console(), case.estimate.most_iterations
+        title = live.task(case, strategy)
+        with live.LiveIterations(console, title, most).running() as shown:
+            result = workflows.fit(case, strategy, shown, shown.starts, shown.live, search=search)
+    place = None
     try:
         figures = run_folder.write_fit(result, folder)
+        place = folder
     finally:  # whatever becomes of the files
         if output.as_json:
             print_json(result.to_dict())
-    output.draw(figures)
+        elif output.shown:
+            console.print()
+            if verbose:
+                terminal.show(console, fits.whole(result, place, before))
+            else:
+                terminal.show_shortest(console, fits.briefs(result, place, before))
+    output.draw(figures, listed=verbose)
     return result
 
 
-@click.command(short_help="Check a case before its fit.")
-@case_argument
-def check(case: Path) -> None:
-    """Check CASE before a fit: its record, derivatives, bypassed blocks, a run without a step.
+def fit_again_and_again(
+    case: Path, given: Given, folder: Path, settings: FitSettings, output: Output, verbose: bool
+) -> None:
+    """Fit a case, and again whenever a file of it or of its given values changes, until Ctrl-C.
 
-    Warns of an inverted channel, another base, a step that no regulator is tested with, ripple, a
-    start that is not at rest, and of a validation that sees what is fitted.
-
-    Of a programme it runs the tests at rest, which takes no time, and checks each fit with what
-    they give.
+    Raises ExfitError where there is no such file, or no place for the results: a change of the
+    case would not help.
     """
-    from exfit import workflows
-    from exfit.case.peek import keys_of
-    from exfit.show import checks, terminal
+    from exfit.case.peek import changed, stamps_of
+    from exfit.case.yaml import read_text
+    from exfit.show import run_folder, terminal
 
-    keys = keys_of(case)
-    for key, checked in parts("CHECKS").items():
-        if key in keys:
-            if not checked.load()(case):
-                raise SystemExit(NOT_CONVERGED)
-            return
-    result = workflows.check(case)
-    terminal.show(terminal.console(), checks.check(result))
-    if not (result.agrees and result.flat):
+    read_text(case)
+    run_folder.refuse_unwritable(folder, run_folder.OF_FIT)
+    console, before = terminal.console(), None
+    with suppress(KeyboardInterrupt):
+        while True:
+            stamps = stamps_of(case, given.files)
+            try:
+                loaded = given.load(case)
+                refuse_own_files(loaded, folder, run_folder.OF_FIT, True)
+                before = fit_one(loaded, folder, settings, output, verbose, before)
+            except ExfitError as fault:
+                Refusal(str(fault)).show()
+            if before is not None and before.interrupted:
+                return
+            terminal.waiting(console, stamps)
+            if output_is_lost():
+                return
+            terminal.again(console, changed(stamps))
+
+
+def fit_several(
+    cases: Sequence[Path],
+    given: Given,
+    strategies: Sequence[str],
+    search: str | None,
+    output: Output,
+) -> None:
+    """Fit every case with every strategy, write the files of each fit and those of all.
+
+    The figures come last: all results are written and shown before they are drawn.
+
+    Raises ExfitError with the faults of all cases before the first fit begins, and with those of
+    fits that failed when all else is done; SystemExit where not all fits are done and well.
+    """
+    from exfit.runs.fits import planned
+    from exfit.show import run_folder
+
+    folder = output.folder(SERIES, run_folder.OF_SERIES)
+    plan = planned(cases, strategies, given.load, search)
+    refuse_files_of_cases(plan, folder, run_folder.OF_SERIES)
+    figures: dict[str, FigureFiles] = {}
+    series = run_planned(plan, folder, figures, output)
+    try:
+        of_all = run_folder.write_series(series, folder)
+    finally:  # whatever becomes of the files
+        if output.as_json:
+            print_json(series.to_dict())
+        elif output.shown:
+            from exfit.show import terminal
+            from exfit.show.series import fit_series
+
+            console = terminal.console()
+            console.print()
+            terminal.show(console, fit_series(series))
+    if output.shown:
+        terminal.written(console, folder)
+    output.draw(of_all)
+    if output.figures:
+        draw_each(figures, output)
+    if series.failed:
+        raise FileError(f"{name}: {fault}" for name, fault in series.failed.items())
+    if not series.all_hold:
         raise SystemExit(NOT_CONVERGED)
+
+
+def run_planned(
+    plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]", output: Output
+) -> "FitSeries":
+    """Run the fits, write their numbers and collect their figures; show how far they are.
+
+    Raises Interruption where none is done.
+    """
+    from exfit.runs.fits import run_all
+    from exfit.show import run_folder
+
+    progress = None
+    if output.shown:
+        from exfit.show import live, terminal
+
+        progress = live.SeriesProgress(terminal.console(), plan)
+
+    def finished(run: "FitRun") -> None:
+        if progress is not None:
+            progress.finished(run)
+        figures[run.name] = run_folder.write_fit(run.result, folder / run.name)
+
+    with nullcontext() if progress is None else progress.running():
+        series = run_all(plan, progress or (lambda *_: None), finished)
+    if not series.runs and series.interrupted:
+        raise Interruption("no fit is done")
+    return series
+
+
+def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
+    """Draw the figures of each fit, with a line for each fit where results are shown."""
+    left = [*figures]
+    try:
+        for name, of_fit in figures.items():
+            warn(of_fit.draw())
+            left.remove(name)
+            if output.shown:
+                from exfit.show import terminal
+
+                terminal.figures_of_fit(terminal.console(), name)
+    except KeyboardInterrupt as interruption:
+        others = f", and those of {', '.join(left[1:])}" if left[1:] else ""
+        raise KeyboardInterrupt(f"{interruption}{others}") from None
+
+
+def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, files: Sequence[str]) -> None:
+    """Raise CaseError where results would replace files of a case, or cannot be written.
+
+    ``files`` are those that are written beside the folders of the fits.
+    """
+    from exfit.show import run_folder
+
+    faults: dict[str, None] = {}
+    for fit in plan:
+        try:
+            run_folder.refuse_unwritable(folder / fit.name, run_folder.OF_FIT)
+            refuse_own_files(fit.case, folder / fit.name, run_folder.OF_FIT, True)
+            refuse_own_files(fit.case, folder, files)
+        except ExfitError as fault:
+            faults[str(fault)] = None
+    if faults:
+        raise CaseError(faults)

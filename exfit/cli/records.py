@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import Output, output_options, print_json
+from exfit.cli.options import Output, output_options
 
 time_option = click.option(
     "--time",
@@ -61,20 +61,12 @@ def inspect_(
     """
     from exfit.case.case_draft import CaseDraft
     from exfit.case.suggestion import RecordSettings, suggested_sections
-    from exfit.show import run_folder
+    from exfit.show import inspections, run_folder
 
     # files of one record in several formats have one stem
     folder = output.folder(f"{file.name}-inspect", run_folder.OF_INSPECTION)
     inspection = RecordSettings(clock, unit, sheet, memory=memory).inspect(file)
     figures = run_folder.write_inspection(inspection, folder)
-    if output.as_json:
-        print_json(inspection.as_json())
-    elif output.shown:
-        from exfit.show import inspections, terminal
-
-        console = terminal.console()
-        suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
-        terminal.show(console, inspections.inspection(inspection, suggested.lines()))
-        console.print()
-        terminal.written(console, folder)
-    output.draw(figures)
+    suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
+    blocks = inspections.inspection(inspection, suggested.lines())
+    output.show(inspection.as_json(), blocks, folder, figures)

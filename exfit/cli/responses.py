@@ -17,14 +17,12 @@ from exfit.cli.options import (
     load,
     output_options,
     parameters_option,
-    print_json,
     set_option,
 )
 from exfit.errors import CaseError, ExfitError
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.results.validation_result import ValidationResult
 
 
 OTHER_VALUES = "--parameters FILE, or --as-found for the model before any fit"
@@ -122,7 +120,10 @@ def validate(
     accepted.
     """
     from exfit import workflows
-    from exfit.show import run_folder
+    from exfit.records.reading import file_hash
+    from exfit.show import run_folder, validations
+    from exfit.show.blocks import paragraph
+    from exfit.util.typed import plain
     from exfit.workflows.given_values import read_parameters, sources_in
 
     if as_found and parameters is not None:
@@ -137,12 +138,17 @@ def validate(
     else:
         values, sources = read_parameters(loaded, source), sources_in(source)
         result = workflows.validation_result(loaded, values, *by_hand, sources)
-        result = _of_file(result, source, parameters)
-    options = (*(["--as-found"] if as_found else []), *_options(parameters, *by_hand))
-    result = replace(result, options=options)
+        result = replace(
+            result,
+            origin=f"values of {parameters or 'the last fit'}",
+            inputs={**result.inputs, "parameters": file_hash(source)},
+            files={**result.files, "parameters": source.name},
+        )
+    result = replace(result, options=tuple(_options(as_found, parameters, *by_hand)))
     figures = run_folder.write_validation(result, folder)
-    _show(result, folder, output)
-    output.draw(figures)
+    content = {"validation": [plain(match) for match in result.matches]}
+    blocks = (paragraph(result.origin), *validations.validation(result.matches))
+    output.show(content, blocks, folder, figures)
     if not result.accepted:
         raise SystemExit(NOT_CONVERGED)
 
@@ -160,48 +166,22 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
     if not case.free():
         return case, parameters
     if source is None:
-        raise CaseError(
-            [f"{path}: no earlier fit of this case; run exfit fit, or give {OTHER_VALUES}"]
-        )
+        text = f"no earlier fit of this case; run exfit fit, or give {OTHER_VALUES}"
+        raise CaseError([f"{path}: {text}"])
     return case, source
 
 
-def _of_file(
-    result: "ValidationResult", source: Path, parameters: Path | None
-) -> "ValidationResult":
-    """Return a validation that says which file its values are from: as given, or the last fit's."""
-    from exfit.records.reading import file_hash
-
-    return replace(
-        result,
-        origin=f"values of {parameters or 'the last fit'}",
-        inputs={**result.inputs, "parameters": file_hash(source)},
-        files={**result.files, "parameters": source.name},
-    )
-
-
-def _show(result: "ValidationResult", folder: Path, output: Output) -> None:
-    """Print a validation, as JSON or as tables."""
-    from exfit.util.typed import plain
-
-    if output.as_json:
-        print_json({"validation": [plain(match) for match in result.matches]})
-    elif output.shown:
-        from exfit.show import terminal, validations
-
-        console = terminal.console()
-        console.print(result.origin, soft_wrap=True, markup=False)
-        terminal.show(console, validations.validation(result.matches))
-        console.print()
-        terminal.written(console, folder)
-
-
 def _options(
-    parameters: Path | None, record: Path | None, steps: Sequence[float], instants: Sequence[float]
+    as_found: bool,
+    parameters: Path | None,
+    record: Path | None,
+    steps: Sequence[float],
+    instants: Sequence[float],
 ) -> Iterator[str]:
     """Yield the options with which a validation is made again."""
-    for option, path in (("--parameters", parameters), ("--record", record)):
-        if path is not None:
-            yield from (option, str(path))
-    for option, numbers in (("--step", steps), ("--at", instants)):
-        yield from (word for number in numbers for word in (option, f"{number!r}"))
+    if as_found:
+        yield "--as-found"
+    files = (("--parameters", [parameters]), ("--record", [record]))
+    for option, given in (*files, ("--step", steps), ("--at", instants)):
+        for value in filter(lambda one: one is not None, given):
+            yield from (option, str(value))

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
-from exfit.show import live, terminal
+from exfit.show import live
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_ctrl_c_among_the_causes_keeps_the_fit_and_says_what_was_not_tried(run, 
             if progress.stage == "causes":
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(terminal, "LiveIterations", Interrupting)
+    monkeypatch.setattr(live, "LiveIterations", Interrupting)
     interrupted = run("fit", late, "--no-plots", "-o", "folder", "--verbose")
     assert (whole.code, interrupted.code) == (3, 3)
     assert "note: not tried as causes (interrupted): " in interrupted.out

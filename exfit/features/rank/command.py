@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli import completion
+from exfit.cli.fitting import draw_each, refuse_files_of_cases, run_planned
 from exfit.cli.options import (
     NOT_CONVERGED,
     Output,
@@ -14,7 +15,6 @@ from exfit.cli.options import (
     output_options,
     print_json,
 )
-from exfit.cli.several_fits import draw_each, refuse_files_of_cases, run_planned
 from exfit.util.strategies import SEARCHES, SEARCHES_EXPLAINED
 
 if TYPE_CHECKING:
