@@ -53,6 +53,7 @@ STABILISERS = Catalogue(stabilisers)
 GOVERNORS = Catalogue(governors)
 LIMITERS = Catalogue(limiters)
 
+
 MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "ONE_AXIS")  # known without their files
 
 

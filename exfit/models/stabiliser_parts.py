@@ -50,19 +50,6 @@ ACCELERATING = sheet(
     ("N", 1.0, "1", (1.0, 4.0), "number of blocks of the ramp tracking filter"),
 )
 
-CANONICAL = sheet(
-    ("K0", 1.0, *WITHIN_1000, "gain of the input of the first integrator"),
-    ("K1", 1.0, *WITHIN_1000, "gain of the output of the first integrator"),
-    ("K2", 1.0, *WITHIN_1000, "gain of the output of the second integrator"),
-    ("K3", 1.0, *WITHIN_1000, "gain of the output of the third integrator"),
-    ("K4", 0.0, *WITHIN_1000, "gain of the output of the fourth integrator"),
-    ("KI3", 1.0, *WITHIN_1000, "gain of the third integrator"),
-    ("KI4", 0.0, *WITHIN_1000, "gain of the fourth integrator"),
-    ("TI1", 0.1, "s", (0.001, 1000.0), "time constant of the first integrator"),
-    ("TI2", 0.1, "s", (0.001, 1000.0), "time constant of the second integrator"),
-    ("TI3", 1.0, "s", (0.001, 1000.0), "time constant of the third integrator"),
-    ("TI4", 1.0, "s", (0.001, 1000.0), "time constant of the fourth integrator"),
-)
 
 INPUT_LIMITS = sheet(
     *limits("VSI1MAX", 2.0, -2.0, "the first input"),
@@ -112,16 +99,6 @@ def accelerating_rest(u: Signal, p: Signal, x: Signal, lags: int) -> None:
     x.W2 = x.V6 = x.W4 = x.V7 = 0.0
     for k in range(1, lags + 1):
         setattr(x, f"R{k}", 0.0)
-
-
-def canonical(u: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
-    """Return a weighted sum of a signal, less what four integrators in a row give, and of these."""
-    e = u - (s.X1 + s.X2 + s.X3 + s.X4)
-    d.X1 = e / p.TI1
-    d.X2 = s.X1 / p.TI2
-    d.X3 = p.KI3 * s.X2 / p.TI3
-    d.X4 = p.KI4 * s.X3 / p.TI4
-    return p.K0 * e + p.K1 * s.X1 + p.K2 * s.X2 + p.K3 * s.X3 + p.K4 * s.X4
 
 
 def switched(vs: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:

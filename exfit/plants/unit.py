@@ -10,13 +10,7 @@ from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, STABILISER, SaturationForm, Stabilised, Swing
 from exfit.plants.controls import listening
-from exfit.plants.limiting import (
-    Limiters,
-    limited_exciter,
-    limiters_rest,
-    sheets_of,
-    states_of,
-)
+from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
 from exfit.plants.loaded_machine import Flow, compensated, loaded_at_rest
 from exfit.plants.parts import (
     Names,

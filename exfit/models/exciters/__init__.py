@@ -1,6 +1,6 @@
-"""The exciters, a file each."""
+"""The exciters."""
 
-FAMILIES = {  # files that hold several models
+FAMILIES = {  # files that hold several models; any other is named after its own
     "ac1": "AC1A AC1C EXAC1 EXAC1A",
     "ac2": "AC2A AC2C EXAC2",
     "ac3": "AC3A AC3C EXAC3",

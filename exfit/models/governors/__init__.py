@@ -1,1 +1,6 @@
-"""The turbine governors, a file each."""
+"""The turbine governors."""
+
+FAMILIES = {  # files that hold several models; any other is named after its own
+    "steam": "IEEEG1 IEESGO TGOV1",
+    "gas": "GAST GGOV1",
+}

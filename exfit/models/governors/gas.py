@@ -1,0 +1,295 @@
+"""Governors of gas turbines: GAST and GGOV1."""
+
+from typing import NamedTuple
+
+from exfit.models.blocks import (
+    Limited,
+    Signal,
+    clip,
+    exp,
+    lag,
+    larger,
+    lead_lag,
+    limited,
+    limited_integrator,
+    limited_lag,
+    log,
+    rate,
+    smaller,
+    washout,
+    where,
+)
+from exfit.models.sheet import (
+    DIVIDING_TIME,
+    LONG_TIME,
+    TIME,
+    UP_TO_10,
+    UP_TO_100,
+    WITHIN_10,
+    documented,
+    limits,
+    record,
+    sheet,
+)
+
+
+def gast(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """GAST: gas turbine governor (PSS/E).
+
+                                       VMAX
+    pref ─────────►(+)─►[lower of]─►[   1   ]─►[   1   ]─┬─►(+)─► Pm
+                 -▲     [the two ]  [1 + sT1]  [1 + sT2] │-▲
+    dw ─►[  1/R  ]┘         ▲          VMIN              │ │
+                      AT ─►(+)◄─[KT]◄─(+)◄── AT          │ │
+                                       ▲-                │ │
+                                       └─[   1   ]◄──────┘ │
+                                         [1 + sT3]         │
+    dw ─►[Dturb]───────────────────────────────────────────┘
+
+    pref is a power. The limits are non-windup. A unit that starts above AT, the
+    load that the ambient temperature allows, is not at rest. Typical data are those
+    of IEC 61970-302 (GovGAST).
+    """
+    demand = smaller(u.pref - u.dw / p.R, p.AT + p.KT * (p.AT - s.V3))
+    v1, d.V1 = limited_lag(demand, s.V1, 1.0, p.T1, p.VMIN, p.VMAX)
+    v2, d.V2 = lag(v1, s.V2, 1.0, p.T2)
+    _, d.V3 = lag(v2, s.V3, 1.0, p.T3)
+    return v2 - p.Dturb * u.dw
+
+
+def gast_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states into x that hold Pm at rest and return pref."""
+    x.V1 = x.V2 = x.V3 = pm
+    return pm
+
+
+GAST = documented(
+    gast,
+    gast_rest,
+    sheet(
+        ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
+        ("T1", 0.5, *TIME, "fuel valve lag"),
+        ("T2", 0.5, *TIME, "turbine lag"),
+        ("T3", 3.0, *DIVIDING_TIME, "exhaust temperature lag"),
+        ("AT", 1.0, "pu", (0.001, 10.0), "load limit by the ambient temperature"),
+        ("KT", 3.0, "1", (0.0, 1000.0), "temperature limiter gain"),
+        *limits("VMAX", 1.0, 0.0, "the valve", WITHIN_10),
+        ("Dturb", 0.18, *UP_TO_100, "turbine damping"),
+    ),
+    "V1 V2 V3",
+    records=record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),
+)
+
+
+STEP = 0.01  # s, in which fsra follows fsr
+
+
+NEVER = 9999.0  # pu, of a limiter that is left out
+
+
+class LoadLimiter(NamedTuple):
+    """The limiter's demand for fuel, and how far the load is below its reference."""
+
+    fsrt: Signal
+    error: Signal
+
+
+class Demand(NamedTuple):
+    """The demand for fuel, that of the PID alone, and the error that the PID sees."""
+
+    fsr: Signal
+    fsrn: Signal
+    error: Signal
+
+
+def droop(pe: Signal, valve: Signal, p: Signal) -> Signal:
+    """Return the signal of the droop, 0 where that is fsr: ``fuel_demand`` closes its loop."""
+    of_valve = where((p.Rselect < -0.5) & (p.Rselect > -1.5), valve, 0.0)
+    return where(p.Rselect > 0.5, pe, of_valve)
+
+
+def fuel_demand(error: Signal, least: Signal, s: Signal, p: Signal) -> Demand:
+    """Compute the PID's demand, at most ``least``; ``error`` is that before its dead band.
+
+    With Rselect = -2 demand and error wait for each other; that loop is solved here: it is
+    monotonous, so that a limit holds there as it does here.
+    """
+    steep = p.Kdgov * rate(p.Tdgov)
+    gain, held = p.Kpgov + steep, s.INTEG - steep * s.DERIV
+    loop = where(p.Rselect < -1.5, p.R, 0.0)
+    alone = dead_band(error - loop * held, p) / (1.0 + loop * gain)
+    free = held + gain * clip(alone, p.minerr, p.maxerr)
+    fsr = clip(smaller(free, least), p.VMIN, p.VMAX)
+    seen = clip(dead_band(error - loop * fsr, p), p.minerr, p.maxerr)
+    return Demand(fsr, held + gain * seen, seen)
+
+
+def dead_band(error: Signal, p: Signal) -> Signal:
+    """Take the dead band off an error."""
+    return error - clip(error, -p.db, p.db)
+
+
+def load_limiter(wf: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> LoadLimiter:
+    """Return the demand that keeps the exhaust temperature, fuel through two lags, at its limit."""
+    falling = exp(smaller(p.Dm, 0.0) * log(1.0 + u.dw))
+    temperature, d.TEMP = lead_lag(wf * falling, s.TEMP, p.Tsa, p.Tsb)
+    measured, d.TEMPM = lag(temperature, s.TEMPM, 1.0, p.Tfload)
+    error = p.Ldref / p.Kturb + p.Wfnl - measured
+    return LoadLimiter(p.Kpload * error + s.LOAD, error)
+
+
+def load_integral(fsr: Signal, load: LoadLimiter, s: Signal, p: Signal) -> Limited:
+    """Return the slope of the load limiter's integral; without Kpload it stops at 1."""
+    follows = p.Kpload > 0.0
+    back = where(follows, (fsr - load.fsrt) / where(follows, p.Kpload, 1.0), 0.0)
+    return limited(p.Kiload * (load.error + back), s.LOAD, -NEVER, where(follows, NEVER, 1.0))
+
+
+def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """GGOV1: general governor of a gas turbine, with load and acceleration limiter.
+
+                             maxerr
+    pref + mw ─►(+)─►[dead]─►[clip]─►[    Kpgov + Kigov/s    ]─► fsrn
+              -▲   ▲-[band]  minerr  [+ sKdgov/(1 + sTdgov)]
+    dw ────────┘   └──[R]◄── droop
+
+                                 VMAX
+    fsrn, fsrt, fsra ─►[least]─►[clip]─► fsr
+                                 VMIN
+
+                       Ropen   VMAX
+    fsr ─►(+)─►[ 1  ]─►[clip]─►[ 1 ]─┬─► valve
+           ▲-  [Tact]  Rclose  [ s ] │
+           │                   VMIN  │
+           └─────────────────────────┘
+
+    wf ─►(+)─►[Kturb]─►[1 + sTc]─►(+)─► Pm
+          ▲-           [1 + sTb]   ▲-
+         Wfnl                  Dm (1 + dw)
+
+    Ldref/Kturb + Wfnl ───────────►(+)─►[Kpload + Kiload/s]─► fsrt
+                                 -▲
+    wf ─►[1 + sTsa]─►[     1     ]┘
+         [1 + sTsb]  [1 + sTfload]
+
+    Aset ─────────────►(+)─►[Ka]─►[ 1 ]─► fsra
+                     -▲           [ s ]
+    dw ─►[   s   ]────┘
+         [1 + sTa]
+
+    pe at the start ─►(+)─►[Kimw/s]─► mw
+                    -▲
+    p ─►[     1     ]┴─► pe
+        [1 + sTpelec]
+
+    The droop is of pe (Rselect = 1), the valve (-1), fsr (-2) or none (0); db is
+    the dead band of the error. wf is the valve, with Flag = 1 times the speed. mw
+    stays within 1.1 R, fsrt at most at 1. The integrals of the PID and of the load
+    limiter follow fsr while another signal is the least, as PowerWorld and InterPSS
+    draw it.
+
+    fsra follows fsr where another signal is the least. The programs take fsr of one
+    time step before and Ka times step times (Aset - acceleration); here that step
+    is 10 ms. Ka = 0 leaves the limiter out (there it lets no valve open). Dm < 0
+    multiplies wf on its way to fsrt with (1 + dw)^Dm. pref is a speed, R times the
+    droop at rest; where Rselect = 0, it is 0. A unit that starts above Ldref is not
+    at rest. Trate_Mbase is the turbine's rating over the machine's base, 1 where
+    PSS/E's Trate (MW) is 0. A .dyr file does not have that base: an import names a
+    Trate, by which the valve is that of PowerWorld 24 within 1e-6 pu at rest.
+
+    The equations are those of InterPSS, which has compared them with PowerWorld. In
+    doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power), the way
+    of wf to fsrt where Dm is not negative (InterPSS multiplies it with the speed
+    there) and the input of Kimw/s (pe, or p without its lag). Not modelled: a dead
+    time of a diesel engine (Teng) and limits of rate of the load limiter (Rup,
+    Rdown). Typical data are those of the public libraries (OpenIPSL, InterPSS).
+    """
+    pe, d.PE = lag(u.p / p.Trate_Mbase, s.PE, 1.0, p.Tpelec)
+    power_error = p.Kimw * (s.PE0 - pe)
+    mw, d.MW = limited_integrator(power_error, s.MW, 1.0, -1.1 * p.R, 1.1 * p.R)
+    acceleration, d.ACC = washout(u.dw, s.ACC, 1.0, p.Ta)
+    valve = clip(s.VALVE, p.VMIN, p.VMAX)
+    wf = valve * where(p.Flag > 0.5, 1.0 + u.dw, 1.0)
+    load = load_limiter(wf, s, u, p, d)
+    fsra = where(p.Ka > 0.0, s.FSRA, NEVER)
+    least = smaller(smaller(load.fsrt, 1.0), fsra)
+    demand = fuel_demand(u.pref + mw - u.dw - p.R * droop(pe, valve, p), least, s, p)
+    _, d.DERIV = washout(demand.error, s.DERIV, 1.0, p.Tdgov)
+    d.INTEG = p.Kigov * (demand.error + (demand.fsr - demand.fsrn) / p.Kpgov)
+    d.LOAD = load_integral(demand.fsr, load, s, p)
+    d.FSRA = (demand.fsr - s.FSRA) / STEP + p.Ka * (p.Aset - acceleration)
+    velocity = clip((demand.fsr - valve) / p.Tact, p.Rclose, p.Ropen)
+    d.VALVE = limited(velocity, s.VALVE, p.VMIN, p.VMAX)
+    power, d.TURB = lead_lag(p.Kturb * (wf - p.Wfnl), s.TURB, p.Tc, p.Tb)
+    return p.Trate_Mbase * (power - larger(p.Dm, 0.0) * (1.0 + u.dw))
+
+
+def ggov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states into x that hold Pm at rest and return pref."""
+    x.PE = x.PE0 = u.p / p.Trate_Mbase
+    x.MW = x.DERIV = x.ACC = 0.0
+    x.TURB = pm / p.Trate_Mbase + larger(p.Dm, 0.0)
+    x.VALVE = x.INTEG = x.TEMP = x.TEMPM = x.TURB / p.Kturb + p.Wfnl
+    x.LOAD = where(p.Kpload > 0.0, x.VALVE, 1.0)
+    x.FSRA = x.VALVE + STEP * p.Ka * p.Aset
+    return p.R * where(p.Rselect < -1.5, x.VALVE, droop(x.PE, x.VALVE, p))
+
+
+GGOV1 = documented(
+    ggov1,
+    ggov1_rest,
+    sheet(
+        ("Rselect", 1.0, "1", (-2.0, 1.0), "signal of the droop: 1, 0, -1 or -2"),
+        ("Flag", 0.0, "1", (0.0, 1.0), "1: fuel in proportion to the speed"),
+        ("R", 0.04, *UP_TO_10, "permanent droop"),
+        ("Tpelec", 1.0, *TIME, "power transducer lag"),
+        ("maxerr", 0.05, *UP_TO_10, "ceiling of the speed error"),
+        ("minerr", -0.05, "pu", (-10.0, 0.0), "floor of the speed error"),
+        ("Kpgov", 10.0, "1", (0.001, 1000.0), "proportional gain of the governor"),
+        ("Kigov", 2.0, "1/s", (0.0, 1000.0), "integral gain of the governor"),
+        ("Kdgov", 0.0, *LONG_TIME, "derivative gain of the governor"),
+        ("Tdgov", 1.0, *DIVIDING_TIME, "derivative lag of the governor"),
+        *limits("VMAX", 1.0, 0.15, "the valve", WITHIN_10),
+        ("Tact", 0.5, *DIVIDING_TIME, "actuator time constant"),
+        ("Kturb", 1.5, "1", (0.001, 100.0), "turbine gain"),
+        ("Wfnl", 0.2, "pu", (0.0, 1.0), "fuel flow at no load"),
+        ("Tb", 0.1, *TIME, "turbine lag"),
+        ("Tc", 0.0, *TIME, "turbine lead"),
+        ("Tfload", 3.0, *TIME, "lag of the load limiter"),
+        ("Kpload", 2.0, "1", (0.0, 1000.0), "proportional gain of the load limiter"),
+        ("Kiload", 0.67, "1/s", (0.0, 1000.0), "integral gain of the load limiter"),
+        ("Ldref", 1.0, *UP_TO_10, "reference of the load limiter"),
+        ("Dm", 0.0, "pu", (-100.0, 100.0), "speed sensitivity of the turbine"),
+        ("Ropen", 0.1, "pu/s", (0.0001, 1000.0), "fastest opening of the valve"),
+        ("Rclose", -0.1, "pu/s", (-1000.0, -0.0001), "fastest closing of the valve"),
+        ("Kimw", 0.0, "1/s", (0.0, 1000.0), "gain of the power controller"),
+        ("Aset", 0.01, "pu/s", (0.0, 1000.0), "setpoint of the acceleration limiter"),
+        ("Ka", 10.0, "1", (0.0, 1000.0), "gain of the acceleration limiter"),
+        ("Ta", 0.1, *DIVIDING_TIME, "lag of the acceleration limiter"),
+        ("db", 0.0, "pu", (0.0, 1.0), "dead band of the speed error"),
+        ("Tsa", 4.0, *TIME, "lead of the exhaust temperature"),
+        ("Tsb", 5.0, *TIME, "lag of the exhaust temperature"),
+        ("Trate_Mbase", 1.0, "1", (0.01, 100.0), "turbine rating over the machine's base"),
+    ),
+    "PE MW DERIV INTEG VALVE TURB TEMP TEMPM LOAD ACC FSRA",
+    records=record(
+        "GGOV1",
+        "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng "
+        "Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown",
+        icons={"Rselect": 1, "Flag": 0},
+        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+        ignored="Trate",
+        held={"Trate_Mbase": 1.0},
+    ),
+    pslf_records=record(
+        "ggov1",
+        "R Rselect Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc "
+        "Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET Aset Ka Ta db Tsa Tsb "
+        "Rup Rdown",
+        icons={"Rselect": 1, "Flag": 0},
+        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+        ignored="PMWSET",
+        held={"Trate_Mbase": 1.0},
+    ),
+    setpoints="PE0",
+)
