@@ -159,14 +159,12 @@ def ac3c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 AC3C = documented(
     ac3c,
     ac3c_rest,
-    (
+    sheet(
         *AC3A.sheet,
-        *sheet(
-            ("KPR", 1.0, *PID_GAIN, "proportional gain"),
-            *shared(KIR=0.5),
-            ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain"),
-            *shared(TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0),
-        ),
+        ("KPR", 1.0, *PID_GAIN, "proportional gain"),
+        *shared(KIR=0.5),
+        ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain"),
+        *shared(TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0),
     ),
     "VC VL VA VE VF VI VD",
     aliases=("ESAC3C",),

@@ -188,13 +188,11 @@ def ac7c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 AC7C = documented(
     ac7c,
     ac7c_rest,
-    (
+    sheet(
         *AC7B.sheet,
         *(row for row in with_typical(ALTERNATOR_SUPPLY, KC1=0.2, VBMAX=7.0) if row.symbol != "KP"),
-        *sheet(
-            ("SW2", 1.0, "1", (1.0, 2.0), "supply of the amplifier: 1 VB, 2 field voltage"),
-            *shared(KR=4.0),
-        ),
+        ("SW2", 1.0, "1", (1.0, 2.0), "supply of the amplifier: 1 VB, 2 field voltage"),
+        *shared(KR=4.0),
     ),
     "VC VI VD VF VA VE",
     aliases=("ESAC7C",),

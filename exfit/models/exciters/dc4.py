@@ -136,12 +136,10 @@ def dc4c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 DC4C = documented(
     dc4c,
     dc4c_rest,
-    (
-        *sheet(
-            *shared(TR=0.0, KPR=80.0, KIR=20.0, KDR=20.0, TDR=0.01, VRMAX=2.7, VRMIN=-2.7),
-            *shared(KA_FIXED=1.0, TA=0.02, KE_SIGNED=1.0, TE=0.8, KF_FIXED=0.0, TF=1.0, VEMIN=0.0),
-            *shared(E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
-        ),
+    sheet(
+        *shared(TR=0.0, KPR=80.0, KIR=20.0, KDR=20.0, TDR=0.01, VRMAX=2.7, VRMIN=-2.7),
+        *shared(KA_FIXED=1.0, TA=0.02, KE_SIGNED=1.0, TE=0.8, KF_FIXED=0.0, TF=1.0, VEMIN=0.0),
+        *shared(E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
         *ALTERNATOR_SUPPLY,
     ),
     "VC VI VD VR EFD VF",

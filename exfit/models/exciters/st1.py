@@ -207,9 +207,9 @@ def st1c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 ST1C = documented(
     st1c,
     st1c_rest,
-    (
+    sheet(
         *ST1A.sheet,
-        *sheet(("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 VA")),
+        ("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 VA"),
     ),
     "VC VL VL1 VA VF",
     aliases=("ESST1C",),

@@ -161,17 +161,14 @@ def st4c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 ST4C = documented(
     st4c,
     st4c_rest,
-    (
+    sheet(
         *(
             row._replace(meaning="firing circuit time constant") if row.symbol == "TA" else row
             for row in with_typical(ST4B.sheet, VRMAX=2.0, VRMIN=-1.74)
         ),
-        *sheet(
-            *limits("VAMAX", 0.95, -0.82, "the lag before the rectifier"),
-            ("TG", 0.02, *SHORT_TIME, "feedback lag of the field voltage loop", FREE),
-            *shared(VGMAX=5.8),
-        ),
-        *shared(SW1=1.0),
+        *limits("VAMAX", 0.95, -0.82, "the lag before the rectifier"),
+        ("TG", 0.02, *SHORT_TIME, "feedback lag of the field voltage loop", FREE),
+        *shared(VGMAX=5.8, SW1=1.0),
     ),
     "VC VR VM VA VG",
     aliases=("ESST4C",),

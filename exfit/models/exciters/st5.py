@@ -156,18 +156,16 @@ def st5c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 ST5C = documented(
     st5c,
     st5c_rest,
-    (
+    sheet(
         *ST5B.sheet,
-        *sheet(
-            ("TUC1", 2.0, *TIME, "first regulator lead while UEL has the gate"),
-            ("TUB1", 10.0, *TIME, "first regulator lag while UEL has the gate"),
-            ("TUC2", 0.1, *TIME, "second regulator lead while UEL has the gate"),
-            ("TUB2", 0.05, *TIME, "second regulator lag while UEL has the gate"),
-            ("TOC1", 0.1, *TIME, "first regulator lead while OEL has the gate"),
-            ("TOB1", 2.0, *TIME, "first regulator lag while OEL has the gate"),
-            ("TOC2", 0.08, *TIME, "second regulator lead while OEL has the gate"),
-            ("TOB2", 0.08, *TIME, "second regulator lag while OEL has the gate"),
-        ),
+        ("TUC1", 2.0, *TIME, "first regulator lead while UEL has the gate"),
+        ("TUB1", 10.0, *TIME, "first regulator lag while UEL has the gate"),
+        ("TUC2", 0.1, *TIME, "second regulator lead while UEL has the gate"),
+        ("TUB2", 0.05, *TIME, "second regulator lag while UEL has the gate"),
+        ("TOC1", 0.1, *TIME, "first regulator lead while OEL has the gate"),
+        ("TOB1", 2.0, *TIME, "first regulator lag while OEL has the gate"),
+        ("TOC2", 0.08, *TIME, "second regulator lead while OEL has the gate"),
+        ("TOB2", 0.08, *TIME, "second regulator lag while OEL has the gate"),
     ),
     "VC VL1 VL2 VE VU1 VU2 VO1 VO2",
     aliases=("ESST5C",),

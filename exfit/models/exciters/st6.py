@@ -139,11 +139,10 @@ def st6c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
 ST6C = documented(
     st6c,
     st6c_rest,
-    (
+    sheet(
         *ST6B.sheet,
-        *sheet(
-            *shared(TA_OF_FIRING=0.02), *limits("VMMAX", 4.5, -3.6, "the lag before the rectifier")
-        ),
+        *shared(TA_OF_FIRING=0.02),
+        *limits("VMMAX", 4.5, -3.6, "the lag before the rectifier"),
         *STATIC_SUPPLY,
     ),
     "VC VI VD VM VG",

@@ -56,27 +56,25 @@ from exfit.models.sheet import (
 
 ALIASES = ("ESST8C",)
 
-SHEET = (
-    *sheet(
-        *shared(TR=0.012, KPR_OF_REGULATOR=20.0, KIR_OF_REGULATOR=10.0),
-        *limits("VPIMAX", 4.5, -1.0, "the field current reference"),
-        ("KPA", 1.0, *PID_GAIN, "proportional gain of the field current loop", FREE),
-        ("KIA", 10.0, *INTEGRAL_GAIN, "integral gain of the field current loop", FREE),
-        *limits("VAMAX", 1.2, -1.0, "the field current loop"),
-        ("KA", 1.0, *GAIN, "regulator gain"),
-        ("TA", 0.01, *SHORT_TIME, "regulator time constant", FREE),
-        *shared(VRMAX=1.0, VRMIN=-0.87),
-        ("KF", 1.0, *UP_TO_100, "feedback gain of the field current"),
-        ("TF", 0.02, *SHORT_TIME, "feedback lag of the field current", FREE),
-        ("KC1", 0.05, *UP_TO_100, "rectifier loading factor"),
-        *shared(KP=6.0),
-        ("KI1", 0.0, *UP_TO_100, "current source gain, on load"),
-        *shared(XL=0.0, THETAP=0.0),
-        ("VB1MAX", 8.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
-        ("KC2", 0.05, *UP_TO_100, "loading factor of the second rectifier, on load"),
-        ("KI2", 0.5, *UP_TO_100, "gain of the second source, on load"),
-        ("VB2MAX", 0.5, "pu", (0.01, 9999.0), "ceiling of the second source, on load"),
-    ),
+SHEET = sheet(
+    *shared(TR=0.012, KPR_OF_REGULATOR=20.0, KIR_OF_REGULATOR=10.0),
+    *limits("VPIMAX", 4.5, -1.0, "the field current reference"),
+    ("KPA", 1.0, *PID_GAIN, "proportional gain of the field current loop", FREE),
+    ("KIA", 10.0, *INTEGRAL_GAIN, "integral gain of the field current loop", FREE),
+    *limits("VAMAX", 1.2, -1.0, "the field current loop"),
+    ("KA", 1.0, *GAIN, "regulator gain"),
+    ("TA", 0.01, *SHORT_TIME, "regulator time constant", FREE),
+    *shared(VRMAX=1.0, VRMIN=-0.87),
+    ("KF", 1.0, *UP_TO_100, "feedback gain of the field current"),
+    ("TF", 0.02, *SHORT_TIME, "feedback lag of the field current", FREE),
+    ("KC1", 0.05, *UP_TO_100, "rectifier loading factor"),
+    *shared(KP=6.0),
+    ("KI1", 0.0, *UP_TO_100, "current source gain, on load"),
+    *shared(XL=0.0, THETAP=0.0),
+    ("VB1MAX", 8.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    ("KC2", 0.05, *UP_TO_100, "loading factor of the second rectifier, on load"),
+    ("KI2", 0.5, *UP_TO_100, "gain of the second source, on load"),
+    ("VB2MAX", 0.5, "pu", (0.01, 9999.0), "ceiling of the second source, on load"),
     *shared(SW1=1.0),
 )
 

@@ -33,20 +33,18 @@ from exfit.models.sheet import FREE, ONE_GATE, POSITIVE_TIME, SHORT_TIME, record
 
 ALIASES = ("ESST9C",)
 
-SHEET = (
-    *sheet(
-        *shared(TR=0.02),
-        ("TCD", 0.06, *SHORT_TIME, "time constant of the derivative"),
-        ("TBD", 0.03, *SHORT_TIME, "lag of the derivative"),
-        ("ZA", 0.036, "pu", (0.0, 9999.0), "dead band of the derivative"),
-        *shared(KA=12.0),
-        ("KU", 100.0, "1", (0.0, 1e6), "gain of the change to TAUEL while UEL has the gate"),
-        ("TA", 2.0, *POSITIVE_TIME, "time constant of the integral", FREE),
-        ("TAUEL", 3.0, *POSITIVE_TIME, "that of the integral while UEL has the gate"),
-        *shared(VRMAX=1.0, VRMIN=-0.866),
-        ("KAS", 6.1, "pu", (0.01, 1000.0), "gain of the power converter"),
-        ("TAS", 0.01, *SHORT_TIME, "firing circuit time constant", FREE),
-    ),
+SHEET = sheet(
+    *shared(TR=0.02),
+    ("TCD", 0.06, *SHORT_TIME, "time constant of the derivative"),
+    ("TBD", 0.03, *SHORT_TIME, "lag of the derivative"),
+    ("ZA", 0.036, "pu", (0.0, 9999.0), "dead band of the derivative"),
+    *shared(KA=12.0),
+    ("KU", 100.0, "1", (0.0, 1e6), "gain of the change to TAUEL while UEL has the gate"),
+    ("TA", 2.0, *POSITIVE_TIME, "time constant of the integral", FREE),
+    ("TAUEL", 3.0, *POSITIVE_TIME, "that of the integral while UEL has the gate"),
+    *shared(VRMAX=1.0, VRMIN=-0.866),
+    ("KAS", 6.1, "pu", (0.01, 1000.0), "gain of the power converter"),
+    ("TAS", 0.01, *SHORT_TIME, "firing circuit time constant", FREE),
     *STATIC_SUPPLY,
 )
 

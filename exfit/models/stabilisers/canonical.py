@@ -107,19 +107,17 @@ def pss6c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
 PSS6C = documented(
     pss6c,
     pss6c_rest,
-    (
-        *sheet(
-            ("KS1", 1.0, *WITHIN_1000, "gain of the first input"),
-            *of_stabiliser(T1_OF_INPUT=0.01),
-            ("T3", 0.4405, *TIME, "lag of the first input"),
-            ("KS2", 1.0, *WITHIN_1000, "gain of the second input"),
-            ("MACC", 20.6838, "s", (-1000.0, 1000.0), "lead of the second input"),
-            *of_stabiliser(T2_OF_INPUT=0.01),
-            ("T4", 0.4405, *DIVIDING_TIME, "lag of the second input"),
-            ("TD", 1.7809, *WASHOUT_TIME, "washout of the sum"),
-            ("KS", 1.0, *WITHIN_10000, "stabiliser gain"),
-            *of_stabiliser(VSTMAX=0.05, VSTMIN=-0.05),
-        ),
+    sheet(
+        ("KS1", 1.0, *WITHIN_1000, "gain of the first input"),
+        *of_stabiliser(T1_OF_INPUT=0.01),
+        ("T3", 0.4405, *TIME, "lag of the first input"),
+        ("KS2", 1.0, *WITHIN_1000, "gain of the second input"),
+        ("MACC", 20.6838, "s", (-1000.0, 1000.0), "lead of the second input"),
+        *of_stabiliser(T2_OF_INPUT=0.01),
+        ("T4", 0.4405, *DIVIDING_TIME, "lag of the second input"),
+        ("TD", 1.7809, *WASHOUT_TIME, "washout of the sum"),
+        ("KS", 1.0, *WITHIN_10000, "stabiliser gain"),
+        *of_stabiliser(VSTMAX=0.05, VSTMIN=-0.05),
         *with_typical(
             CANONICAL,
             **{"K0": 1.3322, "K1": 0.2903, "K2": 0.7371, "K3": 0.0813},
@@ -190,9 +188,9 @@ def pss7c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
 PSS7C = documented(
     pss7c,
     pss7c_rest,
-    (
+    sheet(
         *ACCELERATING,
-        *sheet(*of_stabiliser(KS1=50.0, VSTMAX=0.05, VSTMIN=-0.05)),
+        *of_stabiliser(KS1=50.0, VSTMAX=0.05, VSTMIN=-0.05),
         *with_typical(
             CANONICAL,
             **{"K0": 0.399, "K1": 1.8462, "K2": 0.4231, "K3": 0.2104},

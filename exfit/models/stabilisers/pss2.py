@@ -161,10 +161,11 @@ def pss2c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
 PSS2C = documented(
     pss2c,
     pss2c_rest,
-    (
+    sheet(
         *ACCELERATING,
         *of_stabiliser(KS1=5.0, T1=0.16, T2=0.04, T3=0.16, T4=0.04, T10=0.18, T11=0.03),
-        *sheet(("T12", 0.0, *TIME, "fourth lead"), ("T13", 0.0, *TIME, "fourth lag")),
+        ("T12", 0.0, *TIME, "fourth lead"),
+        ("T13", 0.0, *TIME, "fourth lag"),
         *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
         *INPUT_LIMITS,
         *SWITCH,
