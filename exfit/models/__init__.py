@@ -73,19 +73,14 @@ def find(name: str, folder: Path, sha256: str = "") -> Model:
     for listed in sorted(MODELS, key=lambda listed: not wanted.endswith(listed)):
         if wanted in MODELS[listed].aliases:
             return MODELS[listed]
+    from difflib import get_close_matches
+
     names = [listed for entry in MODELS.values() for listed in (entry.name, *entry.aliases)]
-    raise ModelError(
-        f"{name} is not in the catalogue, which exfit models lists{_hint(wanted, names)}"
-    )
-
-
-def _hint(name: str, names: list[str]) -> str:
-    """Return the names that a wrong one may mean: of those as near, what begins as it does."""
-    import difflib
-
-    close = difflib.get_close_matches(name, names, n=len(names))
-    close.sort(key=lambda other: (-_letters_shared(name, other), other))
-    return f"; did you mean {' or '.join(close[:2])}?" if close else ""
+    close = get_close_matches(wanted, names, n=len(names))
+    # of those as near, what begins as it does
+    close.sort(key=lambda other: (-_letters_shared(wanted, other), other))
+    hint = f"; did you mean {' or '.join(close[:2])}?" if close else ""
+    raise ModelError(f"{name} is not in the catalogue, which exfit models lists{hint}")
 
 
 def _letters_shared(name: str, other: str) -> int:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from inspect import cleandoc
 from math import inf, isfinite
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from exfit.errors import ModelError
@@ -290,36 +291,37 @@ class DynamicsRecord:
 
 
 Records = tuple[DynamicsRecord, ...]
+NONE: Mapping[Any, Any] = MappingProxyType({})
 
 
 def record(
     name: str,
     cons: str,
     *,
-    icons: Mapping[str, int] | None = None,
-    absent: Mapping[str, float] | None = None,
+    icons: Mapping[str, int] = NONE,
+    absent: Mapping[str, float] = NONE,
     ignored: str = "",
     doubt: str = "",
-    held: Mapping[str, float] | None = None,
+    held: Mapping[str, float] = NONE,
     times_speed: bool = False,
-    spelled: Mapping[str, str] | None = None,
-    places: Mapping[int, str] | None = None,
-    unused: Mapping[str, str] | None = None,
+    spelled: Mapping[str, str] = NONE,
+    places: Mapping[int, str] = NONE,
+    unused: Mapping[str, str] = NONE,
     exchanged: str = "",
 ) -> Records:
     """Return a record from its symbols in one text, ``"TR KA TA"``; several are added."""
     made = DynamicsRecord(
         name,
         tuple(cons.split()),
-        tuple((icons or {}).items()),
-        tuple((absent or {}).items()),
+        tuple(icons.items()),
+        tuple(absent.items()),
         tuple(ignored.split()),
         doubt,
-        tuple((held or {}).items()),
+        tuple(held.items()),
         times_speed,
-        tuple((spelled or {}).items()),
-        tuple((places or {}).items()),
-        tuple((unused or {}).items()),
+        tuple(spelled.items()),
+        tuple(places.items()),
+        tuple(unused.items()),
         tuple(exchanged.split()),
     )
     return (made,)
@@ -406,6 +408,10 @@ def documented(
     )
 
 
+NEEDED = ("equations", "rest", "SHEET", "STATES")  # of a file that defines a model
+OPTIONAL = ("SETPOINTS", "ALIASES", "RECORDS", "PSLF_RECORDS", "INPUTS", "PLACES", "DOUBT")
+
+
 def model(name: str, parts: Mapping[str, Any]) -> Model:
     """Return the model that a file's names define.
 
@@ -413,48 +419,34 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
     SHEET, STATES, equations and rest.
     """
     _refuse_incomplete(name, parts)
-    found = documented(
-        parts["equations"],
-        parts["rest"],
-        parts["SHEET"],
-        parts["STATES"],
-        text=str(parts["__doc__"]),
-        setpoints=parts.get("SETPOINTS", ""),
-        aliases=parts.get("ALIASES", ()),
-        records=parts.get("RECORDS", ()),
-        pslf_records=parts.get("PSLF_RECORDS", ()),
-        inputs=parts.get("INPUTS", ()),
-        places=parts.get("PLACES", ()),
-        doubt=str(parts.get("DOUBT", "")),
-    )
-    _refuse_repeated(name, "STATES", [*found.states, *found.setpoints])
-    _refuse_repeated(name, "SHEET", [row.symbol for row in found.sheet])
+    equations, rest, rows, states = (parts[part] for part in NEEDED)
+    given = {part.lower(): parts[part] for part in OPTIONAL if part in parts}
+    found = documented(equations, rest, rows, states, text=str(parts["__doc__"]), **given)
+    names = {
+        "STATES": (*found.states, *found.setpoints),
+        "SHEET": tuple(row.symbol for row in found.sheet),
+    }
+    for part, listed in names.items():
+        repeated = sorted({symbol for symbol in listed if listed.count(symbol) > 1})
+        if repeated:
+            raise ModelError(f"model {name}: {part}: duplicate name: {', '.join(repeated)}")
     return replace(found, name=name)
 
 
 def _refuse_incomplete(name: str, parts: Mapping[str, Any]) -> None:
     """Raise ModelError where a file lacks a part of a model, or one is of another kind."""
-    missing = [
-        part for part in ("__doc__", "SHEET", "STATES", "equations", "rest") if not parts.get(part)
-    ]
+    missing = [part for part in ("__doc__", *NEEDED) if not parts.get(part)]
     if missing:
         raise ModelError(f"model {name}: its file lacks {', '.join(missing)}")
-    if not all(isinstance(row, Parameter) for row in parts["SHEET"]):
+    equations, rest, rows, states = (parts[part] for part in NEEDED)
+    if not all(isinstance(row, Parameter) for row in rows):
         raise ModelError(f"model {name}: its SHEET is not what sheet(...) returns")
-    texts = parts["STATES"], parts.get("SETPOINTS", "")
-    functions = parts["equations"], parts["rest"]
+    texts, functions = (states, parts.get("SETPOINTS", "")), (equations, rest)
     if not (all(isinstance(text, str) for text in texts) and all(map(callable, functions))):
         raise ModelError(
             f"model {name}: STATES (and SETPOINTS) must be a text of names, equations and "
             "rest must be functions"
         )
-
-
-def _refuse_repeated(name: str, part: str, names: Sequence[str]) -> None:
-    """Raise ModelError where a name occurs twice."""
-    repeated = sorted({symbol for symbol in names if names.count(symbol) > 1})
-    if repeated:
-        raise ModelError(f"model {name}: {part}: duplicate name: {', '.join(repeated)}")
 
 
 def typical(rows: Sheet) -> dict[str, float]:

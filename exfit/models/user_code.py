@@ -35,11 +35,6 @@ def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
     return _run_once(path, code) if sha256 else _run(path, code)
 
 
-@cache
-def _run_once(path: Path, code: bytes) -> dict[str, Any]:
-    return _run(path, code)
-
-
 def _run(path: Path, code: bytes) -> dict[str, Any]:
     module = ModuleType(f"exfit_user_{path.stem}")
     try:
@@ -48,3 +43,6 @@ def _run(path: Path, code: bytes) -> dict[str, Any]:
     except (Exception, SystemExit) as fault:
         raise ModelError(f"{path}: {type(fault).__name__}: {fault}") from fault
     return vars(module)
+
+
+_run_once = cache(_run)

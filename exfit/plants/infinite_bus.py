@@ -7,7 +7,7 @@ from typing import Literal
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal, sqrt
 from exfit.models.blocks import modulus
-from exfit.models.machines import Axes, Machine
+from exfit.models.machines import Machine
 from exfit.models.sheet import UP_TO_10, WITHIN_10, Model, Sheet, sheet
 from exfit.plants import (
     BREAKER,
@@ -23,7 +23,7 @@ from exfit.plants import (
     compared,
 )
 from exfit.plants.limiting import Limiters, signals_of
-from exfit.plants.loaded_machine import behind, breaker_of, current
+from exfit.plants.loaded_machine import Terminals, behind, breaker_of, current, voltage
 from exfit.plants.parts import (
     Names,
     motion,
@@ -36,9 +36,7 @@ from exfit.plants.parts import (
 from exfit.plants.unit import (
     ROTOR,
     Controls,
-    Terminals,
     UnitOnLoad,
-    UnitState,
     unit_at_rest,
     unit_motion,
 )
@@ -124,11 +122,11 @@ def infinite_bus(
         breaker = breaker_of(u, dw) if BREAKER in inputs else None
         if breaker is not None:
             i, dw, factor = breaker.current(closed), breaker.dw, breaker.factor
-        v = Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
-        terminals, it = Terminals(fluxes, v, i, dw), modulus(closed.d, closed.q)
+        terminals = Terminals(fluxes, voltage(at, i, factor), i, dw)
+        it = modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]
         controls = Controls(vref, changed.vs, u.get(MEASURED, 0.0), changed.pref)
-        efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
+        efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, p, {**r, **x}, n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         if breaker is not None:
             it, d.delta = breaker.until_open(it), breaker.until_open(d.delta)

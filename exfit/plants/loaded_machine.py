@@ -89,9 +89,41 @@ def current(at: Source, E: Signal, R: Signal, X: Signal, delta: Signal) -> Axes:
     return Axes((R * drop_d + xq * drop_q) * scale, (R * drop_q - xd * drop_d) * scale)
 
 
+def voltage(at: Source, i: Axes, factor: Signal = 1.0) -> Axes:
+    """Return the voltage of a machine at a current, times a factor of its speed."""
+    return Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
+
+
 def compensated(v: Axes, i: Axes, n: Names) -> Signal:
     """Return VC1 = |vt + (Rc + jXc) it| (IEEE Std 421.5-2005, 4): a positive Xc is a droop."""
     return modulus(v.d + n.Rc * i.d - n.Xc * i.q, v.q + n.Rc * i.q + n.Xc * i.d)
+
+
+class Terminals(NamedTuple):
+    """A unit's terminals at one instant: voltage and current by the axes of its rotor.
+
+    ``fluxes`` are the machine's states, ``dw`` the speed less 1 that is heard and shown.
+    """
+
+    fluxes: Names
+    v: Axes
+    i: Axes
+    dw: Signal
+
+    @property
+    def vt(self) -> Signal:
+        """The terminal voltage."""
+        return modulus(self.v.d, self.v.q)
+
+    @property
+    def p(self) -> Signal:
+        """The active power."""
+        return self.v.d * self.i.d + self.v.q * self.i.q
+
+    @property
+    def q(self) -> Signal:
+        """The reactive power."""
+        return self.v.q * self.i.d - self.v.d * self.i.q
 
 
 class MachineBreaker(NamedTuple):

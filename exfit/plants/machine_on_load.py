@@ -7,7 +7,7 @@ from exfit.models.blocks import modulus
 from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import WITHIN_10, Sheet, sheet
 from exfit.plants import BREAKER, MACHINE, NETWORK, SPEED, VT0, Equipment, PlantKind
-from exfit.plants.loaded_machine import Flow, breaker_of, loaded_at_rest
+from exfit.plants.loaded_machine import Flow, Terminals, breaker_of, loaded_at_rest, voltage
 from exfit.plants.parts import (
     Names,
     motion,
@@ -49,7 +49,7 @@ def machine_on_load(machine: Machine, inputs: tuple[str, ...] = (BREAKER,)) -> S
         i, factor = breaker.current(closed), breaker.factor
         fluxes = values_named(x, machine.states)
         at = machine.source(fluxes, values)
-        v = Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
+        terminals = Terminals(fluxes, voltage(at, i, factor), i, breaker.dw)
         ifd, efd = machine.field(fluxes, i, values), r["efd"] + u.get("efd", 0.0)
         machine.slopes(fluxes, efd, ifd, i, values, slopes)
         machine.q_slopes(fluxes, i, values, slopes)
@@ -59,10 +59,10 @@ def machine_on_load(machine: Machine, inputs: tuple[str, ...] = (BREAKER,)) -> S
         d = Names(**{name: breaker.once_open(slope) for name, slope in vars(slopes).items()})
         outputs = {
             "efd": efd,
-            "vt": modulus(v.d, v.q),
+            "vt": terminals.vt,
             "ifd": ifd,
-            "p": v.d * i.d + v.q * i.q,
-            "q": v.q * i.d - v.d * i.q,
+            "p": terminals.p,
+            "q": terminals.q,
             "it": breaker.until_open(modulus(closed.d, closed.q)),
             "speed": 1.0 + breaker.dw,
         }

@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 from exfit.engine.system import Rest, Signals
 from exfit.engine.trace import Signal
-from exfit.models.blocks import modulus
-from exfit.models.machines import Axes, Machine
+from exfit.models.machines import Machine
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, STABILISER, SaturationForm, Stabilised, Swing
 from exfit.plants.controls import listening
 from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
-from exfit.plants.loaded_machine import Flow, compensated, loaded_at_rest
+from exfit.plants.loaded_machine import Flow, Terminals, compensated, loaded_at_rest
 from exfit.plants.parts import (
     Names,
     Part,
@@ -82,33 +81,6 @@ class UnitOnLoad(NamedTuple):
         return seconds(*unit, *added)
 
 
-class Terminals(NamedTuple):
-    """A unit's terminals at one instant: voltage and current by the axes of its rotor.
-
-    ``fluxes`` are the machine's states, ``dw`` the speed less 1 that is heard and shown.
-    """
-
-    fluxes: Names
-    v: Axes
-    i: Axes
-    dw: Signal
-
-    @property
-    def vt(self) -> Signal:
-        """The terminal voltage."""
-        return modulus(self.v.d, self.v.q)
-
-    @property
-    def p(self) -> Signal:
-        """The active power."""
-        return self.v.d * self.i.d + self.v.q * self.i.q
-
-    @property
-    def q(self) -> Signal:
-        """The reactive power."""
-        return self.v.q * self.i.d - self.v.d * self.i.q
-
-
 class Controls(NamedTuple):
     """Inputs of a unit beside its terminals: reference, vs, and the voltage added to vc1.
 
@@ -119,14 +91,6 @@ class Controls(NamedTuple):
     vs: Signal = 0.0
     measured: Signal = 0.0
     pref: Signal = 0.0
-
-
-class UnitState(NamedTuple):
-    """The parameters of a system, what held it at rest, and its states at one instant."""
-
-    p: Signals
-    r: Signals
-    x: Signals
 
 
 class Excited(NamedTuple):
@@ -165,13 +129,19 @@ def unit_at_rest(
 
 
 def unit_motion(
-    unit: UnitOnLoad, at: Terminals, controls: Controls, given: UnitState, network: Names, d: Names
+    unit: UnitOnLoad,
+    at: Terminals,
+    controls: Controls,
+    p: Signals,
+    state: Signals,
+    network: Names,
+    d: Names,
 ) -> Excited:
     """Write the slopes of a unit's states but delta into ``d``, and return what it shows.
 
+    ``state`` holds its states, and the setpoints that held it at rest. The speed follows from
     2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power; as a torque Pm is not divided.
     """
-    p, state = given.p, {**given.r, **given.x}
     of_machine = named_parameters(p, MACHINE, unit.machine.sheet)
     ifd = unit.machine.field(at.fluxes, at.i, of_machine)
     power, vt, vs = at.p, at.vt, controls.vs

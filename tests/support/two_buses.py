@@ -21,9 +21,9 @@ from exfit.models import GOVERNORS
 from exfit.models.blocks import Limited
 from exfit.models.machines import Axes
 from exfit.plants import GOVERNOR, MACHINE, SATURATION, STABILISER, Stabilised
-from exfit.plants.loaded_machine import Flow
+from exfit.plants.loaded_machine import Flow, Terminals
 from exfit.plants.parts import Names, named_parameters, values_named
-from exfit.plants.unit import Controls, Terminals, UnitOnLoad, UnitState, unit_at_rest, unit_motion
+from exfit.plants.unit import Controls, UnitOnLoad, unit_at_rest, unit_motion
 
 MACHINE_RECORD = """\
 1 'GENROU' 1 6.0 0.033 0.54 0.078 6.4 0.0 0.8958 0.8645 0.1189 0.1969 0.089 0.0521 0.0 0.0 /
@@ -108,8 +108,8 @@ class TwoBuses:
         v = inner - 1j * at.xd * i
         terminals = Terminals(fluxes, Axes(-v.imag, v.real), Axes(-i.imag, i.real), dw)
         controls = Controls(self.held["vref"] + (self.pulse if disturbed else 0.0))
-        known = UnitState(self.values, self.held, state)
-        shown = unit_motion(unit, terminals, controls, known, UNCOMPENSATED, d)
+        held = {**self.held, **state}
+        shown = unit_motion(unit, terminals, controls, self.values, held, UNCOMPENSATED, d)
         d.delta = 2.0 * pi * 60.0 * dw
         d.dw = d.dw + terminals.p * (1.0 - 1.0 / speed) / (2.0 * p.H)  # the torque is p over speed
         signals = {"vt": terminals.vt, "p": terminals.p, "q": terminals.q, "efd": shown.efd}

@@ -10,7 +10,7 @@ from exfit.models.machines import Axes
 from exfit.models.sheet import Sheet, sheet
 from exfit.plants import MACHINE, MEASURED, NETWORK, REFERENCES, VT0, Equipment, PlantKind, PowerAt
 from exfit.plants.limiting import signals_of
-from exfit.plants.loaded_machine import Flow, behind, current
+from exfit.plants.loaded_machine import Flow, Terminals, behind, current, voltage
 from exfit.plants.parts import (
     Names,
     initial,
@@ -24,9 +24,7 @@ from exfit.plants.parts import (
 from exfit.plants.unit import (
     ROTOR,
     Controls,
-    Terminals,
     UnitOnLoad,
-    UnitState,
     unit_at_rest,
     unit_motion,
 )
@@ -116,11 +114,10 @@ def grid_playback(
         at, recorded, delta = machine.source(fluxes, of_machine), p[VT0] + u["vt"], x["delta"]
         delta = delta - u["angle"]
         i = current(at, recorded, n.R, n.X, delta)
-        v = Axes(at.voltage.d + at.xq * i.q, at.voltage.q - at.xd * i.d)
-        terminals = Terminals(fluxes, v, i, x["dw"])
+        terminals = Terminals(fluxes, voltage(at, i), i, x["dw"])
         vref = r["vref"] + u["vref"]
         controls = Controls(vref, u.get("vs", 0.0), pref=u.get("pref", 0.0))
-        efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
+        efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, p, {**r, **x}, n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         measured = terminals
         if power_at == "recorded-voltage":

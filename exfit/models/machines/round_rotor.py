@@ -146,7 +146,7 @@ def machine(
         rest=partial(rest, form),
         quadrature=partial(quadrature, form),
         faults=partial(faults, order),
-        records=record(name, CONS, unused={"S12": "S10"} if of_psse else None),
+        records=record(name, CONS, unused={"S12": "S10"} if of_psse else {}),
         pslf_records=pslf_record("genrou", CONS) if of_psse else (),
         saturation=shape,
     )
