@@ -18,33 +18,28 @@ algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10
 Iterative methods for optimization, chapters 2 and 3.
 """
 
-from typing import TYPE_CHECKING
-
-from exfit.util.lazy import names_of
-
-if TYPE_CHECKING:
-    from exfit.estimate.problem import (
-        STATUS,
-        Functions,
-        OneByOne,
-        Progress,
-        Result,
-        SolverIteration,
-        Stop,
-        half_square,
-    )
-    from exfit.estimate.profiling import CostProfile, LowerMinimum, ProfileEnd, profile, profiles
-    from exfit.estimate.searches import (
-        ArmijoDamping,
-        LineSearch,
-        RatioDamping,
-        Searches,
-        TrustRegion,
-        to_half,
-        to_parabola,
-    )
-    from exfit.estimate.solver import Descent, least_squares
-    from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
+from exfit.estimate.problem import (
+    STATUS,
+    Functions,
+    OneByOne,
+    Progress,
+    Result,
+    SolverIteration,
+    Stop,
+    half_square,
+)
+from exfit.estimate.profiling import CostProfile, LowerMinimum, ProfileEnd, profile, profiles
+from exfit.estimate.searches import (
+    ArmijoDamping,
+    LineSearch,
+    RatioDamping,
+    Searches,
+    TrustRegion,
+    to_half,
+    to_parabola,
+)
+from exfit.estimate.solver import Descent, least_squares
+from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
 
 __all__ = [
     "STATUS",
@@ -74,35 +69,3 @@ __all__ = [
     "to_half",
     "to_parabola",
 ]
-
-_MODULES = {
-    "ArmijoDamping": "exfit.estimate.searches",
-    "CostProfile": "exfit.estimate.profiling",
-    "LowerMinimum": "exfit.estimate.profiling",
-    "Descent": "exfit.estimate.solver",
-    "Functions": "exfit.estimate.problem",
-    "LineSearch": "exfit.estimate.searches",
-    "LocalMinimum": "exfit.estimate.starts",
-    "MultistartResult": "exfit.estimate.starts",
-    "OneByOne": "exfit.estimate.problem",
-    "ProfileEnd": "exfit.estimate.profiling",
-    "Progress": "exfit.estimate.problem",
-    "RatioDamping": "exfit.estimate.searches",
-    "Result": "exfit.estimate.problem",
-    "STATUS": "exfit.estimate.problem",
-    "Searches": "exfit.estimate.searches",
-    "SolverIteration": "exfit.estimate.problem",
-    "Stop": "exfit.estimate.problem",
-    "TrustRegion": "exfit.estimate.searches",
-    "half_square": "exfit.estimate.problem",
-    "least_squares": "exfit.estimate.solver",
-    "multistart": "exfit.estimate.starts",
-    "profile": "exfit.estimate.profiling",
-    "profiles": "exfit.estimate.profiling",
-    "spread": "exfit.estimate.starts",
-    "to_half": "exfit.estimate.searches",
-    "to_parabola": "exfit.estimate.searches",
-}
-
-
-__getattr__ = names_of(__name__, _MODULES)

@@ -12,13 +12,12 @@ from exfit.estimate.problem import (
     UNSEEN,
     Array,
     Box,
-    Mask,
     Point,
     Problem,
+    SingularValuesOf,
     Steps,
+    TriangleOf,
     norm,
-    singular_values_of,
-    triangle_of,
 )
 
 
@@ -37,11 +36,16 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float =
     fixed = (low == high) | ((low == 0.0) & (slope > 0.0)) | ((high == 0.0) & (slope < 0.0))
     tolerance = 10.0 * EPS * norm(A.ravel()) * norm(b)
     for _ in range(10 * len(y)):
-        goal = free_minimum(A, b, y, fixed, unseen)
+        goal, rest = y.copy(), -(b + A[:, fixed] @ y[fixed])
+        goal[~fixed] = np.linalg.lstsq(A[:, ~fixed], rest, rcond=unseen)[0]
         blocked = (goal < low) | (goal > high)
-        if blocked.any():
-            y, hit = first_bound(y, goal, low, high, blocked)
-            fixed = fixed | hit
+        if blocked.any():  # go until a variable meets its bound
+            bound = np.where(goal < low, low, high)
+            share = np.full(len(y), inf)
+            share[blocked] = (bound - y)[blocked] / (goal - y)[blocked]
+            hit = share <= share.min()
+            between = np.minimum(np.maximum(y + share.min() * (goal - y), low), high)
+            y, fixed = np.where(hit, bound, between), fixed | hit
             continue
         y, slope = goal, A.T @ (A @ goal + b)
         pull = np.where(fixed & (low < high), np.where(y == low, -slope, slope), 0.0)
@@ -50,26 +54,6 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float =
             break
         fixed[strongest] = False
     return y
-
-
-def free_minimum(A: Array, b: Array, y: Array, fixed: Mask, unseen: float) -> Array:
-    """Return y with its free variables where |A y + b| is least, bounds or not."""
-    goal = y.copy()
-    rest = -(b + A[:, fixed] @ y[fixed])
-    goal[~fixed] = np.linalg.lstsq(A[:, ~fixed], rest, rcond=unseen)[0]
-    return goal
-
-
-def first_bound(
-    y: Array, goal: Array, low: Array, high: Array, blocked: Mask
-) -> tuple[Array, Mask]:
-    """Go from y towards the goal until a variable meets its bound; return where, and which."""
-    bound = np.where(goal < low, low, high)
-    share = np.full(len(y), inf)
-    share[blocked] = (bound - y)[blocked] / (goal - y)[blocked]
-    hit = share <= share.min()
-    between = np.minimum(np.maximum(y + share.min() * (goal - y), low), high)
-    return np.where(hit, bound, between), hit
 
 
 WEAKEST = 0.03  # of the norm of the largest column, in units: a smaller one counts as this
@@ -159,16 +143,6 @@ class LinearModel:
         return norm(self.scale * (x - self.point.x))
 
 
-def linearise(
-    problem: Problem, point: Point, before: LinearModel | None = None
-) -> Steps[LinearModel]:
-    """Return the linear model at a point, scaled no less than the one before."""
-    J = yield from problem.jacobian(point)
-    if not np.isfinite(J).all():
-        return blind(problem, point, J)
-    return (yield from factored(problem, point, J, before))
-
-
 def blind(problem: Problem, point: Point, J: Array) -> LinearModel:
     """Return the model at a point where J is not finite: there are no directions."""
     unknown, none = np.full(len(point.x), nan), np.zeros(0)
@@ -188,15 +162,21 @@ def blind(problem: Problem, point: Point, J: Array) -> LinearModel:
     )
 
 
-def factored(
-    problem: Problem, point: Point, J: Array, before: LinearModel | None
+def linearise(
+    problem: Problem, point: Point, before: LinearModel | None = None
 ) -> Steps[LinearModel]:
-    """Factor J: QR first, for the many residuals, then the singular values of the corner."""
+    """Return the linear model at a point, scaled no less than the one before.
+
+    It is factored by QR first, for the many residuals, then by the singular values of the corner.
+    """
+    J = yield from problem.jacobian(point)
+    if not np.isfinite(J).all():
+        return blind(problem, point, J)
     box, n = problem.box, len(point.x)
     gradient = J.T @ point.residuals
     scale = 1.0 / box.unit if problem.scaled else column_scale(J, box.unit, before)
-    corner = yield from triangle_of(np.column_stack([J, point.residuals]))
-    left, singular, directions = yield from singular_values_of(corner[:, :n] / scale)
+    corner: Array = yield TriangleOf(np.column_stack([J, point.residuals]))
+    left, singular, directions = yield SingularValuesOf(corner[:, :n] / scale)
     return LinearModel(
         point=point,
         jacobian=J,

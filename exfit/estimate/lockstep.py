@@ -6,6 +6,7 @@ next. Several threads each have some searches of their own, so that the Python o
 the machine code of another; a search goes the same way whatever others it is advanced with.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
@@ -64,6 +65,7 @@ def finish_all(
     if count <= 1:
         return Group(waiting, ABREAST, receive).advance(stop)
     ends: SimpleQueue[tuple[int, Done] | BaseException | None] = SimpleQueue()
+    abreast = min(ABREAST, ceil(len(searches) / count))
 
     def work() -> None:
         group = Group(waiting, abreast, lambda place, end: ends.put((place, end)))
@@ -72,24 +74,13 @@ def finish_all(
         except BaseException as fault:  # raised again where the results are received
             ends.put(fault)
 
-    abreast = min(ABREAST, ceil(len(searches) / count))
     threads = [Thread(target=work, daemon=True) for _ in range(count)]
     try:
         for thread in threads:
             thread.start()
     except KeyboardInterrupt:
         stop.set()
-    begun = sum(thread.ident is not None for thread in threads)
-    return collect(ends, begun, receive, stop)
-
-
-def collect(
-    ends: "SimpleQueue[tuple[int, Done] | BaseException | None]",
-    working: int,
-    receive: Callable[[int, Done], object],
-    stop: Event,
-) -> bool:
-    """Receive the ends of all threads; return whether none was interrupted."""
+    working = sum(thread.ident is not None for thread in threads)
     fault: BaseException | None = None
     while working:
         try:
@@ -153,45 +144,38 @@ class Group(Generic[Done]):
         """
         with np.errstate(all="ignore"):
             try:
-                while self.begin():
+                while True:
+                    for place, search in islice(self.waiting, self.abreast - len(self.searches)):
+                        self.searches[place] = search
+                        self._send(place, None)
+                    if not self.searches:
+                        return True
                     for place, answer in answers(self.requests).items():
-                        self.send(place, answer)
+                        self._send(place, answer)
                     if stop.is_set():
                         raise KeyboardInterrupt
             except KeyboardInterrupt:
-                self.interrupt()
+                for place, search in list(self.searches.items()):
+                    with suppress(KeyboardInterrupt):  # one that has nothing to show
+                        try:
+                            search.throw(KeyboardInterrupt)
+                        except StopIteration as end:
+                            self._leave(place, end.value)
                 return False
-        return True
 
-    def begin(self) -> bool:
-        """Fill the places that are free; return whether there is anything to do."""
-        for place, search in islice(self.waiting, self.abreast - len(self.searches)):
-            self.searches[place] = search
-            self.send(place, None)
-        return bool(self.searches)
-
-    def send(self, place: int, answer: Answer | None) -> None:
+    def _send(self, place: int, answer: Answer | None) -> None:
         """Advance one search to its next request, or to its end."""
         search = self.searches[place]
         try:
             self.requests[place] = next(search) if answer is None else search.send(answer)
         except StopIteration as end:
-            self.leave(place, end.value)
+            self._leave(place, end.value)
 
-    def leave(self, place: int, end: Done) -> None:
+    def _leave(self, place: int, end: Done) -> None:
         """Hand over the end of a search, whose place is free then."""
         del self.searches[place]
         self.requests.pop(place, None)
         self.receive(place, end)
-
-    def interrupt(self) -> None:
-        """End all searches where they are; one that has nothing to show ends without a result."""
-        for place, search in list(self.searches.items()):
-            with suppress(KeyboardInterrupt):
-                try:
-                    search.throw(KeyboardInterrupt)
-                except StopIteration as end:
-                    self.leave(place, end.value)
 
 
 def answers(requests: Mapping[int, Request]) -> dict[int, Answer]:
@@ -209,44 +193,39 @@ def answers(requests: Mapping[int, Request]) -> dict[int, Answer]:
 
 def triangles(requests: Mapping[int, TriangleOf]) -> dict[int, Answer]:
     """Return R of each matrix."""
-    return {
-        place: triangle
-        for places, matrices in stacks(requests)
-        for place, triangle in zip(places, np.linalg.qr(matrices, mode="r"), strict=True)
-    }
+    answered: dict[int, Answer] = {}
+    for places, matrices in stacks(requests):
+        answered |= zip(places, np.linalg.qr(matrices, mode="r"), strict=True)
+    return answered
 
 
 def singular_values(requests: Mapping[int, SingularValuesOf]) -> dict[int, Answer]:
     """Return U, s and V' of each matrix."""
-    return {
-        place: factors
-        for places, matrices in stacks(requests)
-        for place, *factors in zip(
-            places, *np.linalg.svd(matrices, full_matrices=False), strict=True
-        )
-    }
+    answered: dict[int, Answer] = {}
+    for places, matrices in stacks(requests):
+        factors = np.linalg.svd(matrices, full_matrices=False)
+        answered |= zip(places, zip(*factors, strict=True), strict=True)
+    return answered
 
 
 def stacks(
     requests: Mapping[int, TriangleOf] | Mapping[int, SingularValuesOf],
 ) -> Iterator[tuple[list[int], Array]]:
     """Yield the matrices of each shape as one stack, and whose they are."""
-    shapes: dict[tuple[int, ...], list[int]] = {}
+    shapes = defaultdict[tuple[int, ...], list[int]](list)
     for place, request in requests.items():
-        shapes.setdefault(request.matrix.shape, []).append(place)
+        shapes[request.matrix.shape].append(place)
     for places in shapes.values():
         yield places, np.stack([requests[place].matrix for place in places])
 
 
 def jacobians(requests: Mapping[int, JacobianAt]) -> dict[int, Answer]:
     """Return the Jacobian at each point."""
-    return {
-        place: J
-        for functions, places in by_functions(requests).items()
-        for place, J in zip(
-            places, functions.jacobians([requests[place].point for place in places]), strict=True
-        )
-    }
+    answered: dict[int, Answer] = {}
+    for functions, places in by_functions(requests).items():
+        points = [requests[place].point for place in places]
+        answered |= zip(places, functions.jacobians(points), strict=True)
+    return answered
 
 
 def residuals(requests: Mapping[int, ResidualsAt]) -> dict[int, Answer]:
@@ -263,9 +242,9 @@ def by_functions(
     requests: Mapping[int, JacobianAt] | Mapping[int, ResidualsAt],
 ) -> dict[Functions, list[int]]:
     """Return whose requests are for the same functions."""
-    groups: dict[Functions, list[int]] = {}
+    groups = defaultdict[Functions, list[int]](list)
     for place, request in requests.items():
-        groups.setdefault(request.functions, []).append(place)
+        groups[request.functions].append(place)
     return groups
 
 

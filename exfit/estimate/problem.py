@@ -4,7 +4,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import inf, isfinite, nan, sqrt
-from typing import Literal, Protocol, TypeVar, cast
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,7 +52,12 @@ def checked(
         raise ValueError(f"bounds[{j}]: {low[j]} exceeds {high[j]}")
     for j in np.flatnonzero((x < low) | (x > high)):
         raise ValueError(f"x0[{j}]: {x[j]} lies outside {low[j]} ... {high[j]}")
-    unit = typical(x, high - low) if x_scale is None else alike(x_scale, x, "x_scale")
+    if x_scale is None:  # the size of the start, or a tenth of the range
+        width = high - low
+        size = np.maximum(abs(x), np.where(np.isfinite(width), 0.1 * width, 0.0))
+        unit = np.where(size > 0.0, size, 1.0)
+    else:
+        unit = alike(x_scale, x, "x_scale")
     if not (np.isfinite(unit).all() and (unit > 0.0).all()):
         raise ValueError("x_scale must be finite and positive")
     return x, Box(low, high, unit)
@@ -64,12 +69,6 @@ def alike(values: ArrayLike, x: Array, name: str) -> Array:
         return np.broadcast_to(np.asarray(values, dtype=np.float64), x.shape)
     except ValueError:
         raise ValueError(f"{name} must be a number or have the shape {x.shape}") from None
-
-
-def typical(x: Array, width: Array) -> Array:
-    """Return the size a variable seems to have: its start's, or a tenth of its range."""
-    size = np.maximum(abs(x), np.where(np.isfinite(width), 0.1 * width, 0.0))
-    return np.where(size > 0.0, size, 1.0)
 
 
 Function = Callable[[Array], ArrayLike]
@@ -86,31 +85,27 @@ class Functions(Protocol):
         """Return the Jacobian (M, N) at each of S points (N,), not finite where there is none."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ResidualsAt:
+class ResidualsAt(NamedTuple):
     """Asks for the residuals at some points (N,)."""
 
     functions: Functions
     points: Sequence[Array]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class JacobianAt:
+class JacobianAt(NamedTuple):
     """Asks for the Jacobian at a point (N,)."""
 
     functions: Functions
     point: Array
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class TriangleOf:
+class TriangleOf(NamedTuple):
     """Asks for R of the QR decomposition of a matrix (M, N): (min(M, N), N)."""
 
     matrix: Array
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class SingularValuesOf:
+class SingularValuesOf(NamedTuple):
     """Asks for U, s and V' of a matrix."""
 
     matrix: Array
@@ -118,27 +113,7 @@ class SingularValuesOf:
 
 Request = ResidualsAt | JacobianAt | TriangleOf | SingularValuesOf
 Answer = Sequence[Array] | Array
-Steps = Generator[Request, Answer, Done]
-
-
-def residuals_at(functions: Functions, points: Sequence[Array]) -> Steps[Sequence[Array]]:
-    """Ask for the residuals (M,) at some points."""
-    return cast(Sequence[Array], (yield ResidualsAt(functions, points)))
-
-
-def jacobian_at(functions: Functions, point: Array) -> Steps[Array]:
-    """Ask for the Jacobian (M, N) at a point."""
-    return cast(Array, (yield JacobianAt(functions, point)))
-
-
-def triangle_of(matrix: Array) -> Steps[Array]:
-    """Ask for R of the QR decomposition of a matrix."""
-    return cast(Array, (yield TriangleOf(matrix)))
-
-
-def singular_values_of(matrix: Array) -> Steps[Sequence[Array]]:
-    """Ask for U, s and V' of a matrix."""
-    return cast(Sequence[Array], (yield SingularValuesOf(matrix)))
+Steps = Generator[Request, Any, Done]  # it is sent the Answer to each Request
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,28 +128,28 @@ class OneByOne:
 
     def residuals(self, points: Sequence[Array]) -> Sequence[Array]:
         """Return fun at each point."""
-        return [self._residuals(x) for x in points]
+        residuals = list[Array]()
+        for x in points:
+            try:
+                residuals.append(np.array(self.fun(x.copy()), dtype=np.float64, ndmin=1))
+            except ArithmeticError:
+                residuals.append(np.full(1, np.nan))
+            if residuals[-1].ndim != 1:
+                shape = residuals[-1].shape
+                raise ValueError(f"fun must return residuals in one dimension, not {shape}")
+        return residuals
 
     def jacobians(self, points: Sequence[Array]) -> Sequence[Array]:
         """Return jac at each point."""
-        return [self._jacobian(x) for x in points]
-
-    def _residuals(self, x: Array) -> Array:
-        try:
-            r = np.array(self.fun(x.copy()), dtype=np.float64, ndmin=1)
-        except ArithmeticError:
-            return np.full(1, np.nan)
-        if r.ndim != 1:
-            raise ValueError(f"fun must return residuals in one dimension, not {r.shape}")
-        return r
-
-    def _jacobian(self, x: Array) -> Array:
         if self.jac is None:
             raise TypeError("jac: missing")
-        try:
-            return np.array(self.jac(x.copy()), dtype=np.float64, ndmin=2)
-        except ArithmeticError:
-            return np.full((1, 1), np.nan)
+        jacobians = list[Array]()
+        for x in points:
+            try:
+                jacobians.append(np.array(self.jac(x.copy()), dtype=np.float64, ndmin=2))
+            except ArithmeticError:
+                jacobians.append(np.full((1, 1), np.nan))
+        return jacobians
 
 
 Differences = Literal["2-point", "3-point"]
@@ -217,12 +192,8 @@ class Problem:
         jacobian_error: float | None = None,
         most_evaluations: int | None = None,
     ) -> None:
-        self.functions, self.differences, self.box, self.scaled = (
-            functions,
-            differences,
-            box,
-            scaled,
-        )
+        self.functions, self.differences = functions, differences
+        self.box, self.scaled = box, scaled
         usual = JACOBIAN_ERROR[differences or "exact"]
         self.unseen = usual if jacobian_error is None else jacobian_error
         self.most_evaluations = most_evaluations
@@ -243,7 +214,8 @@ class Problem:
         if most is not None and self.nfev + len(points) > most:
             raise EvaluationLimit
         self.nfev += len(points)
-        return (yield from residuals_at(self.functions, points))
+        residuals: Sequence[Array] = yield ResidualsAt(self.functions, points)
+        return residuals
 
     def jacobian(self, point: Point) -> Steps[Array]:
         """Return J, shape (M, N); not finite where there is none."""
@@ -251,7 +223,7 @@ class Problem:
         shape = (len(point.residuals), len(point.x))
         if self.differences is not None:
             return (yield from self.quotients(point))
-        J = yield from jacobian_at(self.functions, point.x)
+        J: Array = yield JacobianAt(self.functions, point.x)
         if J.shape == (1, 1) and not isfinite(J[0, 0]):
             return np.full(shape, nan)
         if J.shape != shape:
@@ -262,7 +234,9 @@ class Problem:
         """Return J by differences: the slope of the line or parabola through residuals nearby."""
         offsets = [self.offsets(x, j) for j, x in enumerate(point.x)]
         nearby = [
-            self.shifted(point.x, j, h) for j, distances in enumerate(offsets) for h in distances
+            self.box.inside(np.where(np.arange(len(point.x)) == j, point.x + h, point.x))
+            for j, distances in enumerate(offsets)
+            for h in distances
         ]
         residuals = iter((yield from self.residuals(nearby)) if nearby else ())
         J = np.zeros((len(point.residuals), len(point.x)))
@@ -289,12 +263,6 @@ class Problem:
             wanted = [h, 2.0 * h] if central else [h]
         offsets = tuple(float((x + w) - x) for w in wanted)
         return offsets if all(offsets) else ()  # a box as narrow as rounding leaves no room
-
-    def shifted(self, x: Array, j: int, h: float) -> Array:
-        """Return the point a distance h away along one variable."""
-        x = x.copy()
-        x[j] += h
-        return self.box.inside(x)
 
 
 class Stop(Enum):

@@ -5,11 +5,11 @@ import pytest
 
 from exfit.estimate.lockstep import ABREAST, finish, finish_all
 from exfit.estimate.problem import (
+    JacobianAt,
     OneByOne,
-    jacobian_at,
-    residuals_at,
-    singular_values_of,
-    triangle_of,
+    ResidualsAt,
+    SingularValuesOf,
+    TriangleOf,
 )
 
 LINE = OneByOne(lambda x: np.array([x[0] - 1.0, 2.0 * x[0]]), lambda x: np.array([[1.0], [2.0]]))
@@ -18,10 +18,10 @@ PARABOLA = OneByOne(lambda x: x**2, lambda x: np.diag(2.0 * x))
 
 def all_kinds(functions, x):
     """Ask once for everything there is to ask for."""
-    here, there = yield from residuals_at(functions, [x, x + 1.0])
-    jacobian = yield from jacobian_at(functions, x)
-    triangle = yield from triangle_of(np.column_stack([jacobian, here]))
-    singular = (yield from singular_values_of(triangle))[1]
+    here, there = yield ResidualsAt(functions, [x, x + 1.0])
+    jacobian = yield JacobianAt(functions, x)
+    triangle = yield TriangleOf(np.column_stack([jacobian, here]))
+    singular = (yield SingularValuesOf(triangle))[1]
     return here, there, jacobian, singular
 
 
@@ -60,7 +60,7 @@ def test_a_search_that_ends_leaves_its_place_to_the_next():
 
     def asking(times):
         for _ in range(times):
-            yield from residuals_at(counted, [np.ones(1)])
+            yield ResidualsAt(counted, [np.ones(1)])
 
     counted = Counted(lambda x: x)
     finish_all([asking(1) for _ in range(2 * ABREAST)] + [asking(2)], 1, lambda place, end: None)
@@ -75,12 +75,12 @@ def test_an_interruption_reaches_all_under_way_and_drops_the_others(workers):
         begun.append(place)
         try:
             while True:
-                yield from residuals_at(LINE, [np.zeros(1)])
+                yield ResidualsAt(LINE, [np.zeros(1)])
         except KeyboardInterrupt:
             return "cut short"
 
     def interrupting():
-        yield from residuals_at(LINE, [np.zeros(1)])
+        yield ResidualsAt(LINE, [np.zeros(1)])
         raise KeyboardInterrupt
 
     searches = [interrupting(), *(endless(place) for place in range(1, 300))]
@@ -92,7 +92,7 @@ def test_an_interruption_reaches_all_under_way_and_drops_the_others(workers):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_mistake_in_one_search_is_raised(workers):
     def mistaken():
-        yield from residuals_at(LINE, [np.zeros(1)])
+        yield ResidualsAt(LINE, [np.zeros(1)])
         raise LookupError("a mistake")
 
     searches = [all_kinds(LINE, np.zeros(1)), mistaken()]
@@ -102,7 +102,7 @@ def test_a_mistake_in_one_search_is_raised(workers):
 
 def test_one_that_is_interrupted_with_nothing_to_show_raises():
     def interrupted():
-        yield from residuals_at(LINE, [np.zeros(1)])
+        yield ResidualsAt(LINE, [np.zeros(1)])
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
