@@ -1,10 +1,9 @@
-"""A functional mock-up unit (FMU) that simulates a case: its program, its variables."""
+"""The program of a case: its tests as that program simulates them, what is reported of its runs."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,27 +12,26 @@ from exfit.case.case import Case
 from exfit.case.parts import OF_RECORD
 from exfit.case.schema import ExternalPlant, FmuPlant
 from exfit.errors import CaseError, SimulationError
-from exfit.estimate import Descent, Functions, Result
+from exfit.estimate import Descent
 from exfit.features.external.fmu import (
     FmuDescription,
     FmuError,
-    Interface,
     Use,
     fmu_description,
     laid_out,
     worker_command,
 )
-from exfit.features.external.program import ExternalProgram, running
+from exfit.features.external.program import ExternalProgram
 from exfit.features.external.responders import (
     QUOTIENT_STEP,
     CorrectedResponder,
     LinearResponder,
+    ProgramResponder,
     ProgramSignals,
     QuotientResponder,
     RunResponder,
 )
 from exfit.features.external.twin_descent import descent_by_twin
-from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Differences, Setups
@@ -43,108 +41,9 @@ from exfit.simulation.simulator import Simulator
 from exfit.util.files import on_disk
 from exfit.util.text import near
 
-Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared
-
-
-class FmuProgram(ExternalProgram):
-    """The program that runs an FMU, with the description that was read when it was laid out."""
-
-    def __init__(
-        self, section: FmuPlant, settings: str, folder: Path, description: FmuDescription
-    ) -> None:
-        limits = (section.parallel, section.time_limit)
-        super().__init__(worker_command(settings), folder, *limits, "plant.file")
-        self.description = description
-
-
-@contextmanager
-def fmu_program(case: Case, section: FmuPlant) -> Iterator[ExternalProgram]:
-    """Provide the program that runs the FMU of a case; end it afterwards.
-
-    Raises CaseError for a file that cannot be run.
-    """
-    file = on_disk(case.folder / section.file)
-    try:
-        description = fmu_description(file)
-        interface = _interface(case, section, description)
-        with laid_out(file) as folder:
-            settings = {
-                "folder": str(folder),
-                "interface": interface,
-                "inputs": dict(section.inputs),
-                "outputs": dict(section.outputs),
-            }
-            program = FmuProgram(section, json.dumps(settings), folder, description)
-            with running(program):
-                yield program
-    except FmuError as fault:
-        text = f"{case.path}: plant.file: {section.simulator} {fault}"
-        raise CaseError([text]) from None
-
-
-def refuse_unknown_variables(case: Case, program: ExternalProgram, tests: Sequence[Test]) -> None:
-    """Raise CaseError with all that an FMU cannot be given, or asked for, in the tests of a case.
-
-    Nothing where no FMU simulates it.
-    """
-    section = case.external
-    if isinstance(section, FmuPlant) and isinstance(program, FmuProgram):
-        faults = [*_variable_faults(case, section, program.description, tests)]
-        if faults:
-            raise CaseError([f"{case.path}: {fault}" for fault in dict.fromkeys(faults)])
-
-
-def own_value_notes(case: Case, program: ExternalProgram) -> Iterator[str]:
-    """Name the parameters of a case that an FMU does not take, and has its own values of."""
-    section = case.external
-    if not isinstance(section, FmuPlant) or not isinstance(program, FmuProgram):
-        return
-    taken = program.description.usable_as("parameter")
-    symbols = [part.prefix + symbol for part in case.parts.all for symbol in part.symbols]
-    missing = [
-        name for name in (*symbols, OF_RECORD[0]) if section.names.get(name, name) not in taken
-    ]
-    if missing:
-        yield f"{section.simulator} has values of its own in place of {', '.join(missing)}"
-
-
-def _variable_faults(
-    case: Case, section: FmuPlant, description: FmuDescription, tests: Sequence[Test]
-) -> Iterator[str]:
-    """Yield the variables that the FMU does not have, or that cannot be used so."""
-    variables = description.variables
-    changed = {step.signal: "" for twin, _ in tests for step in twin.inputs.steps}
-    compared = {signal: "" for _, signals in tests for signal in signals}
-    # without a twin it is the case that says which parameters there are
-    needed = dict.fromkeys(case.values() if case.has_no_equations else case.free(), "")
-    uses: tuple[tuple[str, Mapping[str, str], Use, str], ...] = (
-        ("names", {**needed, **section.names}, "parameter", "a parameter that can be set"),
-        ("inputs", {**changed, **section.inputs}, "input", "an input"),
-        ("outputs", {**compared, **section.outputs}, "output", "an output"),
-    )
-    for key, names, use, what in uses:
-        possible = description.usable_as(use)
-        for name, given in names.items():
-            variable = given or name
-            if variable in possible:
-                continue
-            text = f"{section.simulator} has no variable {variable}; {near(variable, possible)}"
-            if variable in variables:
-                text = f"{variable} is not {what} but {variables[variable].kind}"
-            yield f"plant.{key}.{name}: {text}"
-
-
-def _interface(case: Case, section: FmuPlant, description: FmuDescription) -> Interface:
-    """Choose the interface by which an FMU is run; raises CaseError where it has not that one."""
-    interface = section.interface or description.interfaces[0]
-    if interface not in description.interfaces:
-        text = f"{section.simulator} has {' and '.join(description.interfaces)} only"
-        raise CaseError([f"{case.path}: plant.interface: {interface}: {text}"])
-    return interface
-
-
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared
 
 TOLERANCE = 1e-5  # of the cost: no gain that is less is worth a run
 STEP = 1e-4  # of scaled parameters: no step that is less
@@ -159,22 +58,52 @@ def opened(case: Case) -> Iterator["CaseProgram | None"]:
     """
     section = case.external
     if isinstance(section, FmuPlant):
-        with fmu_program(case, section) as program:
-            yield CaseProgram(case, section, program)
+        try:
+            with _opened_fmu(case, section) as of_fmu:
+                yield of_fmu
+        except FmuError as fault:
+            text = f"{case.path}: plant.file: {section.simulator} {fault}"
+            raise CaseError([text]) from None
     elif section is not None:
         folder = case.folder.absolute()
         program = ExternalProgram(section.command, folder, section.parallel, section.time_limit)
-        with running(program):
+        with closing(program):
             yield CaseProgram(case, section, program)
+
+
+@contextmanager
+def _opened_fmu(case: Case, section: FmuPlant) -> Iterator["CaseProgram"]:
+    """Lay out the FMU of a case and provide the program that runs it."""
+    file = on_disk(case.folder / section.file)
+    description = fmu_description(file)
+    interface = section.interface or description.interfaces[0]
+    if interface not in description.interfaces:
+        text = f"{section.simulator} has {' and '.join(description.interfaces)} only"
+        raise CaseError([f"{case.path}: plant.interface: {interface}: {text}"])
+    with laid_out(file) as folder:
+        settings = {
+            "folder": str(folder),
+            "interface": interface,
+            "inputs": dict(section.inputs),
+            "outputs": dict(section.outputs),
+        }
+        limits = section.parallel, section.time_limit
+        command = worker_command(json.dumps(settings))
+        with closing(ExternalProgram(command, folder, *limits, "plant.file")) as program:
+            yield CaseProgram(case, section, program, description)
 
 
 @dataclass(frozen=True, eq=False)
 class CaseProgram:
-    """What simulates a case in place of exfit, as `exfit.fitting.program.Program` asks it."""
+    """What simulates a case in place of exfit, as `exfit.fitting.program.Program` asks it.
+
+    ``description`` is what an FMU says of itself.
+    """
 
     case: Case
     section: ExternalPlant | FmuPlant
     program: ExternalProgram
+    description: FmuDescription | None = None
 
     @property
     def runs(self) -> int:
@@ -205,20 +134,49 @@ class CaseProgram:
         tests = [(setup.experiment.simulator, setup.experiment.signals) for setup in setups]
         return tuple(map(_with_simulator, setups, self._simulators(tests)))
 
-    def _simulators(self, tests: Sequence[tuple[Simulator, tuple[str, ...]]]) -> list[Simulator]:
+    def _simulators(self, tests: Sequence[Test]) -> list[Simulator]:
         recorded = dict.fromkeys(signal for twin, _ in tests for signal in twin.inputs.recorded)
         if recorded:
             text = f"steps and ramps only are allowed with plant {self.section.type}"
             raise CaseError([f"{self.case.path}: test: {', '.join(recorded)}: {text}"])
-        refuse_unknown_variables(self.case, self.program, tests)
-        return [twin.with_responder(self._responder(signals)) for twin, signals in tests]
+        faults = dict.fromkeys(self._variable_faults(tests))
+        if faults:
+            raise CaseError([f"{self.case.path}: {fault}" for fault in faults])
+        simulators = []
+        for twin, signals in tests:
+            given = ProgramSignals(self.program, signals, self.section.names)
+            responder = RunResponder(given)
+            if not self.has_twin:
+                free = free_parameters(self.case)
+                limits = {each.name: (each.low, each.high) for each in free}
+                responder = QuotientResponder(given, limits)
+            simulators.append(twin.with_responder(responder))
+        return simulators
 
-    def _responder(self, signals: tuple[str, ...]) -> RunResponder:
-        given = ProgramSignals(self.program, signals, self.section.names)
-        if self.has_twin:
-            return RunResponder(given)
-        limits = {each.name: (each.low, each.high) for each in free_parameters(self.case)}
-        return QuotientResponder(given, limits)
+    def _variable_faults(self, tests: Sequence[Test]) -> Iterator[str]:
+        """Yield the variables that an FMU does not have, or that cannot be used so."""
+        section, description = self.section, self.description
+        if not isinstance(section, FmuPlant) or description is None:
+            return
+        changed = {step.signal: "" for twin, _ in tests for step in twin.inputs.steps}
+        compared = {signal: "" for _, signals in tests for signal in signals}
+        # without a twin it is the case that says which parameters there are
+        needed = dict.fromkeys(self.case.free() if self.has_twin else self.case.values(), "")
+        uses: tuple[tuple[str, Mapping[str, str], Use, str], ...] = (
+            ("names", {**needed, **section.names}, "parameter", "a parameter that can be set"),
+            ("inputs", {**changed, **section.inputs}, "input", "an input"),
+            ("outputs", {**compared, **section.outputs}, "output", "an output"),
+        )
+        for key, names, use, what in uses:
+            possible = description.usable_as(use)
+            for name, given in names.items():
+                variable = given or name
+                if variable in possible:
+                    continue
+                text = f"{section.simulator} has no variable {variable}; {near(variable, possible)}"
+                if variable in description.variables:
+                    text = f"{variable} is not {what} but {description.variables[variable].kind}"
+                yield f"plant.{key}.{name}: {text}"
 
     def try_start(self, residuals: Residuals) -> None:
         """Run the start of a search; raises SimulationError where there is no run."""
@@ -240,14 +198,7 @@ class CaseProgram:
         xtol = max(descent.xtol, STEP)
         return replace(descent, ftol=TOLERANCE, xtol=xtol, jacobian_error=error)
 
-    def descend(
-        self,
-        residuals: Residuals,
-        descent: Callable[[Functions], Descent],
-        announce: Announce,
-    ) -> Result:
-        """Descend from the start by the derivatives of the twin, corrected."""
-        return descent_by_twin(residuals, descent, announce)
+    descend = staticmethod(descent_by_twin)
 
     def settled(
         self, setups: Setups, values: Values, moving: Residuals | None = None
@@ -264,9 +215,9 @@ class CaseProgram:
         """Run a settled test at other values too; raises SimulationError where there is no run."""
         at = setup.with_start_values(values)
         simulator = setup.experiment.with_inputs(at)
-        given = _given(simulator)
-        if given is not None:
-            run = given.run(simulator, setup.experiment.parameters(at))
+        if isinstance(simulator.responder, ProgramResponder):
+            parameters = setup.experiment.parameters(at)
+            run = simulator.responder.given.run(simulator, parameters)
             if run.failure:
                 raise SimulationError(f"{setup.case}: record {setup.name}: {run.failure}")
 
@@ -278,7 +229,15 @@ class CaseProgram:
         tests = self.settled(self.simulated(setups), values)
         if self.has_twin:
             return self.differences(tests)
-        return {test.name: _differences_from_record(test, values) for test in tests}
+        differences: Differences = {}
+        for test in tests:
+            at, own = test.with_start_values(values), test.experiment
+            simulated, _ = own.samples(at)
+            differences[test.name] = {
+                channel.signal: float(np.nanmax(np.abs(samples - own.measured(channel, at))))
+                for channel, samples in zip(own.channels, simulated.T, strict=True)
+            }
+        return differences
 
     def differences(self, setups: Setups) -> Differences:
         """Find the largest difference from the twin where tests were settled."""
@@ -293,14 +252,23 @@ class CaseProgram:
 
     def own_value_notes(self) -> Iterator[str]:
         """Name the parameters of the case that an FMU does not take, and has its own values of."""
-        return own_value_notes(self.case, self.program)
+        if self.description is not None:
+            taken, names = self.description.usable_as("parameter"), self.section.names
+            parts = self.case.parts.all
+            symbols = [part.prefix + symbol for part in parts for symbol in part.symbols]
+            own = [name for name in (*symbols, OF_RECORD[0]) if names.get(name, name) not in taken]
+            if own:
+                yield f"{self.section.simulator} has values of its own in place of {', '.join(own)}"
 
     def response_notes(self, simulator: Simulator, shown: Iterable[str]) -> Iterator[str]:
         """Name the shown signals that the twin gives, without a correction."""
-        given = _given(simulator)
-        if self.has_twin and given is not None and {*shown} - {*given.signals}:
+        responder = simulator.responder
+        if not self.has_twin or not isinstance(responder, ProgramResponder):
+            return
+        given = responder.given.signals
+        if {*shown} - {*given}:
             yield (
-                f"{self.section.simulator} gives {', '.join(given.signals)}; all other signals are "
+                f"{self.section.simulator} gives {', '.join(given)}; all other signals are "
                 f"by the twin {self.section.twin}, not corrected"
             )
 
@@ -330,12 +298,6 @@ def _with_simulator(setup: ExperimentSetup, simulator: Simulator) -> ExperimentS
     return replace(setup, experiment=replace(setup.experiment, simulator=simulator))
 
 
-def _given(simulator: Simulator) -> ProgramSignals | None:
-    responder = simulator.responder
-    kinds = RunResponder | LinearResponder | CorrectedResponder
-    return responder.given if isinstance(responder, kinds) else None
-
-
 def _settled(setup: ExperimentSetup, values: Values, moving: Residuals | None) -> ExperimentSetup:
     at = setup.with_start_values(values)
     simulator, signals = setup.experiment.with_inputs(at), setup.experiment.signals
@@ -351,19 +313,10 @@ def _settled(setup: ExperimentSetup, values: Values, moving: Residuals | None) -
         free = moving.free
         theta = np.array([each.scaled(at.get(each.name, each.start)) for each in free])
         directions = [setup.experiment.direction(move) for move in moving.moves(theta)]
-        linear = LinearResponder(responder, simulator, parameters, directions)
+        linear = LinearResponder(responder.given, simulator, parameters, directions)
         return _with_simulator(setup, simulator.with_responder(linear))
     assert isinstance(responder, RunResponder)
     twin, _ = simulator.with_responder(None).samples(parameters, signals)
     differences = dict(zip(signals, (outside - twin).T, strict=True))
     corrected = CorrectedResponder(responder.given, differences)
     return _with_simulator(setup, setup.experiment.simulator.with_responder(corrected))
-
-
-def _differences_from_record(setup: ExperimentSetup, values: Values) -> dict[str, float]:
-    at = setup.with_start_values(values)
-    simulated, _ = setup.experiment.samples(at)
-    return {
-        channel.signal: float(np.nanmax(np.abs(samples - setup.experiment.measured(channel, at))))
-        for channel, samples in zip(setup.experiment.channels, simulated.T, strict=True)
-    }

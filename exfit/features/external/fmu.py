@@ -1,4 +1,8 @@
-"""A functional mock-up unit (FMU) as a file: what it says of itself; none of its code is run."""
+"""A functional mock-up unit (FMU): what its file says of itself, and the program that runs it.
+
+That is a process of its own, which the machine code of an FMU may end or hang: a line of JSON asks
+it, a line is its answer.
+"""
 
 import json
 import os
@@ -7,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, NamedTuple, TextIO
+from typing import Any, Literal, NamedTuple
 from zipfile import ZipFile
 
 import numpy as np
@@ -50,7 +54,18 @@ def fmu_description(path: Path) -> FmuDescription:
     Raises FmuError for a file that is none, one of another version of FMI, one without machine
     code for this system, and where FMPy is missing.
     """
-    description, platforms = _read(path)
+    try:
+        import fmpy
+    except ImportError:
+        raise FmuError(PACKAGE_MISSING) from None
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+        platforms = fmpy.supported_platforms(str(path))
+    except OSError as fault:
+        raise FmuError(f"cannot be read: {fault.strerror or fault}") from None
+    except Exception as fault:  # damaged files make the package fail in many ways
+        what = str(fault).partition("\n")[0] or type(fault).__name__
+        raise FmuError(f"is not an FMU, or damaged: {what}") from None
     version = str(description.fmiVersion)
     if not version.startswith(VERSIONS):
         raise FmuError(f"is of FMI {version}; must be of FMI 2 or 3")
@@ -61,7 +76,7 @@ def fmu_description(path: Path) -> FmuDescription:
     present = tuple(name for name, interface in interfaces.items() if interface is not None)
     if not present:
         raise FmuError("is neither for co-simulation nor for model exchange")
-    here = _platform()
+    here = str(fmpy.platform)
     if here not in platforms:
         raise FmuError(f"has no machine code for {here}; has {', '.join(platforms) or 'none'}")
     return FmuDescription(present, variables_of(description))
@@ -69,43 +84,19 @@ def fmu_description(path: Path) -> FmuDescription:
 
 def variables_of(description: Any) -> dict[str, FmuVariable]:
     """Return the variables of a description that FMPy has read."""
-    return {str(each.name): _variable(each) for each in description.modelVariables}
-
-
-def _variable(variable: Any) -> FmuVariable:
-    kind = f"{variable.variability} {variable.causality}, {variable.type}"
-    if variable.type not in NUMBERS or variable.shape:
-        return FmuVariable(kind, ())
-    is_output = variable.causality in ("local", "output")
-    starts = variable.causality == "parameter" or (is_output and variable.initial == "exact")
-    uses: list[Use] = ["output"] if is_output else []
-    if starts and variable.variability != "constant":
-        uses.append("parameter")
-    if variable.causality == "input" or variable.variability == "tunable":
-        uses.append("input")
-    return FmuVariable(kind, tuple(uses))
-
-
-def _read(path: Path) -> tuple[Any, list[str]]:
-    """Return FMPy's description of an FMU, and the systems that it has machine code for."""
-    try:
-        import fmpy
-    except ImportError:
-        raise FmuError(PACKAGE_MISSING) from None
-    try:
-        description = fmpy.read_model_description(str(path), validate=False)
-        return description, fmpy.supported_platforms(str(path))
-    except OSError as fault:
-        raise FmuError(f"cannot be read: {fault.strerror or fault}") from None
-    except Exception as fault:  # damaged files make the package fail in many ways
-        what = str(fault).partition("\n")[0] or type(fault).__name__
-        raise FmuError(f"is not an FMU, or damaged: {what}") from None
-
-
-def _platform() -> str:
-    import fmpy
-
-    return str(fmpy.platform)
+    variables = {}
+    for each in description.modelVariables:
+        uses: list[Use] = []
+        if each.type in NUMBERS and not each.shape:
+            is_output = each.causality in ("local", "output")
+            starts = each.causality == "parameter" or (is_output and each.initial == "exact")
+            uses += ["output"] if is_output else []
+            uses += ["parameter"] if starts and each.variability != "constant" else []
+            if each.causality == "input" or each.variability == "tunable":
+                uses.append("input")
+        kind = f"{each.variability} {each.causality}, {each.type}"
+        variables[str(each.name)] = FmuVariable(kind, tuple(uses))
+    return variables
 
 
 @contextmanager
@@ -317,16 +308,11 @@ def apply_inputs_inside_steps() -> None:
     fmpy.sundials.CVodeSolver = Solver
 
 
-def _answers() -> TextIO:
-    """Return the standard output; what an FMU prints there goes to the standard error."""
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    return answers
-
-
 def main() -> None:
     """Answer each line of the standard input; the last argument has the settings."""
-    answers = _answers()
+    # what an FMU prints goes to the standard error
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     apply_inputs_inside_steps()
     fmu = LoadedFmu(**json.loads(sys.argv[-1]))
     for line in sys.stdin:

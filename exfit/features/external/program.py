@@ -1,25 +1,30 @@
-"""A long-lived process that simulates: one line of JSON asks it, one line is its answer."""
+"""A program that simulates in place of exfit, in several long-lived processes side by side.
+
+One line of JSON asks a process, one line is its answer.
+"""
 
 import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryFile
 from threading import Thread
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.util.processes import ending, last_lines
 from exfit.util.text import show_value
+
+Array = NDArray[np.float64]
 
 NAME = "the program"
 # a program that hangs does not see that its input has ended, where exfit itself is killed
@@ -51,8 +56,18 @@ class ExternalProcess:
             if self._running is None:
                 self._running = _Running(self.command, self.folder)
                 self.starts += 1
-            answer = self._running.answer(json.dumps(request), time_limit)
-            return _checked(answer, request["id"])
+            line = self._running.answer(json.dumps(request), time_limit)
+            text = line.decode(errors="replace").strip()
+            try:
+                answer = json.loads(text)
+            except ValueError:
+                raise ProgramError(f"{show_value(text)} is not a line of JSON") from None
+            if not isinstance(answer, dict):
+                raise ProgramError(f"{show_value(text)} is not a JSON object")
+            if answer.get("id") != request["id"]:
+                given = show_value(answer.get("id"))
+                raise ProgramError(f"the answer has id {given}, not {request['id']}")
+            return answer
         except BaseException:  # an interruption too: what it says later answers nothing
             self.end()
             raise
@@ -82,13 +97,28 @@ class _Running:
         except (OSError, ValueError) as fault:
             self._errors.close()
             raise ProgramError(f"{command[0]} cannot be started: {fault}") from fault
-        self._guard = _guard_of(self._process.pid)
+        self._guard: subprocess.Popen[bytes] | None = None
+        if sys.platform != "win32":  # it kills the group when this process ends
+            self._guard = subprocess.Popen(
+                [sys.executable, "-S", "-E", "-c", GUARD, str(self._process.pid)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,  # where the group has ended by itself
+                start_new_session=True,
+            )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin, self._process.stdout
         self._lines: SimpleQueue[bytes] = SimpleQueue()
-        self._listener = Thread(target=_listen, args=(self._answers, self._lines), daemon=True)
+        self._listener = Thread(target=self._listen, daemon=True)
         self._listener.start()
+
+    def _listen(self) -> None:
+        """Put each line into a queue, an empty one at the end."""
+        with suppress(OSError, ValueError):  # closed meanwhile
+            for line in self._answers:
+                self._lines.put(line)
+        self._lines.put(b"")
 
     def answer(self, request: str, time_limit: float) -> bytes:
         with suppress(OSError):  # it has ended, as its answers say
@@ -98,17 +128,14 @@ class _Running:
             line = self._lines.get(timeout=time_limit)
         except Empty:
             raise ProgramError(f"no answer within {time_limit:g} s") from None
-        if not line:
-            raise ProgramError(self._reason())
-        return line
-
-    def _reason(self) -> str:
-        """Describe the end of a process whose answers have ended."""
+        if line:
+            return line
         try:
             code = self._process.wait(TO_END)
         except subprocess.TimeoutExpired:
-            return f"{NAME} has closed its output"
-        return ": ".join(filter(None, (ending(code, NAME), last_lines(self._errors))))
+            raise ProgramError(f"{NAME} has closed its output") from None
+        words = filter(None, (ending(code, NAME), last_lines(self._errors)))
+        raise ProgramError(": ".join(words))
 
     def end(self) -> None:
         """Kill the process with its group and wait for it."""
@@ -125,44 +152,6 @@ class _Running:
         for file in (self._requests, self._answers, self._errors):
             with suppress(OSError):  # what could not be sent
                 file.close()
-
-
-def _guard_of(group: int) -> subprocess.Popen[bytes] | None:
-    """Start what kills a group of processes when this process ends; not on Windows."""
-    if sys.platform == "win32":
-        return None
-    return subprocess.Popen(
-        [sys.executable, "-S", "-E", "-c", GUARD, str(group)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,  # where the group has ended by itself
-        start_new_session=True,
-    )
-
-
-def _listen(answers: IO[bytes], lines: "SimpleQueue[bytes]") -> None:
-    """Put each line into a queue, an empty one at the end."""
-    with suppress(OSError, ValueError):  # closed meanwhile
-        for line in answers:
-            lines.put(line)
-    lines.put(b"")
-
-
-def _checked(line: bytes, number: int) -> dict[str, Any]:
-    """Read the line of an answer; raises ProgramError where it is none."""
-    text = line.decode(errors="replace").strip()
-    try:
-        answer = json.loads(text)
-    except ValueError:
-        raise ProgramError(f"{show_value(text)} is not a line of JSON") from None
-    if not isinstance(answer, dict):
-        raise ProgramError(f"{show_value(text)} is not a JSON object")
-    if answer.get("id") != number:
-        raise ProgramError(f"the answer has id {show_value(answer.get('id'))}, not {number}")
-    return answer
-
-
-Array = NDArray[np.float64]
 
 
 class ExternalRun(NamedTuple):
@@ -217,18 +206,14 @@ class ExternalProgram:
 
     def runs(self, requests: Sequence[Mapping[str, Any]]) -> list[ExternalRun]:
         """Return the runs of requests, side by side; each names its "signals" and "times"."""
-        keys = [_key(request) for request in requests]
-        missing = {
-            key: request
-            for key, request in zip(keys, requests, strict=True)
-            if key not in self._outcomes
-        }
+        by_key = {_key(request): request for request in requests}
+        missing = {key: by_key[key] for key in by_key if key not in self._outcomes}
         self._values |= {_key_of(request["values"]) for request in missing.values()}
         self._run_all(missing)
         failed = {key: missing[key] for key in missing if self._outcomes[key].failure}
         self._earlier_failures += len(failed)
         self._run_all(failed)
-        return [self._outcomes[key] for key in keys]
+        return [self._outcomes[_key(request)] for request in requests]
 
     def remembered(self, request: Mapping[str, Any]) -> ExternalRun | None:
         """Return the run of a request that was made before and has not failed, None else."""
@@ -237,7 +222,7 @@ class ExternalProgram:
         outcome = self._outcomes.get(_key(request))
         return None if outcome is None or outcome.failure else outcome
 
-    def end(self) -> None:
+    def close(self) -> None:
         """End all processes."""
         for process in self._processes:
             process.end()
@@ -247,17 +232,14 @@ class ExternalProgram:
         if len(requests) <= 1 or len(self._processes) == 1:
             for key, request in requests.items():
                 self._outcomes[key] = self._run(request)
-        else:
-            outcomes = self._side_by_side([*requests.values()])
-            self._outcomes |= zip(requests, outcomes, strict=True)
-
-    def _side_by_side(self, requests: Sequence[Mapping[str, Any]]) -> list[ExternalRun]:
+            return
         executor = ThreadPoolExecutor(min(len(requests), len(self._processes)))
         try:
-            return list(executor.map(self._run, requests))
+            outcomes = list(executor.map(self._run, requests.values()))
+            self._outcomes |= zip(requests, outcomes, strict=True)
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)
-            self.end()  # so that no thread waits for an answer
+            self.close()  # so that no thread waits for an answer
             raise
         finally:
             executor.shutdown()
@@ -280,15 +262,6 @@ def _key(request: Mapping[str, Any]) -> str:
 def _key_of(values: Mapping[str, float]) -> str:
     """Key of values, alike for those that differ by rounding."""
     return json.dumps({name: f"{value:.12g}" for name, value in values.items()}, sort_keys=True)
-
-
-@contextmanager
-def running(program: ExternalProgram) -> Iterator[ExternalProgram]:
-    """Let a program be used inside, and end its processes however that ends."""
-    try:
-        yield program
-    finally:
-        program.end()
 
 
 def run_of(answer: Mapping[str, Any], signals: Sequence[str], samples: int) -> ExternalRun:

@@ -3,6 +3,7 @@
 All else of the test, its grid and its sub-steps among it, stays that of the equations: the twin.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,6 @@ from exfit.simulation.substeps import NO_SUBSTEPS
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
-Limits = Mapping[str, tuple[float, float]]
 Tests = Sequence[Simulator] | None
 
 QUOTIENT_STEP = 1e-3  # of scaled parameters: far above the tolerances of programs that integrate
@@ -36,49 +36,42 @@ class ProgramSignals:
     signals: tuple[str, ...]
     names: Mapping[str, str]
 
-    def request(self, simulator: Simulator, values: Values) -> dict[str, Any]:
-        """Make the request for a run: all values, the steps, the instants without the delay."""
+    def request(
+        self,
+        simulator: Simulator,
+        values: Values,
+        direction: Direction | None = None,
+        step: float = 0.0,
+    ) -> dict[str, Any]:
+        """Make the request for a run: all values, the steps, the instants without the delay.
+
+        Values and inputs are a ``step`` away in a ``direction`` where one is given.
+        """
+        if direction is not None:
+            steps = list(simulator.inputs.steps)
+            for place, (at, size) in direction.steps.items():
+                old = steps[place]
+                steps[place] = old._replace(at=old.at + step * at, step=old.step + step * size)
+            delay = simulator.delay + step * direction.delay
+            simulator = simulator.with_inputs(tuple(steps), delay)
+            rates = direction.parameters.items()
+            values = {**values, **{name: values[name] + step * rate for name, rate in rates}}
         inputs = simulator.inputs
         times = np.clip(simulator.times - simulator.delay, inputs.start, inputs.end)
         return {
             "values": {self.names.get(name, name): value for name, value in values.items()},
             "steps": [
-                {"signal": step.signal, "at": step.at, "step": step.step, "ramp": step.ramp}
-                for step in inputs.steps
+                {"signal": each.signal, "at": each.at, "step": each.step, "ramp": each.ramp}
+                for each in inputs.steps
             ],
             "times": times.tolist(),
             "signals": list(self.signals),
         }
 
-    def moved(
-        self, simulator: Simulator, values: Values, direction: Direction, step: float
-    ) -> dict[str, Any]:
-        """Make the request for a run a step away from values and inputs, in a direction."""
-        steps = list(simulator.inputs.steps)
-        for place, (at, size) in direction.steps.items():
-            old = steps[place]
-            steps[place] = old._replace(at=old.at + step * at, step=old.step + step * size)
-        moved = simulator.with_inputs(tuple(steps), simulator.delay + step * direction.delay)
-        changes = {name: values[name] + step * rate for name, rate in direction.parameters.items()}
-        return self.request(moved, {**values, **changes})
-
     def run(self, simulator: Simulator, values: Values) -> ExternalRun:
         """Have the program run a test at some values."""
         (run,) = self.program.runs([self.request(simulator, values)])
         return run
-
-    def put_remembered(
-        self,
-        samples: Array,
-        simulators: Sequence[Simulator],
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-    ) -> None:
-        """Put the runs that the program remembers in the place of samples (K, M, ny) of K sets."""
-        for k, (simulator, values) in enumerate(zip(simulators, sets, strict=True)):
-            run = self.program.remembered(self.request(simulator, values))
-            if run is not None:
-                put(samples[k], run.signals, outputs)
 
 
 def put(samples: Array, signals: Mapping[str, Array], outputs: tuple[str, ...]) -> None:
@@ -88,15 +81,22 @@ def put(samples: Array, signals: Mapping[str, Array], outputs: tuple[str, ...]) 
             samples[:, place] = signals[name]
 
 
-@dataclass(frozen=True, eq=False)
-class RunResponder:
-    """Responds by a run of the program each time; exact derivatives are those of the twin."""
+class ProgramResponder:
+    """Responds by a program, or by what its runs have shown; it has the outputs of the twin."""
 
-    given: ProgramSignals
+    def __init__(self, given: ProgramSignals) -> None:
+        self.given = given
 
     def outputs(self, simulator: Simulator) -> tuple[str, ...]:
-        """Name the outputs of the twin."""
+        """Name the outputs of what stands for the unit."""
         return simulator.system.outputs
+
+    def confirm(self, simulator: Simulator, values: Values) -> None:
+        """Accept all values: no run is asked for."""
+
+
+class RunResponder(ProgramResponder):
+    """Responds by a run of the program each time; exact derivatives are those of the twin."""
 
     def confirm(self, simulator: Simulator, values: Values) -> None:
         """Raise SimulationError where the program has failed."""
@@ -156,7 +156,6 @@ class RunResponder:
         return samples, parts
 
 
-@dataclass(frozen=True, eq=False)
 class QuotientResponder(RunResponder):
     """Responds by runs of the program, which give the derivatives as well.
 
@@ -164,7 +163,9 @@ class QuotientResponder(RunResponder):
     would leave its ``limits`` or that run fails; 0 where both fail. All runs are side by side.
     """
 
-    limits: Limits
+    def __init__(self, given: ProgramSignals, limits: Mapping[str, tuple[float, float]]) -> None:
+        super().__init__(given)
+        self._limits = limits
 
     def outputs(self, simulator: Simulator) -> tuple[str, ...]:
         """Name the signals of the program: there are no others."""
@@ -186,12 +187,11 @@ class QuotientResponder(RunResponder):
         missing = [(k, j) for k in reached for j in range(len(directions[k]))]
         for turn in (1.0, -1.0):
             steps = [turn * self._step(sets[k], directions[k][j]) for k, j in missing]
-            runs = self.given.program.runs(
-                [
-                    self.given.moved(simulators[k], sets[k], directions[k][j], step)
-                    for (k, j), step in zip(missing, steps, strict=True)
-                ]
-            )
+            requests = [
+                self.given.request(simulators[k], sets[k], directions[k][j], step)
+                for (k, j), step in zip(missing, steps, strict=True)
+            ]
+            runs = self.given.program.runs(requests)
             failed = []
             for (k, j), step, run in zip(missing, steps, runs, strict=True):
                 moved = samples[k].copy()
@@ -204,37 +204,20 @@ class QuotientResponder(RunResponder):
     def _step(self, values: Values, direction: Direction) -> float:
         """Choose the step of a direction that keeps its parameters within their limits."""
         for name, rate in direction.parameters.items():
-            low, high = self.limits.get(name, (-np.inf, np.inf))
+            low, high = self._limits.get(name, (-np.inf, np.inf))
             if not low <= values[name] + QUOTIENT_STEP * rate <= high:
                 return -QUOTIENT_STEP
         return QUOTIENT_STEP
 
 
-class LinearResponder:
-    """Responds by a run of the program at one set of values and quotients there.
+class SettledResponder(ProgramResponder, ABC):
+    """Responds without a run; where the program remembers one, that run is the response."""
 
-    ``directions`` (N) are those in which values, steps and the delay may differ from these. Where
-    the program remembers a run, that run is the response.
-    """
-
-    def __init__(
-        self,
-        runs: QuotientResponder,
-        at: Simulator,
-        values: Values,
-        directions: Sequence[Direction],
+    @abstractmethod
+    def correct(
+        self, samples: Array, simulator: Simulator, values: Values, outputs: tuple[str, ...]
     ) -> None:
-        self.given = runs.given
-        self._at, self._values = at, values
-        self._coordinates = Coordinates(directions)
-        self._samples, self._slopes = at.tangents(values, self.given.signals, directions)
-
-    def outputs(self, simulator: Simulator) -> tuple[str, ...]:
-        """Name the outputs of what stands for the unit."""
-        return simulator.system.outputs
-
-    def confirm(self, simulator: Simulator, values: Values) -> None:
-        """Accept all values: no run is asked for."""
+        """Correct the outputs (M, ny) that the equations give at values."""
 
     def samples_of_many(
         self,
@@ -243,16 +226,62 @@ class LinearResponder:
         outputs: tuple[str, ...],
         tests: Tests,
     ) -> tuple[Array, Counts]:
-        """Find outputs (K, M, ny) of K sets, linear in what they differ by."""
+        """Find outputs (K, M, ny) of K sets, corrected."""
         samples, parts = simulator.samples_by_equations(sets, outputs, tests)
         simulators = tests or [simulator] * len(sets)
-        here = self._coordinates.place(self._values, self._at)
-        for k, (own, values) in enumerate(zip(simulators, sets, strict=True)):
-            along = self._coordinates.along(self._coordinates.place(values, own) - here)
-            linear = self._samples + self._slopes @ along
-            put(samples[k], dict(zip(self.given.signals, linear.T, strict=True)), outputs)
-        self.given.put_remembered(samples, simulators, sets, outputs)
+        for own, test, values in zip(samples, simulators, sets, strict=True):
+            self.correct(own, test, values, outputs)
+            run = self.given.program.remembered(self.given.request(test, values))
+            if run is not None:
+                put(own, run.signals, outputs)
         return samples, parts
+
+
+class LinearResponder(SettledResponder):
+    """Responds by a run of the program at one set of values and quotients there.
+
+    ``directions`` (N) are those in which values, steps and the delay may differ from these.
+    """
+
+    def __init__(
+        self,
+        given: ProgramSignals,
+        at: Simulator,
+        values: Values,
+        directions: Sequence[Direction],
+    ) -> None:
+        super().__init__(given)
+        self._at, self._values = at, values
+        self._samples, self._slopes = at.tangents(values, given.signals, directions)
+        self._names = sorted({name for each in directions for name in each.parameters})
+        self._steps = sorted({step for each in directions for step in each.steps})
+        rates = [
+            [
+                *(each.parameters.get(name, 0.0) for name in self._names),
+                *(rate for step in self._steps for rate in each.steps.get(step, (0.0, 0.0))),
+                each.delay,
+            ]
+            for each in directions
+        ]
+        rows = np.array(rates).reshape(len(directions), -1).T
+        self._sizes = np.max(np.abs(rows), axis=1, initial=0.0)
+        self._sizes[self._sizes == 0.0] = 1.0
+        self._inverse = np.linalg.pinv(rows / self._sizes[:, None])
+        self._here = self._place(values, at)
+
+    def _place(self, values: Values, simulator: Simulator) -> Array:
+        """List what the directions move, of values and of a simulator's inputs."""
+        moved = [simulator.inputs.steps[step] for step in self._steps]
+        steps = [number for step in moved for number in (step.at, step.step)]
+        return np.array([*(values[name] for name in self._names), *steps, simulator.delay])
+
+    def correct(
+        self, samples: Array, simulator: Simulator, values: Values, outputs: tuple[str, ...]
+    ) -> None:
+        """Put signals, linear in what they differ by, in the place of outputs (M, ny)."""
+        along = self._inverse @ ((self._place(values, simulator) - self._here) / self._sizes)
+        linear = self._samples + self._slopes @ along
+        put(samples, dict(zip(self.given.signals, linear.T, strict=True)), outputs)
 
     def tangents_of_many(
         self,
@@ -268,63 +297,23 @@ class LinearResponder:
         return samples, np.stack(slopes), parts
 
 
-class Coordinates:
-    """How far values, steps and the delay of a test lie along some directions (N)."""
-
-    def __init__(self, directions: Sequence[Direction]) -> None:
-        self._names = sorted({name for each in directions for name in each.parameters})
-        self._steps = sorted({step for each in directions for step in each.steps})
-        rows = np.array([self._rates(each) for each in directions]).reshape(len(directions), -1).T
-        self._sizes = np.max(np.abs(rows), axis=1, initial=0.0)
-        self._sizes[self._sizes == 0.0] = 1.0
-        self._inverse = np.linalg.pinv(rows / self._sizes[:, None])
-
-    def place(self, values: Values, simulator: Simulator) -> Array:
-        """List what the directions move, of values and of a simulator's inputs."""
-        moved = [simulator.inputs.steps[step] for step in self._steps]
-        steps = [number for step in moved for number in (step.at, step.step)]
-        return np.array([*(values[name] for name in self._names), *steps, simulator.delay])
-
-    def along(self, way: Array) -> Array:
-        """Split a way between two places into its lengths (N,) along the directions."""
-        return np.asarray(self._inverse @ (way / self._sizes))
-
-    def _rates(self, direction: Direction) -> list[float]:
-        steps = [rate for step in self._steps for rate in direction.steps.get(step, (0.0, 0.0))]
-        names = [direction.parameters.get(name, 0.0) for name in self._names]
-        return [*names, *steps, direction.delay]
-
-
-@dataclass(frozen=True, eq=False)
-class CorrectedResponder:
+class CorrectedResponder(SettledResponder):
     """Responds by the twin, with a difference (M,) per unit that is added to some signals.
 
-    It is that between the program and the twin at one set of values, where both agree so. Where the
-    program remembers a run, that run is the response; it is asked for none.
+    It is that between the program and the twin at one set of values, where both agree so.
     """
 
-    given: ProgramSignals
-    differences: Mapping[str, Array]
+    def __init__(self, given: ProgramSignals, differences: Mapping[str, Array]) -> None:
+        super().__init__(given)
+        self.differences = differences
 
-    def outputs(self, simulator: Simulator) -> tuple[str, ...]:
-        """Name the outputs of the twin."""
-        return simulator.system.outputs
-
-    def confirm(self, simulator: Simulator, values: Values) -> None:
-        """Accept all values: no run is asked for."""
-
-    def samples_of_many(
-        self,
-        simulator: Simulator,
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        tests: Tests,
-    ) -> tuple[Array, Counts]:
-        """Simulate outputs (K, M, ny) of K sets, corrected."""
-        samples, parts = simulator.samples_by_equations(sets, outputs, tests)
-        samples = samples + self._added(simulator, outputs)
-        self.given.put_remembered(samples, tests or [simulator] * len(sets), sets, outputs)
-        return samples, parts
+    def correct(
+        self, samples: Array, simulator: Simulator, values: Values, outputs: tuple[str, ...]
+    ) -> None:
+        """Add the differences to outputs (M, ny)."""
+        for place, name in enumerate(outputs):
+            if name in self.differences:
+                samples[:, place] += self.differences[name]
 
     def tangents_of_many(
         self,
@@ -336,8 +325,6 @@ class CorrectedResponder:
     ) -> tuple[Array, Array, Counts]:
         """Simulate outputs (K, M, ny) of K sets, corrected, with the derivatives of the twin."""
         samples, slopes, parts = simulator.tangents_by_equations(sets, outputs, directions, tests)
-        return samples + self._added(simulator, outputs), slopes, parts
-
-    def _added(self, simulator: Simulator, outputs: tuple[str, ...]) -> Array:
-        nothing = np.zeros(len(simulator.times))
-        return np.stack([self.differences.get(name, nothing) for name in outputs], axis=1)
+        for own, values in zip(samples, sets, strict=True):
+            self.correct(own, simulator, values, outputs)
+        return samples, slopes, parts

@@ -11,8 +11,9 @@ from tiers import few_of
 import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.features.external import case_program
+from exfit.features.external.case_program import CaseProgram
 from exfit.features.external.fmu import FmuDescription, FmuVariable
+from exfit.features.external.program import ExternalProgram
 from exfit.workflows import check
 
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
@@ -201,9 +202,9 @@ DESCRIPTION = FmuDescription(
 
 def test_all_that_an_fmu_has_no_variable_for_is_reported_together(record, tmp_path):
     unit = of_fmu(record, "unit.fmu", names={"K": "avr.k_", "TE": "avr.TE"}, outputs={"vt": "V"})
-    program = case_program.FmuProgram(unit.external, "", tmp_path, DESCRIPTION)
+    never_run = ExternalProgram(["none"], tmp_path, 1, 1.0)
     with pytest.raises(CaseError) as faults:
-        case_program.refuse_unknown_variables(unit, program, [(_test_of(unit), ("vt",))])
+        CaseProgram(unit, unit.external, never_run, DESCRIPTION).simulator(_test_of(unit))
     text = str(faults.value)
     assert "plant.names.K: unit.fmu has no variable avr.k_; did you mean avr.K?" in text
     assert "plant.names.TE: avr.TE is not a parameter that can be set but fixed calc" in text

@@ -1,10 +1,11 @@
 """Runs of another program: what is an answer, what is remembered."""
 
 import sys
+from contextlib import closing
 
 import pytest
 
-from exfit.features.external.program import ExternalProgram, run_of, running
+from exfit.features.external.program import ExternalProgram, run_of
 
 REQUEST = {"values": {"K": 2.0}, "steps": [], "times": [0.0, 1.0], "signals": ["vt"]}
 CODE = """
@@ -35,7 +36,7 @@ def test_an_answer_that_is_no_run_has_a_reason(answer, reason):
 
 def test_no_run_is_asked_for_twice(tmp_path):
     requests = [{**REQUEST, "values": {"K": float(k)}} for k in (1, 2, 3)]
-    with running(ExternalProgram([sys.executable, "-c", CODE], tmp_path, 2, 20.0)) as program:
+    with closing(ExternalProgram([sys.executable, "-c", CODE], tmp_path, 2, 20.0)) as program:
         first = program.runs(requests)
         again = program.runs([*reversed(requests), requests[0]])
         assert [run.signals["vt"][1] for run in first] == [1.0, 2.0, 3.0]
@@ -56,7 +57,7 @@ for number, line in enumerate(sys.stdin, 1):
 
 def test_a_run_that_fails_is_made_once_again(tmp_path):
     requests = [{**REQUEST, "values": {"K": k}} for k in (3.0, 2.0, 1.0)]
-    with running(ExternalProgram([sys.executable, "-c", FAILING], tmp_path, 1, 20.0)) as program:
+    with closing(ExternalProgram([sys.executable, "-c", FAILING], tmp_path, 1, 20.0)) as program:
         for _ in range(2):
             runs = program.runs(requests)
             assert [run.failure for run in runs] == ["", "", "it reports: none"]
