@@ -227,7 +227,9 @@ class TrustRegion:
         """Return the best move that the trust region allows."""
         cost, search = linear.point.cost, self
         if self.radius == inf:
-            search = replace(self, radius=first_radius(problem, linear, self.first))
+            unit = 1.0 if problem.scaled else norm(linear.scale * linear.box.unit)
+            longest = max(linear.scaled_length(linear.full.target), TINY)
+            search = replace(self, radius=min(self.first * unit, longest))
         capped = False
         for rejections in range(spent, spent + MOST_TRIALS):
             nu = damping(linear, search.radius)
@@ -236,7 +238,10 @@ class TrustRegion:
             step = solve(linear, nu)
             if not worth_trying(linear, step.promise, rejections):
                 break
-            trial = yield from self.trial(problem, linear, step, nu)
+            target = step.target
+            if self.bends and nu > 0.0 and self.damped >= VALLEY:
+                target = yield from bent(problem, linear, step, nu)
+            trial = yield from problem.evaluate(target)
             decrease = cost - trial.cost
             search = search.resized(linear, step, nu, decrease)
             quality = gain_ratio(decrease, step.promise)
@@ -246,14 +251,6 @@ class TrustRegion:
                 move = Move(trial, nu, rejections, quality, stop, capped)
                 return move, search.after(linear, nu, decrease)
         return Move(None, nu, rejections, stop=Stop.STALLED, capped=capped), search
-
-    def trial(
-        self, problem: Problem, linear: LinearModel, step: DampedStep, nu: float
-    ) -> Steps[Point]:
-        """Return the end of a step, bent where the search follows a valley."""
-        if self.bends and nu > 0.0 and self.damped >= VALLEY:
-            return (yield from problem.evaluate((yield from bent(problem, linear, step, nu))))
-        return (yield from problem.evaluate(step.target))
 
     def after(self, linear: LinearModel, nu: float, decrease: float) -> Self:
         """Return the search after an accepted trial: how many were timid, or damped, in a row."""
@@ -292,13 +289,6 @@ def bent(problem: Problem, linear: LinearModel, step: DampedStep, nu: float) -> 
     if 2.0 * float(np.linalg.norm(y)) > STRAIGHT * linear.scaled_length(step.target):
         return step.target
     return linear.box.inside(step.target + 0.5 * y / linear.scale)
-
-
-def first_radius(problem: Problem, linear: LinearModel, first: float) -> float:
-    """Return the radius to begin with, no longer than the full step."""
-    full = linear.scaled_length(linear.full.target)
-    size = norm(linear.scale * linear.box.unit)
-    return min(first * (1.0 if problem.scaled else size), max(full, TINY))
 
 
 def damping(linear: LinearModel, radius: float) -> float:
@@ -365,7 +355,8 @@ class RatioDamping:
     def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Raise nu until a trial does not raise the cost."""
         cost = linear.point.cost
-        nu = first_nu = self.at_start(linear) if isnan(self.nu) else self.nu
+        nu = linear.gradient_norm if self.first is None else self.first
+        nu = first_nu = nu if isnan(self.nu) else self.nu
         for rejections in range(MOST_TRIALS):
             step = damped_step(linear, nu)
             promise = -0.5 * step.slope
@@ -379,10 +370,6 @@ class RatioDamping:
             nu = self.raised(nu)
         move = Move(None, nu, rejections, stop=Stop.STALLED, capped=first_nu > 0.0)
         return move, replace(self, nu=nu)
-
-    def at_start(self, linear: LinearModel) -> float:
-        """Return nu to begin with."""
-        return linear.gradient_norm if self.first is None else self.first
 
     def raised(self, nu: float) -> float:
         """Return nu after a bad trial."""

@@ -1,12 +1,12 @@
 """The one loop of all methods, its log, its rules to stop, and the methods by name."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from math import inf, nan, sqrt
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.lockstep import finish
@@ -42,63 +42,39 @@ KINK = 1e-3  # of the cost: what a derivative from one side may promise at a min
 MOST_ITERATIONS = 100  # of a phase for which nothing is given
 
 
-@dataclass(frozen=True)
 class Rules:
-    """The tolerances, of which `least_squares` says what they mean, and what they refer to.
+    """The rules to stop, by the tolerances of a descent and what they refer to at its start.
 
-    ``scaled``: whether units are given; ``seen``: the variables that no end may lose sight of.
+    Without units nothing says that the start is sensible: a cost is not small because that of the
+    start was large, and variables that were seen there may get lost.
     """
 
-    max_iterations: int | Mapping[str, int]
-    gtol: float
-    ftol: float
-    xtol: float
-    gtol_absolute: float | None = None
-    matches: Callable[[Array], bool] | None = None
-    scaled: bool = True
-    first_cost: float = nan
-    first_gradient: float = nan
-    seen: Mask = field(default_factory=lambda: np.zeros(1, dtype=np.bool_))
-
-    def starting_at(self, start: LinearModel, scaled: bool) -> Self:
-        """Return the rules that measure by the start.
-
-        Without units (``scaled``) nothing says that the start is sensible: a cost is not small
-        because that of the start was large, and variables that were seen there may get lost.
-        """
-        rules = replace(self, scaled=scaled, first_gradient=start.gradient_norm)
-        if scaled:
-            return replace(rules, first_cost=start.point.cost)
-        return replace(rules, first_cost=0.0, seen=seen(start))
-
-    def most_iterations(self, phase: str) -> int:
-        """Limit of the iterations of a phase."""
-        if isinstance(self.max_iterations, int):
-            return self.max_iterations
-        return self.max_iterations.get(phase, MOST_ITERATIONS)
+    def __init__(self, descent: "Descent", start: LinearModel) -> None:
+        self.gtol, self.ftol, self.xtol = descent.gtol, descent.ftol, descent.xtol
+        self.gtol_absolute, self.matches = descent.gtol_absolute, descent.matches
+        self.scaled = descent.x_scale is not None
+        self.first_cost = start.point.cost if self.scaled else 0.0
+        self.first_gradient = start.gradient_norm
+        self.seen = np.zeros(1, dtype=np.bool_) if self.scaled else seen(start)
 
     def at_rest(self, linear: LinearModel) -> Stop | None:
-        """Find a reason to stop at a point: there is nothing to gain."""
+        """Find a reason to stop at a point: there is nothing to gain, or it is good enough."""
         if not linear.finite:
             return Stop.JACOBIAN
-        cost = linear.point.cost
+        cost, gradient = linear.point.cost, linear.gradient_norm
         nothing = cost <= self.gtol**2 * self.first_cost
-        flat = linear.gradient_norm <= self.gtol * self.first_gradient + TINY
+        flat = gradient <= self.gtol * self.first_gradient + TINY
         if flat and (nothing or linear.full.promise <= self.ftol * cost):
             return Stop.GRADIENT
         if not linear.surely_longer(self.xtol):
             full = linear.full
             if self.tiny(full.target, full.origin, linear.box):
                 return Stop.STEP
-        return self.good_enough(linear)
-
-    def good_enough(self, linear: LinearModel) -> Stop | None:
-        """Find the tolerance of the user's own that a point is within, if any."""
         if self.matches is not None and self.matches(linear.point.residuals):
             return Stop.MATCH
         if self.gtol_absolute is None:
             return None
-        flat = linear.gradient_norm <= self.gtol * self.first_gradient + self.gtol_absolute
+        flat = gradient <= self.gtol * self.first_gradient + self.gtol_absolute
         return Stop.FLAT if flat else None
 
     def after(self, before: LinearModel, linear: LinearModel, move: Move) -> Stop | None:
@@ -134,7 +110,9 @@ class Rules:
         promise = linear.full.promise / linear.point.cost
         if stop is Stop.ILL_CONDITIONED:
             return stop
-        if promise <= sqrt(EPS) or rounding(linear):
+        parts = abs(linear.jacobian) @ abs(linear.point.x)
+        rounding = 0.5 * ROUNDING**2 * float(parts @ parts)
+        if promise <= sqrt(EPS) or linear.point.cost <= rounding:
             return Stop.FLOOR
         if self.orthogonal(linear):
             return Stop.GRADIENT
@@ -151,10 +129,6 @@ class Rules:
         flat = np.all(abs(linear.projected) <= ORTHOGONAL * r * norms)
         return not self.scaled and bool(flat)
 
-    def lost(self, linear: LinearModel) -> bool:
-        """Tell whether the residuals depend no longer on a variable that they depended on."""
-        return bool(np.any(self.seen & ~seen(linear)))
-
     def tiny(self, there: Array, here: Array, box: Box) -> bool:
         """Tell whether a step is below the tolerance in every variable."""
         size = np.maximum(abs(here), box.unit)
@@ -165,12 +139,6 @@ def seen(linear: LinearModel) -> Mask:
     """Return on which variables the residuals depend by more than rounding, unit by unit."""
     norms = np.linalg.norm(linear.jacobian, axis=0) * linear.box.unit
     return np.asarray(norms > linear.unseen * np.max(norms, initial=0.0))
-
-
-def rounding(linear: LinearModel) -> bool:
-    """Tell whether the residuals are no more than the rounding of their parts."""
-    parts = abs(linear.jacobian) @ abs(linear.point.x)
-    return linear.point.cost <= 0.5 * ROUNDING**2 * float(parts @ parts)
 
 
 NOT_FINITE = "the residuals at x0 are not finite"
@@ -198,25 +166,31 @@ class SearchRun:
 
     def __init__(
         self,
+        descent: "Descent",
         problem: Problem,
-        rules: Rules,
-        searches: Searches,
         callback: Callable[[SolverIteration], object] | None,
     ) -> None:
-        self.problem, self.rules, self.callback = problem, rules, callback
-        self.searches = searches
+        self.descent, self.problem, self.callback = descent, problem, callback
+        self.searches = descent.searches
         self.history: list[SolverIteration] = []
         self.iterations = 0
         self.best: LinearModel | None = None
 
-    def begin(self, x0: Array) -> Steps[LinearModel]:
-        """Return the linear model at the start, or raise NotFinite."""
-        point = yield from self.problem.evaluate(x0)
-        if point.cost == inf:
-            raise NotFinite(NOT_FINITE)
-        start = yield from self.linearise(point)
-        self.rules = self.rules.starting_at(start, self.problem.scaled)
-        return start
+    def search(self, x0: Array) -> Steps[Result]:
+        """Search from a start, or raise NotFinite."""
+        try:
+            point = yield from self.problem.evaluate(x0)
+            if point.cost == inf:
+                raise NotFinite(NOT_FINITE)
+            start = yield from self.linearise(point)
+            self.rules = Rules(self.descent, start)
+            outcome = yield from STRATEGIES[self.descent.method](self, start)
+            outcome = yield from self.best_of(outcome)
+        except EvaluationLimit:
+            outcome = yield from self.exhausted()
+        except KeyboardInterrupt:
+            outcome = self.interrupted()
+        return self.result(outcome)
 
     def linearise(self, point: Point, before: LinearModel | None = None) -> Steps[LinearModel]:
         """Return the linear model at a point; remember the best one."""
@@ -230,7 +204,10 @@ class SearchRun:
         if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
             self.announce(search.phase, linear)
         first = len(self.history) - 1
-        for _ in range(self.rules.most_iterations(search.phase)):
+        most = self.descent.max_iterations
+        if not isinstance(most, int):
+            most = most.get(search.phase, MOST_ITERATIONS)
+        for _ in range(most):
             stop = self.rules.at_rest(linear)
             if stop is not None:
                 return self.end(linear, stop)
@@ -249,7 +226,7 @@ class SearchRun:
     def end(self, linear: LinearModel, stop: Stop) -> Outcome:
         """End a phase, at no minimum where a variable got lost."""
         outcome = Outcome(linear, stop)
-        lost = outcome.converged and self.rules.lost(linear)
+        lost = outcome.converged and np.any(self.rules.seen & ~seen(linear))
         return Outcome(linear, Stop.LOST) if lost else outcome
 
     def announce(
@@ -315,8 +292,9 @@ class SearchRun:
     def result(self, outcome: Outcome) -> Result:
         """Make the result for the user."""
         linear, stop = outcome.linear, outcome.stop
+        x, box = linear.point.x, linear.box
         return Result(
-            x=linear.point.x,
+            x=x,
             cost=linear.point.cost,
             fun=linear.point.residuals,
             jac=linear.jacobian,
@@ -331,24 +309,19 @@ class SearchRun:
             success=outcome.converged,
             history=tuple(self.history),
             stop=stop,
-            active_mask=active(linear.point.x, linear.box),
+            active_mask=np.where(x <= box.low, -1, np.where(x >= box.high, 1, 0)),
         )
 
 
-def active(x: Array, box: Box) -> NDArray[np.int_]:
-    """Return -1 where a variable is at its lower bound, 1 at its upper one, else 0."""
-    return np.where(x <= box.low, -1, np.where(x >= box.high, 1, 0))
-
-
-Strategy = Callable[[SearchRun, LinearModel, float | None], Steps[Outcome]]
+Strategy = Callable[[SearchRun, LinearModel], Steps[Outcome]]
 
 
 def alone(search: Callable[[Searches], Search]) -> Strategy:
     """Return the strategy that is one method from start to end."""
-    return lambda run, start, _: run.descend(search(run.searches), start)
+    return lambda run, start: run.descend(search(run.searches), start)
 
 
-def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Outcome]:
+def lm_then_dgn(run: SearchRun, start: LinearModel) -> Steps[Outcome]:
     """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
     lm, dgn = run.searches.lm, run.searches.dgn
     outcome = yield from relay(run, start, lm.handing_over(), dgn)
@@ -357,7 +330,7 @@ def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Ou
     return (yield from run.descend(lm, outcome.linear))
 
 
-def robust(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Outcome]:
+def robust(run: SearchRun, start: LinearModel) -> Steps[Outcome]:
     """Go on with lm where gn quits."""
     return relay(run, start, FullStep(), run.searches.lm)
 
@@ -370,21 +343,18 @@ def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> 
     return (yield from run.descend(second, outcome.linear))
 
 
-def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Steps[Outcome]:
-    """Try dgn; where that is not good enough, lm and dgn from the same start."""
+def auto(run: SearchRun, start: LinearModel) -> Steps[Outcome]:
+    """Try dgn; where that did not converge, or not to a match, lm and dgn from the same start."""
     first = yield from run.descend(run.searches.dgn, start)
-    if matches(first, good_enough):
-        return first
-    second = yield from lm_then_dgn(run, start, good_enough)
-    return second if second.linear.point.cost <= first.linear.point.cost else first
-
-
-def matches(outcome: Outcome, good_enough: float | None) -> bool:
-    """Tell whether the residuals are small enough; without a limit, whether it converged."""
+    point, good_enough = first.linear.point, run.descent.good_enough
     if good_enough is None:
-        return outcome.converged
-    point = outcome.linear.point
-    return sqrt(2.0 * point.cost / len(point.residuals)) <= good_enough
+        matches = first.converged
+    else:
+        matches = sqrt(2.0 * point.cost / len(point.residuals)) <= good_enough
+    if matches:
+        return first
+    second = yield from lm_then_dgn(run, start)
+    return second if second.linear.point.cost <= point.cost else first
 
 
 STRATEGIES: dict[str, Strategy] = {
@@ -430,36 +400,21 @@ class Descent:
         start, box = checked(x0, self.bounds, self.x_scale)
         if self.method not in STRATEGIES:
             raise ValueError(f"method: {self.method!r} is none of {', '.join(STRATEGIES)}")
-        scaled = self.x_scale is not None
         problem = Problem(
             self.functions,
             self.differences,
             box,
-            scaled,
+            self.x_scale is not None,
             self.jacobian_error,
             self.most_evaluations,
         )
-        rules = Rules(
-            self.max_iterations, self.gtol, self.ftol, self.xtol, self.gtol_absolute, self.matches
-        )
-        return self._search(SearchRun(problem, rules, self.searches, callback), start)
+        return SearchRun(self, problem, callback).search(start)
 
     def run(
         self, x0: ArrayLike, callback: Callable[[SolverIteration], object] | None = None
     ) -> Result:
         """Search from x0 (N,) alone and return the result."""
         return finish(self.begin(x0, callback))
-
-    def _search(self, run: SearchRun, start: Array) -> Steps[Result]:
-        try:
-            linear = yield from run.begin(start)
-            outcome = yield from STRATEGIES[self.method](run, linear, self.good_enough)
-            outcome = yield from run.best_of(outcome)
-        except EvaluationLimit:
-            outcome = yield from run.exhausted()
-        except KeyboardInterrupt:
-            outcome = run.interrupted()
-        return run.result(outcome)
 
 
 def least_squares(

@@ -1,7 +1,7 @@
 """Many starts, each refined to a minimum, and the distinct minima they lead to."""
 
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
 from math import inf, nan
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exfit.estimate.lockstep import finish_all
-from exfit.estimate.problem import Array, Functions, Progress, Result, Steps, Stop, checked
+from exfit.estimate.problem import Array, Progress, Result, Steps, Stop, checked
 from exfit.estimate.solver import Descent, NotFinite
 from exfit.util.sorting import median
 
@@ -42,22 +42,15 @@ def _primitive() -> Iterator[int]:
     """Yield polynomials over GF(2) as bits, the first of degree zero, then all primitive ones."""
     yield 1
     for polynomial in count(3, 2):
-        if _is_primitive(polynomial):
+        degree = polynomial.bit_length() - 1
+        power, order = 1, 0
+        while (order == 0 or power > 1) and order < 1 << degree:
+            power <<= 1
+            if power >> degree:
+                power ^= polynomial
+            order += 1
+        if power == 1 and order == (1 << degree) - 1:
             yield polynomial
-
-
-def _is_primitive(polynomial: int) -> bool:
-    degree = polynomial.bit_length() - 1
-    power, order = 1, 0
-    while True:
-        power <<= 1
-        if power >> degree:
-            power ^= polynomial
-        order += 1
-        if power == 1:
-            return order == (1 << degree) - 1
-        if order == 1 << degree or power == 0:
-            return False
 
 
 def _directions(polynomial: int, draw: random.Random) -> list[int]:
@@ -150,15 +143,17 @@ def multistart(
     near, ends = dict[int, RefinedStart](), dict[int, RefinedStart]()
 
     def receive(place: int, end: RefinedStart) -> None:
-        if joining[place]:
-            near[place] = end
-            refuse_interrupted(end)
-        else:
+        if not joining[place]:
             take([place], end)
+            return
+        near[place] = end
+        if end.cut_short is not None:
+            raise KeyboardInterrupt
 
     def take(places: Sequence[int], end: RefinedStart) -> None:
         ends.update(dict.fromkeys(places, end))
-        refuse_interrupted(end)
+        if end.cut_short is not None:
+            raise KeyboardInterrupt
         lowest = min((end.cost for end in ends.values() if end.end is not None), default=inf)
         watch(Progress("refining", len(ends), len(points), lowest))
 
@@ -166,28 +161,21 @@ def multistart(
     begun = [refined(x, legs[:1] if joins else legs[first:]) for x, first, joins in ways]
     whole = finish_all(begun, workers, receive)
     if whole and near:
-        groups = together(near, merged or 0.0)
-        going_on = [refined(near[group[0]].at(points[group[0]]), legs[1:]) for group in groups]
+        there = {k: start.end for k, start in sorted(near.items()) if start.end is not None}
+        places = [*there]
+        groups = [[places[k] for k in own] for own in distinct([*there.values()], merged or 0.0)]
+        groups += [[k] for k, start in sorted(near.items()) if start.end is None]
+        begins = []
+        for own in groups:
+            end = near[own[0]].end
+            begins.append(points[own[0]] if end is None else end.result.x)
+        going_on = [refined(x, legs[1:]) for x in begins]
         whole = finish_all(going_on, workers, lambda k, end: take(groups[k], end))
     every = [
         *(RefinedStart(result.history[0].cost, outcome_of(result)) for result in earlier),
         *(ends.get(k, RefinedStart(nan)) for k in range(len(points))),
     ]
     return summary(every, legs[-1], interrupted=not whole)
-
-
-def refuse_interrupted(end: "RefinedStart") -> None:
-    """Raise KeyboardInterrupt where an interruption ended a refinement."""
-    if end.cut_short is not None:
-        raise KeyboardInterrupt
-
-
-def together(ends: Mapping[int, "RefinedStart"], errors: float) -> list[list[int]]:
-    """Group starts whose ends lie within so many standard errors: they go on as one."""
-    begun = [(k, start.end) for k, start in sorted(ends.items()) if start.end is not None]
-    groups = distinct([end for _, end in begun], errors)
-    alone = [[k] for k, start in sorted(ends.items()) if start.end is None]
-    return [*([begun[k][0] for k in group] for group in groups), *alone]
 
 
 @dataclass(frozen=True)
@@ -200,10 +188,6 @@ class RefinedStart:
     first_cost: float
     end: "StartOutcome | None" = None
     cut_short: Result | None = None
-
-    def at(self, start: Array) -> Array:
-        """Return the point (N,) where it ended, that of the start where it could not begin."""
-        return start if self.end is None else self.end.result.x
 
     @property
     def cost(self) -> float:
@@ -234,15 +218,21 @@ def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
 
 
 def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> MultistartResult:
-    """Summarise the ends of some starts."""
-    ends = [(start.end, start.first_cost) for start in starts if start.end is not None]
-    nothing = leg.gtol**2 * float(median([first_cost for _, first_cost in ends] or [0.0]))
-    minima = minima_of([end for end, _ in ends], nothing, leg.functions)
+    """Summarise the ends of some starts; minima get their residuals and Jacobian again."""
+    ends = [start.end for start in starts if start.end is not None]
+    first_costs = [start.first_cost for start in starts if start.end is not None]
+    nothing = leg.gtol**2 * float(median(first_costs or [0.0]))
+    minima = list[LocalMinimum]()
+    for group in distinct(ends, nothing=nothing):
+        best = ends[group[0]].result
+        (residuals,), (J,) = leg.functions.residuals([best.x]), leg.functions.jacobians([best.x])
+        whole = replace(best, fun=residuals, jac=J)
+        minima.append(LocalMinimum(best.x, best.cost, len(group), whole))
     cut_short = [start.cut_short for start in starts if start.cut_short is not None]
     candidates = [*(local.result for local in minima[:1]), *cut_short]
     failed = sum(start.first_cost == inf for start in starts)
     return MultistartResult(
-        minima=minima,
+        minima=tuple(minima),
         best=min(candidates, key=lambda result: result.cost, default=None),
         start_costs=np.array([start.first_cost for start in starts]),
         end_costs=np.array([start.cost for start in starts]),
@@ -321,20 +311,3 @@ def same(
     way = best.triangle @ (other.result.x - best.result.x)
     rise = other.result.cost - best.result.cost
     return max(rise, 0.5 * float(way @ way)) <= errors**2 * best.variance + nothing
-
-
-def minima_of(
-    ends: Sequence[StartOutcome], nothing: float, functions: Functions
-) -> tuple[LocalMinimum, ...]:
-    """Return the distinct minima that ends are, the lowest first."""
-    return tuple(
-        minimum(ends[group[0]].result, len(group), functions)
-        for group in distinct(ends, nothing=nothing)
-    )
-
-
-def minimum(best: Result, starts: int, functions: Functions) -> LocalMinimum:
-    """Return the minimum with the best of some ends, with its residuals and Jacobian again."""
-    (residuals,), (jacobian,) = functions.residuals([best.x]), functions.jacobians([best.x])
-    result = replace(best, fun=residuals, jac=jacobian)
-    return LocalMinimum(best.x, best.cost, starts, result)
