@@ -16,7 +16,6 @@ from exfit.fitting.experiment import Channel
 from exfit.fitting.noise import LEAST_NOISE, noise_shape, propagated_noise, scatter_of
 from exfit.inference.noise import effective_samples, whiteness
 from exfit.inference.quantiles import chi_square_tail
-from exfit.results.comparisons import Overlay
 from exfit.results.verdict import ResidualTests
 from exfit.util.sorting import median
 from exfit.verdict.causes import Evidence, FittedRecord
@@ -52,14 +51,6 @@ def sample_scatter(std: float, samples: int) -> Scatter:
     The residuals are as many ``samples``; so is their own share of the variance here.
     """
     return Scatter(std, (OF_RMS + OF_SCATTER) / samples)
-
-
-def white_scatter(std: float, samples: int) -> Scatter:
-    """Return the scatter of residuals that are weighted by the noise of what drives them.
-
-    It is as certain as the scatter of these signals, by the median of fourth differences.
-    """
-    return Scatter(std, (OF_RMS + OF_FOURTH_DIFFERENCES) / samples)
 
 
 def rest_scatter(at_rest: Array, samples: int) -> Scatter | None:
@@ -117,22 +108,17 @@ def step_pattern(errors: Array, steps: Sequence[int]) -> float | None:
     """
     if not np.any(errors):
         return None
-    starts = _parts(len(errors), steps)
+    inside = sorted({step for step in steps if 0 < step < len(errors)})[:MOST_STEPS]
+    starts = [
+        first + 2**k - 1
+        for first, last in pairwise([0, *inside, len(errors)])
+        for k in range((last - first).bit_length())
+        if first + 2**k - 1 < last
+    ]
     sums = np.add.reduceat(errors, starts)
     lengths = np.diff([*starts, len(errors)])
     statistic = float(np.sum(sums**2 / lengths)) / float(np.mean(errors**2))
     return chi_square_tail(statistic, len(starts))
-
-
-def _parts(count: int, steps: Sequence[int]) -> list[int]:
-    """Places at which the parts of a pattern begin."""
-    inside = sorted({step for step in steps if 0 < step < count})[:MOST_STEPS]
-    return [
-        first + 2**k - 1
-        for first, last in pairwise([0, *inside, count])
-        for k in range((last - first).bit_length())
-        if first + 2**k - 1 < last
-    ]
 
 
 def largest_deviation(errors: Array, scatter: float) -> float:
@@ -170,7 +156,9 @@ def residual_tests(evidence: Evidence) -> tuple[ResidualTests, ...]:
     each = iter(np.split(influence, np.cumsum(residuals.sizes)[:-1]))
     noises = iter(evidence.uncertainty.confidence.noise)
     for record in evidence.records:
-        instants = _step_instants(record, values)
+        simulator = record.setup.experiment.with_inputs(values)
+        # the instants (s) of the steps, as the record shows them
+        instants = [step.at + simulator.delay for step in simulator.inputs.steps]
         for channel, (size, scatter) in zip(
             record.setup.channels, _sizes(record, values), strict=True
         ):
@@ -180,49 +168,53 @@ def residual_tests(evidence: Evidence) -> tuple[ResidualTests, ...]:
     return tuple(tests)
 
 
+def _errors(record: FittedRecord) -> Array:
+    """Return the weighted errors of all channels of a record, white where the fit makes them so."""
+    experiment, errors = record.setup.experiment, list[Array]()
+    for channel in experiment.channels:
+        error = record.comparison.overlays[channel.signal].error
+        errors.append(channel.weight * error[np.isfinite(error)])
+    whole, whitening = np.concatenate(errors), experiment.whitening
+    return whole if whitening is None else whitening.errors(whole[None])[0]
+
+
 def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[Scatter]]]:
     """Yield the factor from a weighted error to one of the channel, pu, and the channel's scatter.
 
-    That of white errors is what they were before, whose size their noise foretells.
+    That of white errors is what they were before, whose size their noise foretells: it is as
+    certain as the scatter of the signals that drive, by the median of fourth differences.
     """
     experiment, first = record.setup.experiment, 0
     whitening = experiment.whitening
     carried = propagated_noise(record.setup, values) if whitening is None else []
     for k, channel in enumerate(experiment.channels):
         if whitening is None:
-            own = _scatter(record, channel, values, carried[k] if carried else None)
-            yield 1.0 / channel.weight, own
+            scatter = _scatter(record, channel, values)
+            if carried:
+                scatter = [with_carried(each, carried[k]) for each in scatter]
+            yield 1.0 / channel.weight, scatter
         else:
             before = whitening.deviations[first : first + channel.size] / channel.weight
             std = float(np.sqrt(np.mean(before**2)))
-            yield std / whitening.scale, [white_scatter(std, channel.samples)]
+            uncertain = (OF_RMS + OF_FOURTH_DIFFERENCES) / channel.samples
+            yield std / whitening.scale, [Scatter(std, uncertain)]
         first += channel.size
 
 
-def _errors(record: FittedRecord) -> Array:
-    """Return the weighted errors of all channels of a record, white where the fit makes them so."""
-    experiment = record.setup.experiment
-    errors = [
-        channel.weight * _compared(record.comparison.overlays[channel.signal].error)
-        for channel in experiment.channels
-    ]
-    together = np.concatenate(errors)
-    return (
-        together if experiment.whitening is None else experiment.whitening.errors(together[None])[0]
-    )
+def _scatter(record: FittedRecord, channel: Channel, values: Values) -> list[Scatter]:
+    """Return the scatter of a channel's record as the fit scales it, as far as it is known.
 
-
-def _scatter(
-    record: FittedRecord, channel: Channel, values: Values, carried: Array | None
-) -> list[Scatter]:
-    """Return the scatter of a channel's record as the fit scales it, as far as it is known."""
+    That from sample to sample, and that before the first step, where it should be at rest.
+    """
     shape = noise_shape(channel)
     samples = max(1, channel.samples // shape.apart)
     measured = record.setup.experiment.measured(channel, values)
     own = scatter_of(replace(channel, measured=measured)) * shape.gain
-    at_rest = rest_scatter(_at_rest(record, channel.signal), samples)
-    scatter = [sample_scatter(own, samples), *([] if at_rest is None else [at_rest])]
-    return scatter if carried is None else [with_carried(each, carried) for each in scatter]
+    overlay = record.comparison.overlays[channel.signal]
+    until = -np.inf if record.steady_until is None else record.steady_until
+    resting = (record.comparison.time < until) & np.isfinite(overlay.error)
+    at_rest = rest_scatter(overlay.measured[resting], samples)
+    return [sample_scatter(own, samples), *([] if at_rest is None else [at_rest])]
 
 
 def _tests_of(
@@ -237,48 +229,25 @@ def _tests_of(
 
     ``errors`` (M,) are as the loss counts them. What deviates for long is none that a loss bears.
     """
-    comparison, name = record.comparison, record.comparison.name
-    overlay, largest = comparison.overlays[channel.signal], max(each.std for each in scatter)
+    name, signal = record.comparison.name, channel.signal
+    overlay, largest = record.comparison.overlays[signal], max(each.std for each in scatter)
     if not rmse > LEAST_NOISE:
-        return ResidualTests(
-            name, channel.signal, None, None, 1.0, largest, rmse / largest, 0.0, 0.0
-        )
-    apart = noise_shape(channel).apart
-    steps = np.searchsorted(comparison.time[np.isfinite(overlay.error)][::apart], instants)
-    deviation = largest_deviation(_compared(overlay.error), largest)
+        return ResidualTests(name, signal, None, None, 1.0, largest, rmse / largest, 0.0, 0.0)
+    apart, compared = noise_shape(channel).apart, np.isfinite(overlay.error)
+    steps = np.searchsorted(record.comparison.time[compared][::apart], instants)
+    deviation = largest_deviation(overlay.error[compared], largest)
+    # the range of the signal: as simulated, or as measured but for its noise
+    smooth = moving_median(overlay.measured[compared])
+    span = float(max(np.ptp(overlay.simulated[compared]), np.ptp(smooth)))
     return ResidualTests(
         record=name,
-        signal=channel.signal,
+        signal=signal,
         whiteness=whiteness(errors[::apart]),
         pattern=step_pattern(errors[::apart], steps.tolist()),
         excess=max(excess(rmse, each) for each in scatter),
         scatter=largest,
         times=rmse / largest,
         deviation=deviation,
-        share=deviation / max(_range(overlay), LEAST_NOISE),
+        share=deviation / max(span, LEAST_NOISE),
         carried=max(each.carried for each in scatter),
     )
-
-
-def _compared(errors: Array) -> Array:
-    return errors[np.isfinite(errors)]
-
-
-def _at_rest(record: FittedRecord, signal: str) -> Array:
-    """Samples before the first step, where the record should be at rest."""
-    overlay = record.comparison.overlays[signal]
-    until = -np.inf if record.steady_until is None else record.steady_until
-    return overlay.measured[(record.comparison.time < until) & np.isfinite(overlay.error)]
-
-
-def _step_instants(record: FittedRecord, values: Values) -> list[float]:
-    """Instants (s) of the steps of a test, as the record shows them."""
-    simulator = record.setup.experiment.with_inputs(values)
-    return [step.at + simulator.delay for step in simulator.inputs.steps]
-
-
-def _range(overlay: Overlay) -> float:
-    """Range of a signal (pu): as simulated, or as measured but for its noise."""
-    compared = np.isfinite(overlay.error)
-    smooth = moving_median(overlay.measured[compared])
-    return float(max(np.ptp(overlay.simulated[compared]), np.ptp(smooth)))

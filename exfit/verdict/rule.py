@@ -54,7 +54,9 @@ def verdict_of(evidence: Evidence) -> Verdict:
     except KeyboardInterrupt:
         words, reason = MATCHES, UNTESTED
         evidence.pace.stopped((VALUES,), interrupted=True)
-    contradicted += _shown(averages, matched, reason)
+    # averages that the record shows, unless a trial is to name them
+    if averages is not None and averages.shown and (matched or averages.reason in reason):
+        contradicted.append(averages)
     contradicted.sort(key=lambda each: -each.likelihood)
     if contradicted and good_but_for_averages:
         words, reason = MATCHES, contradicted[0].reason
@@ -62,15 +64,6 @@ def verdict_of(evidence: Evidence) -> Verdict:
     if words == MATCHES:
         causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
-
-
-def _shown(
-    averages: RecorderAverages | None, matched: bool, reason: str
-) -> tuple[RecorderAverages, ...]:
-    """Averages that the record shows, unless a trial is to name them."""
-    if averages is None or not averages.shown:
-        return ()
-    return (averages,) if matched or averages.reason in reason else ()
 
 
 def verdict_alone(evidence: Evidence) -> Verdict:
@@ -140,7 +133,6 @@ def _label(record: str, signal: str, evidence: Evidence) -> str:
 
 def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
     """Name the reasons for which a fit that matches is not good."""
-
     undetermined = evidence.undetermined
     if undetermined:
         verb = "is" if len(undetermined) == 1 else "are"

@@ -13,7 +13,7 @@ from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import parameters_of
-from exfit.fitting.uncertainty import slopes_of
+from exfit.fitting.uncertainty import slices, slopes_of
 from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.inference.wording import digits, listed
 from exfit.plants import REFERENCES, VT0
@@ -25,7 +25,6 @@ from exfit.verdict.causes.steps import correct_instant, correct_step
 from exfit.verdict.causes.trials import (
     LinearFit,
     Opened,
-    blocks,
     freed_within,
     linear_model,
     moving,
@@ -172,7 +171,10 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
     column = {free.name: each for free, each in zip(added, others.T, strict=True)}
     directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
-    for names in _together([*fixed]):
+    # those of a saturation as one: they come from the same curve
+    saturation = tuple(name for name in SATURATION if name in fixed)
+    alone = [(name,) for name in fixed if name not in saturation]
+    for names in [saturation, *alone] if saturation else alone:
         direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
         directions.append((_held_value(evidence, names), direction))
     directions = [each for each in directions if np.isfinite(each[1]).all()]
@@ -199,14 +201,6 @@ def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, flo
     }
     freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
     return with_freed(extended, freed), of_test, fixed
-
-
-def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Yield names, those of a saturation as one: they come from the same curve."""
-    saturation = tuple(name for name in SATURATION if name in names)
-    if saturation:
-        yield saturation
-    yield from ((name,) for name in names if name not in saturation)
 
 
 def _held_value(evidence: Evidence, names: Sequence[str]) -> Held:
@@ -258,16 +252,15 @@ def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Arra
     """
     if evidence.weighted_by_noise:
         return
-    for number, places in enumerate(blocks(evidence)):
-        experiment = evidence.residuals.experiments[number]
-        for channel, rows in zip(experiment.channels, places, strict=True):
-            place = f"{channel.signal}{evidence.name_of(number)}"
-            measured = experiment.measured(channel, evidence.values)
-            simulated, constant = np.zeros(len(errors)), np.zeros(len(errors))
-            simulated[rows] = -errors[rows] - channel.weight * channel.filtered(measured)
-            constant[rows] = -channel.weight
-            if not is_found(experiment, channel, "scale"):
-                rare = RARE if channel.signal == "vt" else 0.0
-                yield Held(f"the base of {place}", CHECK_BASE, rare=rare), simulated
-            if channel.signal != "vt" and not is_found(experiment, channel, "offset"):
-                yield Held(f"the zero of {place}", check_zero(channel), unit="pu"), constant
+    places = iter(slices(evidence.residuals.sizes))
+    for number, _, experiment, channel in evidence.channels:
+        rows, place = next(places), f"{channel.signal}{evidence.name_of(number)}"
+        measured = experiment.measured(channel, evidence.values)
+        simulated, constant = np.zeros(len(errors)), np.zeros(len(errors))
+        simulated[rows] = -errors[rows] - channel.weight * channel.filtered(measured)
+        constant[rows] = -channel.weight
+        if not is_found(experiment, channel, "scale"):
+            rare = RARE if channel.signal == "vt" else 0.0
+            yield Held(f"the base of {place}", CHECK_BASE, rare=rare), simulated
+        if channel.signal != "vt" and not is_found(experiment, channel, "offset"):
+            yield Held(f"the zero of {place}", check_zero(channel), unit="pu"), constant

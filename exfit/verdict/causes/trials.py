@@ -15,7 +15,6 @@ from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
 from exfit.util.text import yaml_number
 from exfit.verdict.causes.evidence import Evidence, Suspicion, suspected
@@ -179,12 +178,6 @@ def linear_model(errors: Array, slopes: Array) -> LinearFit:
     basis, triangle = np.linalg.qr(slopes)
     sizes = np.abs(np.diag(triangle))
     return LinearFit(errors, basis[:, sizes > DEPENDENT * np.max(sizes, initial=0.0)])
-
-
-def blocks(evidence: Evidence) -> list[list[slice]]:
-    """Places of the errors of each channel of each record among all of them."""
-    places = iter(slices(evidence.residuals.sizes))
-    return [[next(places) for _ in each.channels] for each in evidence.residuals.experiments]
 
 
 def within(start: float, factor: float, limits: tuple[float, float] = (-inf, inf)) -> str:
