@@ -32,6 +32,7 @@ from exfit.results.intervals.value_errors import (
 )
 from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FitResult, FittedParameter, Iteration
+from exfit.util.criteria import Criteria
 from exfit.util.versions import versions
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.causes.evidence import time_for_causes
@@ -39,11 +40,9 @@ from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tol
 from exfit.verdict.rule import verdict_of
 from exfit.verdict.run_quality import speed_notes, switching_notes
 from exfit.workflows.case_description import (
-    criteria_of,
     fixed_values,
     identified_values,
-    input_hashes,
-    input_names,
+    inputs_of,
     other_program_of,
     parts_of,
     tests_of,
@@ -97,7 +96,7 @@ def fit_result(
         unseen = program.simulated(unseen)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
-    hashes, case_text = input_hashes(case, used), text_of(case)
+    (hashes, names), case_text = inputs_of(case, used), text_of(case)
 
     def announce(state: SearchState, line: estimate.SolverIteration) -> None:
         residuals = state.problem.residuals
@@ -212,10 +211,10 @@ def fit_result(
         parts=tuple(parts_of(case)),
         tests=tuple(tests_of(case, used, identified)),
         behaviour=analysis.behaviour,
-        files=input_names(case, used),
+        files=names,
         case_text=case_text,
         as_found=analysis.as_found,
-        criteria=criteria_of(case),
+        criteria=Criteria(**dict(case.report.criteria)),
         other_program=other_program_of(case, program, simulated),
     )
 

@@ -23,8 +23,9 @@ from exfit.fitting.validation_steps import GivenSteps, SetupOfRecord, with_steps
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
-from exfit.results.description import OtherProgram, RecordedTest
+from exfit.results.description import OtherProgram
 from exfit.results.validation_result import ValidationResult
+from exfit.util.criteria import Criteria
 from exfit.util.file_names import folded
 from exfit.util.sources import NOT_STATED
 from exfit.verdict.causes.before_fit import causes_before_fit
@@ -36,10 +37,8 @@ from exfit.verdict.run_quality import (
     voltage_notes,
 )
 from exfit.workflows.case_description import (
-    criteria_of,
     identified_values,
-    input_hashes,
-    input_names,
+    inputs_of,
     other_program_of,
     parts_of,
     tests_of,
@@ -57,7 +56,8 @@ from exfit.workflows.responses import (
 
 Values = Mapping[str, float]
 
-EARLY_OR_LATE = {"min": "late", "max": "early"}  # a response, by the bound that its step is on
+# a step, and the response with it where it is, by the bound that it is on
+EARLIER_OR_LATER = {"min": ("earlier", "late"), "max": ("later", "early")}
 LONE_RECORD = "record"  # its name, as in the case
 NOTHING_TO_VALIDATE_ON = (
     "missing: there is no record to validate on but the fitted ones; name one there, or give it by "
@@ -111,7 +111,8 @@ def validate(
     steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
     or where there is nothing to validate on.
     """
-    given = GivenSteps(_numbers(step), _numbers(at))
+    sizes, instants = (tuple(n) if isinstance(n, Sequence) else (n,) for n in (step, at))
+    given = GivenSteps(sizes, instants)
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
     saw: tuple[Recording, ...] = ()
@@ -141,10 +142,6 @@ def validate(
     return Validation(case, own, tuple(tests), described)
 
 
-def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
-    return tuple(given) if isinstance(given, Sequence) else (given,)
-
-
 def _fitted(
     case: Case, recording: Recording, values: Values, program: Program | None
 ) -> ComparedTest:
@@ -166,29 +163,22 @@ def _validated(
     setup: ExperimentSetup,
     values: Values,
 ) -> ComparedTest:
+    """Compare values with a record that no fit saw, judged by the ``fitted`` ones."""
     setup, values = aligned(case, setup, values)
     if setup.name == SINGLE:  # fit is no name for what was not fitted
         setup = replace(setup, experiment=replace(setup.experiment, name=LONE_RECORD))
     comparison = validation_of(case, fitted, setup, values)
+    simulator, at = setup.experiment.with_inputs(values), setup.experiment.parameters(values)
+    simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
     notes = (
         *comparison.notes,
         *(cause.sentence for cause in causes_before_fit(case, recording)),
-        *_run_notes(case, setup, comparison, values),
+        *switching_notes(setup),
+        *unstable_rest_notes(simulator, at),
+        *step_error_notes(case, simulator, at, simulated),
+        *voltage_notes(case, comparison.time, simulated.get("vt")),
     )
     return ComparedTest(recording, setup, values, replace(comparison, notes=notes))
-
-
-def _run_notes(
-    case: Case, setup: ExperimentSetup, comparison: Comparison, values: Values
-) -> Iterator[str]:
-    """Yield doubts about the simulated response of a record."""
-    simulator = setup.experiment.with_inputs(values)
-    at = setup.experiment.parameters(values)
-    simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
-    yield from switching_notes(setup)
-    yield from unstable_rest_notes(simulator, at)
-    yield from step_error_notes(case, simulator, at, simulated)
-    yield from voltage_notes(case, comparison.time, simulated.get("vt"))
 
 
 def _validated_by_hand(
@@ -202,59 +192,43 @@ def _validated_by_hand(
     """Compare values with a record that the case does not name, judged by ``fitted`` ones.
 
     The case has that record where it was given as samples. Its columns are those of the first
-    record under validate, or else of the first fitted one.
+    record under validate, or else of the first fitted one; windows and masks are those of its own.
     Raises ExfitError where the record or the steps given cannot be used.
     """
     recordings = (*case.validations, *case.recordings)
     if not recordings:
         text = "record: missing; its columns are needed to read a record"
         raise CaseError([f"{case.path}: {text}"])
-    recording = _in_place_of(recordings[0], record, {match.name for match in fitted})
-    if isinstance(record, Record):
-        case = replace(case, given_records={**case.given_records, recording.name: record})
-    test = with_steps_of_record(case, recording, values, given)
-    setup = by_program(program, test.setup, values)
-    setup, own_values = aligned(case, setup, values)
-    comparison = validation_of(case, fitted, setup, own_values)
-    best = fitted_to_record(case, setup, own_values) if instants_of(setup) else own_values
-    comparison = replace(
-        comparison,
-        steps=tuple(_steps(setup, comparison, own_values, best, given)),
-        notes=(
-            *comparison.notes,
-            *_notes(test, setup, comparison, fitted, best),
-            *(cause.sentence for cause in causes_before_fit(case, recording)),
-            *_run_notes(case, setup, comparison, own_values),
-        ),
-    )
-    return case, ComparedTest(recording, setup, own_values, comparison)
-
-
-def _in_place_of(recording: Recording, record: Record | Path | str, taken: set[str]) -> Recording:
-    """Return a recording with another record, whole: windows and masks are those of its own."""
     file = record.source if isinstance(record, Record) else Path(record)
     update = {"file": str(file.absolute()), "window": None, "mask": ()}
-    name = file.name if folded(file.stem) in map(folded, taken) else file.stem
-    section = recording.record.model_copy(update=update)
-    return recording.model_copy(update={"name": name, "record": section})
+    section = recordings[0].record.model_copy(update=update)
+    taken = {folded(match.name) for match in fitted}
+    name = file.name if folded(file.stem) in taken else file.stem
+    recording = recordings[0].model_copy(update={"name": name, "record": section})
+    if isinstance(record, Record):
+        case = replace(case, given_records={**case.given_records, name: record})
+    test = with_steps_of_record(case, recording, values, given)
+    compared = _validated(case, fitted, recording, by_program(program, test.setup, values), values)
+    setup, own, comparison = compared.setup, compared.values, compared.comparison
+    # the values whose instants are fitted within what the record allows
+    best = fitted_to_record(case, setup, own) if instants_of(setup) else own
+    comparison = replace(
+        comparison,
+        steps=tuple(_steps(setup, comparison, own, best, given)),
+        notes=(*_notes(test, setup, comparison, fitted, best), *comparison.notes),
+    )
+    return case, compared._replace(comparison=comparison)
 
 
 def _steps(
     setup: ExperimentSetup, comparison: Comparison, values: Values, best: Values, given: GivenSteps
 ) -> Iterator[ValidatedStep]:
-    """Yield the steps that the record holds, as they were found at last or given.
-
-    ``best`` are the values whose instants are fitted within what the record allows.
-    """
+    """Yield the steps that the record holds, as they were found at last or given."""
     simulator, moved = (setup.experiment.with_inputs(each) for each in (values, best))
     least = None
     if instants_of(setup):
         least = compare_with_record(setup, setup.name, best).rmse
-    found = tuple(
-        name
-        for name, numbers in (("instant", given.instants), ("size", given.sizes))
-        if not numbers
-    )
+    found = (*(() if given.instants else ("instant",)), *(() if given.sizes else ("size",)))
     for step, other in zip(simulator.inputs.steps, moved.inputs.steps, strict=True):
         at = step.at + simulator.delay
         if at >= setup.record.time[0]:
@@ -281,7 +255,15 @@ def _notes(
                 f"{comparison.record} is a file that was fitted ({match.name}): what the fit saw "
                 "does not validate it"
             )
-    yield from _spike_notes(test.setup)
+    for channel in test.setup.channels:  # spikes count as errors of the model
+        kept = channel.kept & np.isfinite(channel.measured)
+        samples = channel.measured[kept]
+        count = len(spikes(record.time[kept], samples, noise_of(samples), SPIKE_LIMIT))
+        if count:
+            yield (
+                f"{channel.signal} of {record.source.name} has {count} samples that look like "
+                f"spikes: `outliers: {SPIKE_LIMIT:g}` on the channel leaves them out"
+            )
     yield from test.notes
     if not test.notes and steady is not None:
         causes = unsteady_signals(record, steady, test.setup.channels)
@@ -289,23 +271,10 @@ def _notes(
     for parameter in setup.free:
         side = parameter.bound(best[parameter.name])
         if side is not None and parameter.name.endswith(".at"):
-            way = {"min": "earlier", "max": "later"}[side]
+            way, late = EARLIER_OR_LATER[side]
             yield (
                 f"a step {way} than the record shows it would match better than the one at "
-                f"{parameter.start:.4g} s: the response is too {EARLY_OR_LATE[side]}"
-            )
-
-
-def _spike_notes(setup: ExperimentSetup) -> Iterator[str]:
-    """Yield the compared channels with spikes, which count as errors of the model."""
-    for channel in setup.channels:
-        kept = channel.kept & np.isfinite(channel.measured)
-        samples = channel.measured[kept]
-        count = len(spikes(setup.record.time[kept], samples, noise_of(samples), SPIKE_LIMIT))
-        if count:
-            yield (
-                f"{channel.signal} of {setup.record.source.name} has {count} samples that look "
-                f"like spikes: `outliers: {SPIKE_LIMIT:g}` on the channel leaves them out"
+                f"{parameter.start:.4g} s: the response is too {late}"
             )
 
 
@@ -324,47 +293,39 @@ def validation_result(
     ``sources`` says where those values come from that were given beside the case.
     """
     case, values, tests, other_program = validation
-    setups = [test.setup for test in tests]
     own = [(test.setup, test.values) for test in tests]
+    setups, of_case, matches = [setup for setup, _ in own], case.values(), validation.comparisons
+    hashes, names = inputs_of(case, setups)
+    free = case.free() if validation.fitted else ()
+    # of values that differ from the case, the one who gave them
+    changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
+    others = [name for name in changed if name not in case.ties.by_name]
+    given = {name: word for name, word in sources.items() if name in of_case}
+    described = []
+    identified = identified_values({}, matches)
+    for match, test in zip(matches, tests_of(case, setups, identified), strict=True):
+        # of a record by hand the steps that it shows
+        done = "; ".join(step.text for step in match.steps) or test.done
+        role = "validation" if match.validation else "fitted"
+        described.append(replace(test, name=match.name, role=role, done=done))
     return ValidationResult(
         case=case.path,
         about=case.about,
         model=case.subject,
         saturation=case.saturation,
         origin=GIVEN if validation.fitted else AS_FOUND if case.free() else OF_CASE,
-        values={name: values[name] for name in case.values()},
-        sources=_sources(validation, sources),
+        values={name: values[name] for name in of_case},
+        sources={**case.sources(fitted=free), **dict.fromkeys(others, NOT_STATED), **given},
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
-        matches=tuple(validation.comparisons),
+        matches=tuple(matches),
         versions=versions,
-        inputs=input_hashes(case, setups),
+        inputs=hashes,
         parts=tuple(parts_of(case)),
-        tests=tuple(_tests(validation)),
+        tests=tuple(described),
         behaviour=None if case.has_no_equations else behaviour_of(own),
-        files=input_names(case, setups),
+        files=names,
         case_text=text_of(case),
         as_found=None if case.as_found is None else as_found_of(case, own, program),
-        criteria=criteria_of(case),
+        criteria=Criteria(**dict(case.report.criteria)),
         other_program=other_program,
     )
-
-
-def _sources(validation: Validation, sources: Mapping[str, str]) -> dict[str, str]:
-    """Name the source of every value: of those that differ from the case, the one who gave it."""
-    case, values = validation.case, validation.values
-    of_case, free = case.values(), case.free() if validation.fitted else ()
-    changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
-    given = {name: word for name, word in sources.items() if name in of_case}
-    others = [name for name in changed if name not in case.ties.by_name]
-    return {**case.sources(fitted=free), **dict.fromkeys(others, NOT_STATED), **given}
-
-
-def _tests(validation: Validation) -> Iterator[RecordedTest]:
-    """Yield the tests with their records; of a record by hand the steps that it shows."""
-    matches = validation.comparisons
-    setups = [test.setup for test in validation.tests]
-    described = tests_of(validation.case, setups, identified_values({}, matches))
-    for match, test in zip(matches, described, strict=True):
-        done = "; ".join(step.text for step in match.steps) or test.done
-        role = "validation" if match.validation else "fitted"
-        yield replace(test, name=match.name, role=role, done=done)
