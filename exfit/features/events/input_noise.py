@@ -231,18 +231,41 @@ def weighted_search(
     """Weigh a problem by the noise of what drives its tests, and search on from where that leads.
 
     ``found`` is the search of the problem without it, ``setups`` its tests as fitted; ``proceed``
-    searches on, by the weighted problem, from a point (N,). Where errors cannot be weighted the
-    problem and the search remain, with a note that says why; so they do at an interruption.
-    Raises SimulationError where there is no response.
+    searches on, by the weighted problem, from a point (N,). The noise moves the minimum no longer:
+    where it moved it by much, weights and bias are found anew from the better point. Minima far
+    above the best one stay as they are. Where errors cannot be weighted the problem and the search
+    remain, with a note that says why; so they do at an interruption. Raises SimulationError where
+    there is no response.
     """
-    reason = why_not_weighted(problem.residuals, setups)
+    own, theta = problem.residuals, found.best.x
+    reason = why_not_weighted(own, setups)
     if reason is not None:
         return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHTED} {reason}"))
+    bias, cost = np.zeros_like(theta), float(own.costs([theta])[0])
     try:
-        weighted, theta, notes = weighted_by_noise(problem, setups, found.best.x, watch)
-        found = with_minima_of(weighted, found)
+        for further in range(MOST_PASSES):
+            watch(Progress("weighing", further, MOST_PASSES, cost))
+            at, before = theta, bias
+            white = whitened(own, setups, at)
+            if not further:
+                theta = descent_near(white, at).x
+            unbiased, bias = without_bias(white, theta)
+            theta = descent_near(unbiased, theta).x
+            if np.max(np.abs(theta - at)) < FAR and np.max(np.abs(bias - before)) < SMALL_BIAS:
+                break
+        watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))
+        notes = [*noise_notes(unbiased, theta, bias)]
+        if found.minima is not None:
+            minima = []
+            for minimum in found.minima.minima:
+                if minimum.cost <= REFUTED * found.best.cost:
+                    end = descent_near(unbiased, minimum.x)
+                    minimum = LocalMinimum(end.x, end.cost, minimum.starts, end)
+                minima.append(minimum)
+            found = found._replace(minima=replace(found.minima, minima=tuple(minima)))
     except KeyboardInterrupt:
         return problem, found._replace(best=stopped(found.best, Stop.INTERRUPTED))
+    weighted = FitProblem(unbiased, unbiased)
     found = proceed(weighted, found, theta)
     return weighted, found._replace(notes=(*found.notes, *notes))
 
@@ -262,34 +285,6 @@ def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) ->
         if sum(setup.experiment.sizes) > MOST_ERRORS:
             return f"in a record with more than {MOST_ERRORS} samples of all signals compared"
     return None
-
-
-def weighted_by_noise(
-    problem: FitProblem,
-    setups: Sequence[ExperimentSetup],
-    theta: Array,
-    watch: Callable[[Progress], object] = lambda _: None,
-) -> tuple[FitProblem, Array, tuple[str, ...]]:
-    """Return the problem weighted by the noise of what drives it, its minimum (N,), and notes.
-
-    ``theta`` (N,) is the minimum without weights. The noise moves the minimum no longer: where it
-    moved it by much, weights and bias are found anew from the better point. ``watch`` gets how far
-    that is. Raises SimulationError where there is no response, KeyboardInterrupt at an
-    interruption.
-    """
-    bias, cost = np.zeros_like(theta), float(problem.residuals.costs([theta])[0])
-    for further in range(MOST_PASSES):
-        watch(Progress("weighing", further, MOST_PASSES, cost))
-        at, before = theta, bias
-        white = whitened(problem.residuals, setups, at)
-        if not further:
-            theta = descent_near(white, at).x
-        unbiased, bias = without_bias(white, theta)
-        theta = descent_near(unbiased, theta).x
-        if np.max(np.abs(theta - at)) < FAR and np.max(np.abs(bias - before)) < SMALL_BIAS:
-            break
-    watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))
-    return FitProblem(unbiased, unbiased), theta, tuple(noise_notes(unbiased, theta, bias))
 
 
 def whitened(residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Array) -> Residuals:
@@ -312,9 +307,28 @@ def whitened(residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Arr
 def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     """Return white residuals whose minimum near theta (N,) the driving noise does not move.
 
-    With the bias (N,) that is gone, in standard errors of each parameter.
+    With the bias (N,) that is gone, in standard errors of each parameter. As much noise again, of
+    either sign, shows how it moves the gradient: only what is of second order is left on average.
     """
-    gradient, jacobian = added_gradient(residuals, theta), residuals.errors(theta)[1]
+    generator = np.random.default_rng(SEED)
+    values, moves = residuals.values(theta), residuals.moves(theta)
+    gradient, jacobians = np.zeros(len(theta)), []
+    for experiment in residuals.experiments:
+        simulator = experiment.with_inputs(values)
+        errors, own = experiment.tangents(values, moves)
+        jacobians.append(own)
+        recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
+        for _ in range(PAIRS):
+            drawn = {
+                signal: deviation * generator.standard_normal(len(recorded[signal].samples))
+                for signal, deviation in deviations.items()
+            }
+            for sign in (1.0, -1.0):
+                more = {signal: sign * added for signal, added in drawn.items()}
+                noisy = replace(experiment, simulator=with_added(simulator, more))
+                noisy_errors, slopes = noisy.tangents(values, moves)
+                gradient += (slopes.T @ noisy_errors - own.T @ errors) / (2 * PAIRS)
+    jacobian = np.concatenate(jacobians)
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     seen = singular > UNSEEN * np.max(singular, initial=0.0)
     roots = directions[seen].T / singular[seen]
@@ -330,49 +344,6 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     some = deviations > 0.0
     relative = np.where(some, bias, 0.0) / np.where(some, deviations, 1.0)
     return replace(residuals, experiments=experiments), relative
-
-
-def added_gradient(residuals: Residuals, theta: Array) -> Array:
-    """Gradient (N,) that as much noise of the driving signals again adds, on average.
-
-    Half of that of either sign: only what is of second order is left.
-    """
-    generator = np.random.default_rng(SEED)
-    values, moves = residuals.values(theta), residuals.moves(theta)
-    added = np.zeros(len(theta))
-    for experiment in residuals.experiments:
-        simulator = experiment.with_inputs(values)
-        errors, jacobian = experiment.tangents(values, moves)
-        recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
-        for _ in range(PAIRS):
-            drawn = {
-                signal: deviation * generator.standard_normal(len(recorded[signal].samples))
-                for signal, deviation in deviations.items()
-            }
-            for sign in (1.0, -1.0):
-                more = {signal: sign * own for signal, own in drawn.items()}
-                noisy = replace(experiment, simulator=with_added(simulator, more))
-                noisy_errors, slopes = noisy.tangents(values, moves)
-                added += (slopes.T @ noisy_errors - jacobian.T @ errors) / (2 * PAIRS)
-    return added
-
-
-def with_minima_of(problem: FitProblem, found: SearchResult) -> SearchResult:
-    """Return a search whose minima are those of another problem.
-
-    Minima far above the best one stay as they are. Raises KeyboardInterrupt at an interruption.
-    """
-    if found.minima is None:
-        return found
-
-    def weighted(minimum: LocalMinimum) -> LocalMinimum:
-        if minimum.cost > REFUTED * found.best.cost:
-            return minimum
-        end = descent_near(problem.residuals, minimum.x)
-        return LocalMinimum(end.x, end.cost, minimum.starts, end)
-
-    minima = map(weighted, found.minima.minima)
-    return found._replace(minima=replace(found.minima, minima=tuple(minima)))
 
 
 def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str]:
