@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from faulty_events import KINDS, NOISE, drawn
 from grid_events import TRUTH
-from tiers import few_of
+from tiers import examples_of, few_of
 
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
@@ -12,7 +12,7 @@ from exfit.workflows import fit
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", examples_of(KINDS, 4))
 def test_what_the_unit_has_otherwise_is_the_first_cause(kind, tmp_path):
     verdict = fit(load_case(drawn(kind, 2, tmp_path).faulty), search="local").verdict
     assert verdict.verdict in ("misses the record", "no match")
@@ -20,7 +20,7 @@ def test_what_the_unit_has_otherwise_is_the_first_cause(kind, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", examples_of(KINDS, 4))
 def test_a_unit_as_its_case_has_it_is_not_accused(kind, tmp_path):
     verdict = fit(load_case(drawn(kind, 2, tmp_path).sound), search="local").verdict
     assert verdict.verdict in ("good", "matches, not all determined")

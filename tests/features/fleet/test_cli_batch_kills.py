@@ -46,8 +46,9 @@ def test_a_batch_that_is_killed_goes_on_to_the_same_table(batch, fleet, with_wor
     assert resumed.whole, resumed
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("with_workers", [False, True])
+@pytest.mark.parametrize(
+    ("with_workers", "number"), [(False, signal.SIGINT), (True, signal.SIGTERM)]
+)
 def test_an_interruption_stops_at_once_and_writes_the_table(batch, fleet, with_workers, number):
     cases, expected, _ = batch
     process = start(cases, fleet)

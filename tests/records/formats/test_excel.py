@@ -236,7 +236,7 @@ def test_the_missing_package_is_named_with_its_extra(book, monkeypatch):
 @pytest.mark.parametrize("inside", [False, True], ids=["file", "sheet"])
 @given(damage())
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_whatever_is_damaged_only_record_errors_come_out(book, inside, apply):
     path = book(Data=[("Date", "Time", "Ut"), *((at.date(), at.time(), 1.0) for at in instants())])

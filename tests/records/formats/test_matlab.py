@@ -203,7 +203,7 @@ def test_no_file_of_matlab_that_scipy_reads_is_held_for_damaged():
 )
 @given(damage())
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_whatever_is_damaged_only_record_errors_come_out(tmp_path, options, apply):
     path = tmp_path / "bump.mat"

@@ -203,7 +203,7 @@ def test_the_missing_package_is_named_with_its_extra(parquet, monkeypatch):
 @pytest.mark.parametrize("compression", few_of(["none", "snappy"], 1))
 @given(damage())
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_whatever_is_damaged_only_record_errors_come_out(parquet, compression, apply):
     columns = {"t": T, "ts": INSTANTS, "x": [1, None, 3], "s": ["a", "b", "c"]}
