@@ -106,14 +106,11 @@ def _rests(samples: Array, noise: float) -> Iterator[tuple[int, int]]:
     places = np.pad(moved, (WINDOW - 1, WINDOW), mode="edge")
     bounds = np.flatnonzero(np.diff(places, prepend=True, append=True))
     for start, stop in zip(bounds[::2], bounds[1::2], strict=True):
-        if stop - start >= FEWEST_RESTING and _is_level(samples[start:stop], noise):
-            yield int(start), int(stop)
-
-
-def _is_level(samples: Array, noise: float) -> bool:
-    way = np.arange(len(samples)) - 0.5 * (len(samples) - 1)
-    slope = way @ samples / (way @ way)
-    return bool(abs(slope) <= DRIFT * noise / np.sqrt(way @ way))
+        if stop - start >= FEWEST_RESTING:
+            way = np.arange(stop - start) - 0.5 * (stop - start - 1)
+            slope = way @ samples[start:stop] / (way @ way)
+            if abs(slope) <= DRIFT * noise / np.sqrt(way @ way):  # it is level
+                yield int(start), int(stop)
 
 
 def largest_jump(samples: Array) -> int:

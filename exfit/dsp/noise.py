@@ -39,20 +39,15 @@ def noise(samples: Array, order: int = 2) -> float:
             f"{len(samples)} samples: the noise is estimated from at least {order + 1}"
         )
     scatter = spread(np.diff(samples, order)) / sqrt(comb(2 * order, order))
-    return max(float(scatter), UNIFORM_SPREAD * _quantum(samples))
+    lasting = median(sliding_window_view(samples, NEIGHBOURS), axis=-1)  # longer than a spike
+    steps = np.diff(distinct(lasting))
+    return max(float(scatter), UNIFORM_SPREAD * float(np.min(steps)) if len(steps) else 0.0)
 
 
 def spread(values: Array, axis: int = -1) -> Array:
     """Return the median absolute deviation along an axis, scaled to the normal law's spread."""
     away = np.abs(values - median(values, axis=axis, keepdims=True))
     return np.asarray(median(away, axis=axis) / MEDIAN_DEVIATION)
-
-
-def _quantum(samples: Array) -> float:
-    """Return the smallest step between two values that last longer than a spike, or 0."""
-    lasting = median(sliding_window_view(samples, NEIGHBOURS), axis=-1)
-    steps = np.diff(distinct(lasting))
-    return float(np.min(steps)) if len(steps) else 0.0
 
 
 def drift_at_rest(samples: Array) -> float:

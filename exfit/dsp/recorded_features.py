@@ -291,7 +291,9 @@ def _with_errors(own: Features, drawn: Mapping[str, Array], between_samples: flo
         half = NORMAL_95 * float(np.sqrt(np.mean((seen - value) ** 2))) if len(seen) else 0.0
         hidden = ""
         if name in TIMES:
-            if _of_two_kinds(seen, half):
+            low, high = (round(share * len(seen)) for share in MIDDLE)
+            middle = np.sort(seen)[low:high]  # with a wide gap it is of two kinds
+            if len(middle) > 1 and float(np.max(np.diff(middle))) > MOST_APART * half:
                 hidden = EITHER
             half = hypot(half, between_samples)
             if len(seen) < (1.0 - MOST_WITHOUT) * len(draws) or half > value:
@@ -301,10 +303,3 @@ def _with_errors(own: Features, drawn: Mapping[str, Array], between_samples: flo
         else:
             errors[name] = half
     return replace(own, **times, errors=errors, why=why)  # type: ignore[arg-type]
-
-
-def _of_two_kinds(draws: Array, half: float) -> bool:
-    """Check for a gap in the middle of draws that is wide beside the error they give."""
-    low, high = (round(share * len(draws)) for share in MIDDLE)
-    middle = np.sort(draws)[low:high]
-    return len(middle) > 1 and float(np.max(np.diff(middle))) > MOST_APART * half

@@ -58,7 +58,8 @@ def resampled(
             three sampling steps, or the rate is not between that of two samples and the record's.
     """
     own = _mean_rate(time, signals, rate)
-    if not _is_even(time, own):
+    away = time - np.linspace(time[0], time[-1], len(time))
+    if float(np.max(np.abs(away))) * own > OFF_CLOCK:
         ratio = ceil(OVERSAMPLING * own / rate)
         fine = _clock(
             time, ratio * rate, floor((time[-1] - time[0]) * ratio * rate + OFF_CLOCK) + 1
@@ -70,7 +71,8 @@ def resampled(
     share = Fraction(rate / own).limit_denominator(MOST_DENOMINATOR)
     exact = abs(float(share) * own - rate) <= RATE_TOLERANCE * rate
     if not exact:
-        share = _finer_share(SAMPLES_FOR_SPLINE * rate / own)
+        least = SAMPLES_FOR_SPLINE * rate / own  # a whole number, or one over it, not below
+        share = Fraction(1, floor(1.0 / least)) if least <= 1.0 else Fraction(ceil(least))
     fine = _clock(time, float(share) * own, floor((len(time) - 1) * share) + 1)
     filtered = {name: _filtered(signal, own, share, rate) for name, signal in signals.items()}
     if exact:
@@ -108,20 +110,9 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
     return own
 
 
-def _is_even(time: Array, rate: float) -> bool:
-    """Check whether instants lie on an even clock, up to the rounding of their stamps."""
-    away = time - np.linspace(time[0], time[-1], len(time))
-    return float(np.max(np.abs(away))) * rate <= OFF_CLOCK
-
-
 def _clock(time: Array, rate: float, count: int) -> Array:
     """Return an even clock (count,) from the first instant of a record on."""
     return np.asarray(time[0] + np.arange(count) / rate)
-
-
-def _finer_share(least: float) -> Fraction:
-    """Return a whole number, or one over a whole number, that is not below ``least``."""
-    return Fraction(1, floor(1.0 / least)) if least <= 1.0 else Fraction(ceil(least))
 
 
 def _spline(time: Array, signal: Array, at: Array) -> Array:

@@ -279,38 +279,26 @@ def _heading(above: Sequence[TextRow], first: TextRow, shape: _Shape) -> _Headin
     """Read the names of columns in the rows above the ``first`` row of numbers."""
     plain = [row for row in above if not row.comment]
     for rows in (plain, [row for row in above if row.comment]):
-        heading = _named_above_types(rows, shape) or _named(rows, shape)
+        fitted = [_fitted(row, shape) for row in rows]
+        # a JSIS file has rows of names, types of channels, units and descriptions
+        types = next((at for at, row in enumerate(rows) if are_channel_types(row.cells)), 0)
+        if 0 < types < len(rows) - 1 and any(fitted[types - 1]) and is_units(fitted[types + 1]):
+            return _Heading(fitted[types - 1], fitted[types + 1])
+        heading = _named(fitted, shape)
         if heading is not None:
             return heading
     return _Heading(fault=_fault_of_names(plain, first, shape))
 
 
-def _named(rows: Sequence[TextRow], shape: _Shape) -> _Heading | None:
+def _named(rows: Sequence[tuple[str, ...]], shape: _Shape) -> _Heading | None:
     """Return the names in the last row, or those above a row of units; None where it has none."""
-    last = _fitted(rows[-1], shape) if rows else ()
-    if not any(last) or any(is_value(last[at]) for at in shape.columns):
+    names = rows[-1] if rows else ()
+    if not any(names) or any(is_value(names[at]) for at in shape.columns):
         return None
-    names = last
-    units: tuple[str, ...] = ()
-    if len(rows) > 1 and is_units(last):
-        above = _fitted(rows[-2], shape)
-        if any(name and not is_value(name) for name in above):
-            names, units = above, last
-    if shape.ends_empty and not names[-1]:
-        names = names[:-1]
-    return _Heading(names, units)
-
-
-def _named_above_types(rows: Sequence[TextRow], shape: _Shape) -> _Heading | None:
-    """Return the names and units about a row of types of channels, None without one.
-
-    A JSIS file has rows of names, types, units and descriptions.
-    """
-    types = next((at for at, row in enumerate(rows) if are_channel_types(row.cells)), 0)
-    if not 0 < types < len(rows) - 1:
-        return None
-    names, units = (_fitted(rows[at], shape) for at in (types - 1, types + 1))
-    return _Heading(names, units) if any(names) and is_units(units) else None
+    above = rows[-2] if len(rows) > 1 and is_units(names) else ()
+    if any(name and not is_value(name) for name in above):
+        return _Heading(above[:-1] if shape.ends_empty and not above[-1] else above, names)
+    return _Heading(names[:-1] if shape.ends_empty and not names[-1] else names)
 
 
 def _fault_of_names(plain: Sequence[TextRow], first: TextRow, shape: _Shape) -> str | None:

@@ -173,16 +173,13 @@ def _kind(cell: Any) -> str:
     return "time of day" if isinstance(cell, time | timedelta) else "number"
 
 
-def _of_day(cell: time | timedelta) -> timedelta:
-    """Return the time since midnight."""
-    if isinstance(cell, timedelta):
-        return cell
-    return datetime.combine(date.min, cell) - datetime.min
+def _since_midnight(cell: time | timedelta) -> timedelta:
+    return cell if isinstance(cell, timedelta) else datetime.combine(date.min, cell) - datetime.min
 
 
 # kind of the cells -> what converts one, what replaces a missing one, and the type of the array
 ARRAYS: dict[str, tuple[Callable[[Any], Any], Any, str]] = {
     "number": (float, np.nan, "float64"),
     "timestamp": (lambda stamp: stamp, None, "datetime64[ns]"),
-    "time of day": (_of_day, None, "timedelta64[ns]"),
+    "time of day": (_since_midnight, None, "timedelta64[ns]"),
 }
