@@ -6,9 +6,8 @@ from math import isnan, nan
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array, Places
 
 TAIL = 0.05  # share of the response after the step whose mean is its final value
 BAND = 0.02  # of the step: within it the response has settled
@@ -137,9 +136,9 @@ def _settled(t: Array, way: Array) -> Array:
 def _between(
     t: Array,
     way: Array,
-    row: NDArray[np.intp],
-    before: NDArray[np.intp],
-    after: NDArray[np.intp],
+    row: Places,
+    before: Places,
+    after: Places,
     level: Array,
 ) -> Array:
     """Times at which the lines through two samples of each response pass a level."""
@@ -150,7 +149,7 @@ def _between(
     return np.asarray(t[before] + share * (t[after] - t[before]))
 
 
-def _vertices(t: Array, way: Array, peak: NDArray[np.intp]) -> tuple[Array, Array]:
+def _vertices(t: Array, way: Array, peak: Places) -> tuple[Array, Array]:
     """Return time and height of the parabola through the highest sample and its neighbours."""
     row, count = np.arange(len(way)), len(t)
     inner = (peak > 0) & (peak < count - 1)

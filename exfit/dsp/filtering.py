@@ -6,15 +6,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import even_step
+from exfit.util.arrays import Array, Mask, Places
 from exfit.util.sorting import median
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Places = NDArray[np.intp]
 
 LOWEST_CUTOFF = 1e-6  # of the sampling rate: the coefficients for a lower one are rounded away
 BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice

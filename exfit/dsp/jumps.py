@@ -4,12 +4,11 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.noise import SECOND_DIFFERENCE, spread
+from exfit.util.arrays import Array, Places
 from exfit.util.sorting import distinct, median
 
-Array = NDArray[np.float64]
 Jump = tuple[int, int]  # the samples before and after it
 
 FEWEST_SAMPLES = 10  # at rest, from which the level is taken and before which nothing jumps
@@ -37,7 +36,7 @@ def scatter(samples: Array) -> float:
     return float(spread(np.diff(samples, 2)) / SECOND_DIFFERENCE) if len(samples) > 2 else 0.0
 
 
-def jumps(time: Array, samples: Array) -> NDArray[np.intp]:
+def jumps(time: Array, samples: Array) -> Places:
     """Find the jumps of a reference (M,): the last sample before each of them.
 
     A jump is complete between two samples: just before and just after it the reference changes by
@@ -78,7 +77,7 @@ def rest_end(samples: Array) -> int:
     return end
 
 
-def settled(samples: Array, first: int, after: NDArray[np.intp]) -> Array:
+def settled(samples: Array, first: int, after: Places) -> Array:
     """Replace the noise of a reference (M,) by its mean wherever it rests.
 
     It rests before its ``first`` move, and wherever the means of ten samples before and after a

@@ -11,13 +11,11 @@ from math import inf, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.sampling import even_step
+from exfit.util.arrays import Array, Mask
 from exfit.util.sorting import median
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Range = tuple[float, float]
 
 FEWEST_PERIODS = 3  # in a record: with fewer a line is like the response, or a drift

@@ -4,14 +4,11 @@ from math import log
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.filtering import OUTLIER_WINDOW, outliers
 from exfit.dsp.noise import noise
+from exfit.util.arrays import Array, Mask, Places
 from exfit.util.sorting import distinct, median
-
-Array = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 EXCERPT, EXCERPT_PARTS = 200_000, 20  # samples that are enough to estimate noise; in parts
 JUMP_SHARE = 0.75  # of a spike's least size: it begins or ends with such a jump
@@ -152,7 +149,7 @@ def _excerpt(samples: Array) -> Array:
     return np.concatenate([samples[k : k + length] for k in starts])
 
 
-def _near(places: Places, count: int, far: int) -> NDArray[np.bool_]:
+def _near(places: Places, count: int, far: int) -> Mask:
     """Mask of ``count`` samples: those that lie no farther than ``far`` from any of the places."""
     edges = np.zeros(count + 1, np.int64)
     np.add.at(edges, np.maximum(places - far, 0), 1)

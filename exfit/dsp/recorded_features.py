@@ -15,14 +15,12 @@ from random import Random
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.features import TIMES, Features, RemovedLine, features, features_after, figures_of
 from exfit.dsp.lines import cosine_and_sine, largest_line
 from exfit.dsp.noise import noise
+from exfit.util.arrays import Array, Mask, Places
 from exfit.util.sorting import distinct, median
-
-Array = NDArray[np.float64]
 
 SEED = 421  # any: what matters is that a run can be repeated
 DRAWS = 200  # of the noise: enough for the deviation to 5 %
@@ -92,12 +90,12 @@ class RecordedResponse:
     found: FoundByRecord | None = None
 
     @cached_property
-    def after(self) -> NDArray[np.bool_]:
+    def after(self) -> Mask:
         """Which samples are those of the response."""
         return (self.time >= self.step_at) & (self.time <= self.until)
 
     @cached_property
-    def before(self) -> NDArray[np.bool_]:
+    def before(self) -> Mask:
         """Which samples show where it starts."""
         return self.time < self.step_at
 
@@ -158,7 +156,7 @@ def _whitened(normal: Array) -> Array:
 
 
 def _smoothing(
-    response: RecordedResponse, read: NDArray[np.intp]
+    response: RecordedResponse, read: Places
 ) -> tuple[_Smoothing, tuple[RemovedLine, ...]]:
     """Return the smoothing of a record, without the line that stands out of it, and that line.
 

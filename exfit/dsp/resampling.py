@@ -5,12 +5,10 @@ from fractions import Fraction
 from math import ceil, floor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.sampling import GAP_STEPS
+from exfit.util.arrays import Array
 from exfit.util.sorting import median
-
-Array = NDArray[np.float64]
 
 OFF_CLOCK = 0.01  # of a sampling step: an instant may lie so far off, as stamps are rounded
 PASSBAND = 0.8  # of half the new rate: up to here a signal stays as it is

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
+
 Scale = float | Array  # one for all errors, or each its own
 OfError = Callable[[Array, Scale], Array]
 

@@ -5,9 +5,8 @@ at one level, all samples have the same error again.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 COARSE = 1.8  # steps over the scatter: below, noise of 0.5 steps leaves 1 % of no sum of errors
 FINEST, COARSEST, CANDIDATES = 0.03, 1.0, 15  # noise before rounding, in steps

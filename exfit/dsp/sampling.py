@@ -4,12 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from exfit.util.arrays import Array, Mask, Places
 from exfit.util.sorting import distinct, median
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 GAP_STEPS = 3.0  # median steps: a longer one is a gap
 MOST_UNEVEN = 0.01  # of a sampling step: steps that differ by more are uneven
@@ -113,7 +110,7 @@ def envelope(x: Array, y: Array, bins: int = PIXELS) -> tuple[Array, Array]:
     return x[rows], y[rows]
 
 
-def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
+def kept_rows(signals: Sequence[Array], bins: int) -> Places:
     """Return the rows that hold the least and greatest of each signal (M,) in each of the bins.
 
     The first and last row are always among them, and all where they are not many more than these.

@@ -6,13 +6,11 @@ from math import inf, sqrt
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import present_samples
+from exfit.util.arrays import Array
 from exfit.util.sorting import median
-
-Array = NDArray[np.float64]
 
 SAMPLES_AT_REST = 10  # before a step: fewer do not determine the level it starts from
 MEDIAN_SAMPLES = 7  # of a running median: three may be spikes

@@ -7,12 +7,10 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.sampling import even_step
+from exfit.util.arrays import Array, Complex
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Connection = Literal["phase-to-ground", "phase-to-phase"]
 
 LINE_VOLTAGE: Mapping[Connection, float] = MappingProxyType(

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.lines import Ripple, ripple_at_rest
 from exfit.dsp.noise import UNIFORM_SPREAD, drift_at_rest
@@ -18,8 +17,7 @@ from exfit.records.channel_names import CONTROL_ERROR, Clarity, Guess, guess_sig
 from exfit.records.steps import ChannelSteps, RecordedStep
 from exfit.records.units import quantity_of
 from exfit.signals import OF_BUMP_TEST, POSITIVE_AT_REST, SIGNALS
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 PLACES_LISTED = 5  # of spikes and of other faults, the first ones
 NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still, as simulated ones

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.errors import RecordError
-from exfit.records.formats.table import Array, column_error
+from exfit.records.formats.table import column_error
 from exfit.records.units import SECONDS, alike, bare, usual
+from exfit.util.arrays import Array
 from exfit.util.sorting import median
 from exfit.util.text import LARGEST
 

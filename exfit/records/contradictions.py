@@ -4,15 +4,17 @@ So it is with the way that they move at a step, and with the base of field volta
 in per unit, by where the machine rests with it.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from exfit.signals import SIGNALS
 
 if TYPE_CHECKING:
     from exfit.records.channel_inspection import InspectedChannel
     from exfit.records.steps import RecordedStep
+
+Channels: TypeAlias = "Sequence[InspectedChannel]"
 
 LARGEST_STEP = 0.2  # pu: no regulator is tested with more
 FIELD = ("efd", "ifd")  # what rises for good where vt does
@@ -42,9 +44,7 @@ class ScaleRange:
 # ---- at a step
 
 
-def contradictions(
-    channels: Sequence["InspectedChannel"], steps: Sequence["RecordedStep"]
-) -> Iterator[str]:
+def contradictions(channels: Channels, steps: Sequence["RecordedStep"]) -> Iterator[str]:
     """Find the contradictions between the channels of a file, in sentences."""
     voltage = _of(channels, "vt")
     for step in steps:
@@ -74,7 +74,7 @@ def size_in_words(size: float) -> str:
 
 
 def sign_disputed_by(
-    channels: Iterable["InspectedChannel"],
+    channels: Channels,
     steps: Sequence["RecordedStep"],
     step: "RecordedStep",
 ) -> tuple["InspectedChannel", ...]:
@@ -83,7 +83,6 @@ def sign_disputed_by(
     They certainly move against the voltage, which hardly changes there, or with which they move at
     other steps: a channel that always moves against it is inverted.
     """
-    channels = [*channels]
     voltage = _of(channels, "vt")
     if voltage is None or step.sizes.get(voltage.name, 0.0) == 0.0:
         return ()
@@ -99,7 +98,7 @@ def sign_disputed_by(
 
 
 def _opposite(
-    voltage: "InspectedChannel", channels: Sequence["InspectedChannel"], step: "RecordedStep"
+    voltage: "InspectedChannel", channels: Channels, step: "RecordedStep"
 ) -> Iterator[str]:
     """Yield the signals that fall for good where the voltage rises, or the other way round."""
     if not _certain(voltage, step.sizes.get(voltage.name, 0.0)):
@@ -128,14 +127,14 @@ def _certain(channel: "InspectedChannel", size: float) -> bool:
     return abs(size) > max(share * abs(channel.level), times * channel.noise)
 
 
-def _of(channels: Sequence["InspectedChannel"], signal: str) -> "InspectedChannel | None":
+def _of(channels: Channels, signal: str) -> "InspectedChannel | None":
     return next((channel for channel in channels if channel.signal == signal), None)
 
 
 # ---- at rest
 
 
-def is_on_load(channels: Sequence["InspectedChannel"]) -> bool:
+def is_on_load(channels: Channels) -> bool:
     """Check for active power at rest in a channel, or for a record of a load rejection."""
     power = _of(channels, "p")
     rejected = any(channel.rejected_load for channel in channels)
@@ -147,9 +146,7 @@ def shows_power(power: "InspectedChannel") -> bool:
     return abs(power.level) > max(ON_LOAD, CERTAIN_POWER * power.noise)
 
 
-def scale_to_find(
-    channel: "InspectedChannel", channels: Sequence["InspectedChannel"]
-) -> ScaleRange | None:
+def scale_to_find(channel: "InspectedChannel", channels: Channels) -> ScaleRange | None:
     """Return the scale of a field channel with another base than the machine's; None for others."""
     level = _level_pu(channel)
     if channel.signal not in FIELD or level is None or level == 0.0:
@@ -162,7 +159,7 @@ def scale_to_find(
     return ScaleRange(usual / channel.level, *limits)
 
 
-def base_findings(channels: Sequence["InspectedChannel"]) -> Iterator[str]:
+def base_findings(channels: Channels) -> Iterator[str]:
     """Find contradictions to a field voltage and current in per unit of the air-gap line."""
     on_load, in_range = is_on_load(channels), {}
     for channel in filter(None, (_of(channels, signal) for signal in FIELD)):
@@ -200,14 +197,14 @@ def _level_pu(channel: "InspectedChannel") -> float | None:
     return channel.level if channel.seems_per_unit else None
 
 
-def _voltage(channels: Sequence["InspectedChannel"]) -> float:
+def _voltage(channels: Channels) -> float:
     """Return the voltage at rest, pu; 1 where it is not known."""
     voltage = _of(channels, "vt")
     level = None if voltage is None else _level_pu(voltage)
     return level if level is not None and level > 0.0 else 1.0
 
 
-def _range(channels: Sequence["InspectedChannel"]) -> tuple[float, float]:
+def _range(channels: Channels) -> tuple[float, float]:
     """Range in which field voltage and current rest, pu of the air-gap line."""
     reactive = _of(channels, "q")
     shares = WITHOUT_LOAD

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.jumps import rest_end
 from exfit.dsp.quality import mains_frequency
@@ -38,9 +37,8 @@ from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_f
 from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
 from exfit.records.units import unit_in, usual
 from exfit.signals import OF_EVENT
+from exfit.util.arrays import Array
 from exfit.util.text import LARGEST
-
-Array = NDArray[np.float64]
 
 REFERENCE = "vref"
 

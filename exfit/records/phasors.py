@@ -8,20 +8,18 @@ from math import pi, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.formats.cells import quoted
-from exfit.records.formats.table import NONE, Array, RecordTable, column_error, listed
+from exfit.records.formats.table import NONE, RecordTable, column_error, listed
 from exfit.records.formats.text import TextTable
 from exfit.records.units import alike, scale_between
 from exfit.signals import OF_CURRENT_PHASOR, OF_PHASORS, OF_VOLTAGE_PHASOR, PHASOR_COLUMNS
+from exfit.util.arrays import Array, Complex, Places
 
 if TYPE_CHECKING:
     from exfit.dsp.three_phase import Connection
 
-Complex = NDArray[np.complex128]
-Rows = NDArray[np.intp]
 
 TURN = np.exp(2j * np.pi / 3.0)  # by which phase a leads phase b
 TURNS = {"deg": 360.0, "rad": 2.0 * pi}  # of a turn in a unit
@@ -257,7 +255,7 @@ def _smoothed(time: Array, samples: Array) -> Array:
     return np.convolve(padded, np.ones(width) / width, "valid")
 
 
-def smooth_angle(table: RecordTable, column: str, angle: Array, rows: Rows) -> Array:
+def smooth_angle(table: RecordTable, column: str, angle: Array, rows: Places) -> Array:
     """Return the angle (M,) in rad at rows (M,) of a file without jumps by whole turns.
 
     Raises RecordError with the place where its turns cannot be counted.
@@ -274,7 +272,7 @@ def smooth_angle(table: RecordTable, column: str, angle: Array, rows: Rows) -> A
 
 
 def leave_out_bad(
-    table: RecordTable, status: Status, columns: dict[str, Array], rows: Rows, missing: bool
+    table: RecordTable, status: Status, columns: dict[str, Array], rows: Places, missing: bool
 ) -> None:
     """Put nan into those of the given rows that their flags call bad.
 

@@ -7,13 +7,11 @@ from itertools import pairwise, takewhile
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.records.channel_names import KINDS, folded, triples, words_of
 from exfit.records.phasors import unit_by_range, wraps
 from exfit.records.units import WORDS, bare, quantity_of, usual
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 # openPDC numbers its phasors: PM1, PA1; other programs say mag and ang, or M and A
 MAGNITUDE = re.compile(

@@ -7,22 +7,21 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.clock import Clock, check_finite, check_increasing, check_steps, why_unusable
 from exfit.records.formats import open_table
 from exfit.records.formats.table import NONE, RecordTable, column_error, read_bytes, refuse_uneven
-from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
+from exfit.records.record import FEWEST_SAMPLES, Record, read_only
 from exfit.records.units import alike, needs_base, unit_of, usual
 from exfit.signals import unit_of_signal
+from exfit.util.arrays import Array, Places
 from exfit.util.text import LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from exfit.dsp.three_phase import Connection
     from exfit.records.phasors import Phasors, Status
 
-Rows = NDArray[np.intp]
 Repeats = Literal["refuse", "first", "last"]
 
 PERCENT = "%"
@@ -210,7 +209,7 @@ def _check_units(
                 raise column_error(table.path, column, f"in {unit} as the file says, {remedy}")
 
 
-def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Rows:
+def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Places:
     """Return the rows in the window."""
     start, end = window or (time[0], time[-1])
     rows = np.flatnonzero((time >= start) & (time <= end))
@@ -228,9 +227,9 @@ def _without_repeats(
     clock: Clock,
     time: Array,
     columns: Mapping[str, Array],
-    rows: Rows,
+    rows: Places,
     repeats: Repeats,
-) -> tuple[Rows, tuple[str, ...]]:
+) -> tuple[Places, tuple[str, ...]]:
     """Select the rows that have a time of their own each, and describe the others.
 
     Raises RecordError where rows of one time differ and nothing says which counts.
@@ -256,7 +255,11 @@ def _without_repeats(
 
 
 def _of_phases(
-    table: RecordTable, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
+    table: RecordTable,
+    time: Array,
+    columns: Mapping[str, Array],
+    channel: ThreePhases,
+    rows: Places,
 ) -> tuple[Array, float | None]:
     """Return the voltage (M,) per unit of three phases, nan but at the given rows.
 
@@ -285,7 +288,7 @@ def _of_phases(
 
 
 def _signal(
-    table: RecordTable, channel: ChannelLike, column: Array, rows: Rows, missing: bool
+    table: RecordTable, channel: ChannelLike, column: Array, rows: Places, missing: bool
 ) -> Array:
     """Return a channel in per unit; raises RecordError where it is not finite, nor missing."""
     with np.errstate(over="ignore", invalid="ignore"):

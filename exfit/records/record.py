@@ -8,13 +8,12 @@ from types import MappingProxyType
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from exfit.errors import RecordError
 from exfit.records.clock import check_increasing, check_steps, why_unusable
+from exfit.util.arrays import Array
 from exfit.util.text import LARGEST
-
-Array = NDArray[np.float64]
 
 FEWEST_SAMPLES = 2
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from math import ceil, floor, inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
 from exfit.dsp.sampling import present_samples
@@ -14,8 +13,7 @@ from exfit.dsp.step_detection import block_medians, running_median
 from exfit.records.contradictions import sign_disputed_by
 from exfit.records.inspection import Inspection, effective_value
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 LONGEST_RESPONSE = 60.0  # s: what still moves then drifts
 SETTLED = 0.01  # of a step: so near to where it ends, a response has settled

@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.quality import mains_frequency, noise_of
 from exfit.dsp.sampling import present_samples
@@ -18,8 +17,7 @@ from exfit.dsp.step_detection import (
     find_step,
     find_steps,
 )
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 COARSE_SAMPLES = 20_000  # in which the steps of a longer record are first looked for
 COARSE_AROUND_STEP = 50  # of these, before and after a step, from which its instant is then taken

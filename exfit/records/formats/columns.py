@@ -13,13 +13,13 @@ from exfit.errors import RecordError
 from exfit.records.clock import are_soc, find_clock, in_seconds, soc_in_seconds
 from exfit.records.formats.table import (
     NONE,
-    Array,
     MemoryLimit,
     column_error,
     increases,
     positions,
     refuse_uneven,
 )
+from exfit.util.arrays import Array
 
 T = TypeVar("T")
 

@@ -19,7 +19,6 @@ from exfit.errors import RecordError
 from exfit.records.formats.cells import is_number, stated, why_not
 from exfit.records.formats.columns import Columns, missing_package
 from exfit.records.formats.table import (
-    Array,
     MemoryLimit,
     RecordTable,
     column_error,
@@ -27,6 +26,7 @@ from exfit.records.formats.table import (
     read_bytes,
 )
 from exfit.records.units import unit_in
+from exfit.util.arrays import Array
 from exfit.util.files import siblings
 
 if TYPE_CHECKING:

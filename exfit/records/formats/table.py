@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.util.arrays import Array
 from exfit.util.files import read_regular, regular_size, why_unreadable
-
-Array = NDArray[np.float64]
 
 NONE: frozenset[str] = frozenset()
 COLUMNS_SHOWN = 30

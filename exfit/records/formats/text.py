@@ -27,7 +27,6 @@ from exfit.records.formats.dialect import (
 )
 from exfit.records.formats.table import (
     NONE,
-    Array,
     MemoryLimit,
     column_error,
     increases,
@@ -35,6 +34,7 @@ from exfit.records.formats.table import (
     positions,
     read_bytes,
 )
+from exfit.util.arrays import Array
 
 SCANNED_BYTES = 1 << 22  # looked at together
 DECODED_BYTES = 1 << 20  # at a time, to see whether they are UTF-8

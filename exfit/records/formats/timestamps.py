@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.records.formats.cells import CELL_SHOWN, MONTHS, timestamp_form
+from exfit.util.arrays import Array, Mask
 
 Whole = NDArray[np.int64]
 Cells = NDArray[np.bytes_]
@@ -45,7 +46,7 @@ class _Stamps:
     digits: int
 
 
-def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
+def seconds_since_first(cells: Cells) -> Array:
     """Return the instants (M,) in s since the first, of cells (M, 1), or (M, 2) of date and time.
 
     Raises StampError for a cell that is not a timestamp, has another form than the first, or could
@@ -71,7 +72,7 @@ def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
         row = int(np.abs(second).argmax())
         what = f"{second[row] / DAY:.0f} days from the first timestamp are too many"
         raise StampError(row, 0, what)
-    instants: NDArray[np.float64] = (second * unit + (fraction - fraction[0])) / unit
+    instants: Array = (second * unit + (fraction - fraction[0])) / unit
     return instants
 
 
@@ -153,7 +154,7 @@ def _date(values: NDArray[np.uint8], form: re.Match[str]) -> Whole:
     return np.stack(parts, axis=1)
 
 
-def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDArray[np.bool_]]:
+def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, Mask]:
     """Return the seconds of the day, in UTC where a zone is given, and which are none."""
     hour, minute, second = (_number(values, form, part) for part in ("hour", "minute", "second"))
     wrong = (minute > 59) | (second > 59)
