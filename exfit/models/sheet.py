@@ -123,6 +123,9 @@ Sheet = tuple[Parameter, ...]
 Row = tuple[str, float, str, Limits, str] | tuple[str, float, str, Limits, str, SearchRange]
 
 
+SharedRow = tuple[str, str, Limits, str] | tuple[str, str, Limits, str, SearchRange]
+
+
 def sheet(*rows: Row | Parameter) -> Sheet:
     """Make the data sheet of rows (symbol, typical value, unit, (low, high), meaning).
 
@@ -144,6 +147,14 @@ def limits(ceiling: str, high: float, low: float, of: str, kind: Kind = LIMIT) -
     return sheet((ceiling, high, *kind, f"ceiling of {of}"), (floor, low, *kind, f"floor of {of}"))
 
 
+def table(*rows: SharedRow) -> Sheet:
+    """Make rows that models share, of (name, unit, (low, high), meaning): see ``chosen``."""
+    return tuple(
+        Parameter(name, 0.0, unit, *limits, meaning, *search)
+        for name, unit, limits, meaning, *search in rows
+    )
+
+
 def chosen(table: Sheet, **typical: float) -> Sheet:
     """Take rows of a table by their names, each with the typical value of this model, ``KA=46.0``.
 
@@ -159,87 +170,87 @@ def chosen(table: Sheet, **typical: float) -> Sheet:
 
 
 # rows that exciters share by name: the unit, the range and the meaning of each
-SHARED = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 0.0, *GAIN, "regulator gain", FREE),
-    ("TA", 0.0, *SHORT_TIME, "regulator time constant", REGULATOR_LAG),
-    ("TB", 0.0, *TIME, "regulator lag"),
-    ("TC", 0.0, *TIME, "regulator lead"),
-    ("VRMAX", 0.0, *LIMIT, "regulator ceiling"),
-    ("VRMIN", 0.0, *LIMIT, "regulator floor"),
-    ("KE", 0.0, *UP_TO_10, "exciter constant"),
-    ("TE", 0.0, *POSITIVE_TIME, "exciter time constant", EXCITER_LAG),
-    ("KF", 0.0, *UP_TO_10, "stabilising feedback gain", FEEDBACK),
-    ("TF", 0.0, *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 0.0, *UP_TO_100, "first voltage of the saturation curve"),
-    ("SE1", 0.0, *UP_TO_100, "saturation at E1"),
-    ("E2", 0.0, *UP_TO_100, "second voltage of the saturation curve"),
-    ("SE2", 0.0, *UP_TO_100, "saturation at E2"),
-    ("KC", 0.0, *UP_TO_100, "rectifier loading factor"),
-    ("KD", 0.0, *UP_TO_100, "demagnetising factor", DEMAGNETISING),
-    ("VEMIN", 0.0, *LIMIT, "floor of the exciter voltage"),
-    ("KP", 0.0, "pu", (0.01, 100.0), "potential source gain"),
-    ("KI", 0.0, *UP_TO_100, "current source gain, on load"),
-    ("XL", 0.0, *UP_TO_10, "reactance of the potential source, on load"),
-    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
-    ("VBMAX", 0.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
-    ("VFEMAX", 0.0, *LIMIT, "ceiling of the exciter's field current"),
-    ("VAMAX", 0.0, *LIMIT, "regulator ceiling"),
-    ("VAMIN", 0.0, *LIMIT, "regulator floor"),
-    ("KIR", 0.0, *INTEGRAL_GAIN, "integral gain", FREE),
-    ("TDR", 0.0, *SHORT_TIME, "lag of the derivative", SearchRange(needs="KDR")),
-    ("VIMAX", 0.0, *LIMIT, "ceiling of the voltage error"),
-    ("VIMIN", 0.0, *LIMIT, "floor of the voltage error"),
-    ("TF1", 0.0, *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
-    ("KG", 0.0, *UP_TO_100, "feedback gain of the field voltage loop"),
-    ("EFDMAX", 0.0, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
-    ("EFDN", 0.0, *UP_TO_100, "field voltage where the feedback gain changes"),
-    ("K", 0.0, *GAIN, "regulator gain", FREE),
-    ("KA_FIXED", 0.0, "pu", (0.0001, 100000.0), "regulator gain"),
-    ("KB", 0.0, "pu", (0.01, 10000.0), "second stage gain", FREE),
-    ("KC_FREE", 0.0, *UP_TO_100, "rectifier loading factor", LOADING),
-    ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    ("KD_OF_PID", 0.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
-    ("KE_ABOVE_0", 0.0, "pu", (0.01, 10.0), "exciter constant"),
-    ("KE_OR_0", 0.0, *WITHIN_10, "exciter constant, or 0"),
-    ("KE_SIGNED", 0.0, *WITHIN_10, "exciter constant"),
-    ("KF_FIXED", 0.0, *UP_TO_10, "stabilising feedback gain"),
-    ("KF_TO_EFDN", 0.0, *UP_TO_10, "stabilising feedback gain up to EFDN", FEEDBACK),
-    ("KH", 0.0, *UP_TO_100, "feedback gain of the exciter's field current", FREE),
-    ("KIR_OF_REGULATOR", 0.0, *INTEGRAL_GAIN, "integral gain of the regulator", FREE),
-    ("KI_OF_PID", 0.0, *INTEGRAL_GAIN, "integral gain", FREE),
-    ("KLR", 0.0, *UP_TO_1000, "field current limiter gain"),
-    ("KN", 0.0, *UP_TO_10, "stabilising feedback gain beyond EFDN"),
-    ("KPR", 0.0, *PID_GAIN, "proportional gain", FREE),
-    ("KPR_OF_REGULATOR", 0.0, *PID_GAIN, "proportional gain of the regulator", FREE),
-    ("KP_OF_PID", 0.0, *PID_GAIN, "proportional gain", FREE),
-    ("KP_OR_0", 0.0, *UP_TO_100, "potential source gain"),
-    ("KR", 0.0, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
-    ("SW1", 0.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
-    ("TATB", 0.0, "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
-    ("TA_FIXED", 0.0, *SHORT_TIME, "regulator time constant"),
-    ("TA_OF_FIRING", 0.0, *SHORT_TIME, "firing circuit time constant", FREE),
-    ("TB_ALONE", 0.0, *TIME, "regulator lag", FREE),
-    ("TB_FREE", 0.0, *TIME, "regulator lag", LAG_OF_TC),
-    ("TC_FREE", 0.0, *TIME, "regulator lead", LEAD_OF_TB),
-    ("TD", 0.0, *SHORT_TIME, "lag of the derivative", SearchRange(needs="KD")),
-    ("TE_OR_0", 0.0, *SHORT_TIME, "exciter time constant", EXCITER_LAG),
-    ("TF2", 0.0, *TIME, "stabilising feedback lag"),
-    ("VEMAX", 0.0, *LIMIT, "ceiling of the exciter voltage"),
-    ("VGMAX", 0.0, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
-    ("VMMAX", 0.0, *LIMIT, "ceiling of the field voltage loop"),
-    ("VMMIN", 0.0, *LIMIT, "floor of the field voltage loop"),
-    ("VPIDMAX", 0.0, *LIMIT, "ceiling of the PID"),
-    ("VPIDMIN", 0.0, *LIMIT, "floor of the PID"),
-    ("VRMAX_AT_VT_OR_0", 0.0, *LIMIT, "regulator ceiling at rated voltage, or 0"),
-    ("VRMAX_OF_EFD", 0.0, *LIMIT, "ceiling of the field voltage"),
-    ("VRMAX_OF_EFD_AT_VT", 0.0, *LIMIT, "ceiling of the field voltage at rated voltage"),
-    ("VRMAX_OF_EXCITER", 0.0, *LIMIT, "ceiling of the exciter's field voltage"),
-    ("VRMAX_OR_0", 0.0, *LIMIT, "regulator ceiling, or 0"),
-    ("VRMIN_AT_VT", 0.0, *LIMIT, "regulator floor at rated voltage"),
-    ("VRMIN_OF_EFD", 0.0, *LIMIT, "floor of the field voltage"),
-    ("VRMIN_OF_EFD_AT_VT", 0.0, *LIMIT, "floor of the field voltage at rated voltage"),
-    ("VRMIN_OF_EXCITER", 0.0, *LIMIT, "floor of the exciter's field voltage"),
+SHARED = table(
+    ("TR", "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", *GAIN, "regulator gain", FREE),
+    ("TA", *SHORT_TIME, "regulator time constant", REGULATOR_LAG),
+    ("TB", *TIME, "regulator lag"),
+    ("TC", *TIME, "regulator lead"),
+    ("VRMAX", *LIMIT, "regulator ceiling"),
+    ("VRMIN", *LIMIT, "regulator floor"),
+    ("KE", *UP_TO_10, "exciter constant"),
+    ("TE", *POSITIVE_TIME, "exciter time constant", EXCITER_LAG),
+    ("KF", *UP_TO_10, "stabilising feedback gain", FEEDBACK),
+    ("TF", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
+    ("E1", *UP_TO_100, "first voltage of the saturation curve"),
+    ("SE1", *UP_TO_100, "saturation at E1"),
+    ("E2", *UP_TO_100, "second voltage of the saturation curve"),
+    ("SE2", *UP_TO_100, "saturation at E2"),
+    ("KC", *UP_TO_100, "rectifier loading factor"),
+    ("KD", *UP_TO_100, "demagnetising factor", DEMAGNETISING),
+    ("VEMIN", *LIMIT, "floor of the exciter voltage"),
+    ("KP", "pu", (0.01, 100.0), "potential source gain"),
+    ("KI", *UP_TO_100, "current source gain, on load"),
+    ("XL", *UP_TO_10, "reactance of the potential source, on load"),
+    ("THETAP", "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    ("VBMAX", "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    ("VFEMAX", *LIMIT, "ceiling of the exciter's field current"),
+    ("VAMAX", *LIMIT, "regulator ceiling"),
+    ("VAMIN", *LIMIT, "regulator floor"),
+    ("KIR", *INTEGRAL_GAIN, "integral gain", FREE),
+    ("TDR", *SHORT_TIME, "lag of the derivative", SearchRange(needs="KDR")),
+    ("VIMAX", *LIMIT, "ceiling of the voltage error"),
+    ("VIMIN", *LIMIT, "floor of the voltage error"),
+    ("TF1", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
+    ("KG", *UP_TO_100, "feedback gain of the field voltage loop"),
+    ("EFDMAX", "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+    ("EFDN", *UP_TO_100, "field voltage where the feedback gain changes"),
+    ("K", *GAIN, "regulator gain", FREE),
+    ("KA_FIXED", "pu", (0.0001, 100000.0), "regulator gain"),
+    ("KB", "pu", (0.01, 10000.0), "second stage gain", FREE),
+    ("KC_FREE", *UP_TO_100, "rectifier loading factor", LOADING),
+    ("KDR", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
+    ("KD_OF_PID", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
+    ("KE_ABOVE_0", "pu", (0.01, 10.0), "exciter constant"),
+    ("KE_OR_0", *WITHIN_10, "exciter constant, or 0"),
+    ("KE_SIGNED", *WITHIN_10, "exciter constant"),
+    ("KF_FIXED", *UP_TO_10, "stabilising feedback gain"),
+    ("KF_TO_EFDN", *UP_TO_10, "stabilising feedback gain up to EFDN", FEEDBACK),
+    ("KH", *UP_TO_100, "feedback gain of the exciter's field current", FREE),
+    ("KIR_OF_REGULATOR", *INTEGRAL_GAIN, "integral gain of the regulator", FREE),
+    ("KI_OF_PID", *INTEGRAL_GAIN, "integral gain", FREE),
+    ("KLR", *UP_TO_1000, "field current limiter gain"),
+    ("KN", *UP_TO_10, "stabilising feedback gain beyond EFDN"),
+    ("KPR", *PID_GAIN, "proportional gain", FREE),
+    ("KPR_OF_REGULATOR", *PID_GAIN, "proportional gain of the regulator", FREE),
+    ("KP_OF_PID", *PID_GAIN, "proportional gain", FREE),
+    ("KP_OR_0", *UP_TO_100, "potential source gain"),
+    ("KR", "pu", (0.01, 1000.0), "gain of the regulator's supply"),
+    ("SW1", "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
+    ("TATB", "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
+    ("TA_FIXED", *SHORT_TIME, "regulator time constant"),
+    ("TA_OF_FIRING", *SHORT_TIME, "firing circuit time constant", FREE),
+    ("TB_ALONE", *TIME, "regulator lag", FREE),
+    ("TB_FREE", *TIME, "regulator lag", LAG_OF_TC),
+    ("TC_FREE", *TIME, "regulator lead", LEAD_OF_TB),
+    ("TD", *SHORT_TIME, "lag of the derivative", SearchRange(needs="KD")),
+    ("TE_OR_0", *SHORT_TIME, "exciter time constant", EXCITER_LAG),
+    ("TF2", *TIME, "stabilising feedback lag"),
+    ("VEMAX", *LIMIT, "ceiling of the exciter voltage"),
+    ("VGMAX", "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
+    ("VMMAX", *LIMIT, "ceiling of the field voltage loop"),
+    ("VMMIN", *LIMIT, "floor of the field voltage loop"),
+    ("VPIDMAX", *LIMIT, "ceiling of the PID"),
+    ("VPIDMIN", *LIMIT, "floor of the PID"),
+    ("VRMAX_AT_VT_OR_0", *LIMIT, "regulator ceiling at rated voltage, or 0"),
+    ("VRMAX_OF_EFD", *LIMIT, "ceiling of the field voltage"),
+    ("VRMAX_OF_EFD_AT_VT", *LIMIT, "ceiling of the field voltage at rated voltage"),
+    ("VRMAX_OF_EXCITER", *LIMIT, "ceiling of the exciter's field voltage"),
+    ("VRMAX_OR_0", *LIMIT, "regulator ceiling, or 0"),
+    ("VRMIN_AT_VT", *LIMIT, "regulator floor at rated voltage"),
+    ("VRMIN_OF_EFD", *LIMIT, "floor of the field voltage"),
+    ("VRMIN_OF_EFD_AT_VT", *LIMIT, "floor of the field voltage at rated voltage"),
+    ("VRMIN_OF_EXCITER", *LIMIT, "floor of the exciter's field voltage"),
 )
 shared = partial(chosen, SHARED)
 
@@ -325,6 +336,20 @@ def record(
         tuple(exchanged.split()),
     )
     return (made,)
+
+
+def record_of_2016(
+    name: str,
+    cons: str,
+    *,
+    flags: str = "OEL UEL",
+    switches: str = "",
+    places: Mapping[int, str] = NONE,
+    doubt: str = "",
+) -> Records:
+    """Return a record whose integers say where limiters act, its flags, and what it switches."""
+    icons = dict.fromkeys(f"{flags} {switches}".split(), 1)
+    return record(name, cons, icons=icons, ignored=flags, places=places, doubt=doubt)
 
 
 # what is not settled about orders of PSLF

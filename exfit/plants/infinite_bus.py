@@ -33,13 +33,7 @@ from exfit.plants.parts import (
     symbols,
     values_named,
 )
-from exfit.plants.unit import (
-    ROTOR,
-    Controls,
-    UnitOnLoad,
-    unit_at_rest,
-    unit_motion,
-)
+from exfit.plants.unit import ROTOR, Controls, UnitOnLoad, unit_at_rest, unit_motion
 
 OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
 

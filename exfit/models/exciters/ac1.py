@@ -19,6 +19,7 @@ from exfit.models.sheet import (
     ONE_GATE,
     documented,
     record,
+    record_of_2016,
     renamed,
     shared,
     sheet,
@@ -108,11 +109,9 @@ AC1C = documented(
     (*renamed(AC1A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VL VA VE VF",
     aliases=("ESAC1C",),
-    records=record(
+    records=record_of_2016(
         "AC1C",
         "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 EFEMAX EFEMIN VFEMAX VEMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         places=ONE_GATE,
         doubt=OF_TWO_PROGRAMS,
     ),

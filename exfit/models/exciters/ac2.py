@@ -10,6 +10,7 @@ from exfit.models.sheet import (
     PID_GAIN,
     documented,
     record,
+    record_of_2016,
     renamed,
     shared,
     sheet,
@@ -120,12 +121,10 @@ AC2C = documented(
     (*renamed(AC2A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VEMIN=0.0)),
     "VC VL VA VE VF",
     aliases=("ESAC2C",),
-    records=record(
+    records=record_of_2016(
         "AC2C",
         "TR TB TC KA TA VAMAX VAMIN KB EFEMAX EFEMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2 "
         "VEMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         doubt=OF_TWO_PROGRAMS,
     ),
 )

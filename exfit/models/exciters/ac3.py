@@ -26,6 +26,7 @@ from exfit.models.sheet import (
     UP_TO_1000,
     documented,
     record,
+    record_of_2016,
     shared,
     sheet,
 )
@@ -168,12 +169,10 @@ AC3C = documented(
     ),
     "VC VL VA VE VF VI VD",
     aliases=("ESAC3C",),
-    records=record(
+    records=record_of_2016(
         "AC3C",
         "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 KPR "
         "KIR KDR TDR VPIDMAX VPIDMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         places=ONE_GATE,
         doubt=OF_TWO_PROGRAMS,
     ),

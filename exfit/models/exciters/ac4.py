@@ -7,6 +7,7 @@ from exfit.models.sheet import (
     ONE_GATE,
     documented,
     record,
+    record_of_2016,
     shared,
     sheet,
 )
@@ -94,13 +95,8 @@ AC4C = documented(
     AC4A.sheet,
     "VC VL VR",
     aliases=("ESAC4C",),
-    records=record(
-        "AC4C",
-        "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
-        places=ONE_GATE,
-        doubt=OF_TWO_PROGRAMS,
+    records=record_of_2016(
+        "AC4C", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC", places=ONE_GATE, doubt=OF_TWO_PROGRAMS
     ),
 )
 

@@ -21,6 +21,7 @@ from exfit.models.sheet import (
     TIME,
     documented,
     record,
+    record_of_2016,
     renamed,
     shared,
     sheet,
@@ -141,11 +142,9 @@ AC5C = documented(
     ),
     "VC VA VE VL VF",
     aliases=("ESAC5C",),
-    records=record(
+    records=record_of_2016(
         "AC5C",
         "TR KA TA VAMAX VAMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 KC KD VFEMAX VEMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         places=ONE_GATE,
         doubt=OF_TWO_PROGRAMS,
     ),

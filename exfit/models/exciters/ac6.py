@@ -14,6 +14,7 @@ from exfit.models.sheet import (
     UP_TO_10000,
     documented,
     record,
+    record_of_2016,
     renamed,
     shared,
     sheet,
@@ -148,12 +149,10 @@ AC6C = documented(
     (*renamed(AC6A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VK VA VE VH",
     aliases=("ESAC6C",),
-    records=record(
+    records=record_of_2016(
         "AC6C",
         "TR KA TA TK TB TC VAMAX VAMIN EFEMAX EFEMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 "
         "SE2 VFEMAX VEMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         places=ONE_GATE,
         doubt=OF_TWO_PROGRAMS,
     ),

@@ -33,6 +33,7 @@ from exfit.models.sheet import (
     SearchRange,
     documented,
     record,
+    record_of_2016,
     shared,
     sheet,
     with_typical,
@@ -196,12 +197,11 @@ AC7C = documented(
     ),
     "VC VI VD VF VA VE",
     aliases=("ESAC7C",),
-    records=record(
+    records=record_of_2016(
         "AC7C",
         "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
         "VFEMAX VEMIN E1 SE1 E2 SE2 KI XL THETAP KC1 VBMAX KR",
-        icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1, "SW2": 1},
-        ignored="OEL UEL",
+        switches="VOS SW1 SW2",
         places=TWO_GATES,
         doubt=OF_TWO_PROGRAMS,
     ),

@@ -18,7 +18,15 @@ from exfit.models.exciter_parts import (
     limited_alternator,
     supply,
 )
-from exfit.models.sheet import OF_A_LIST, TWO_GATES, documented, record, shared, sheet
+from exfit.models.sheet import (
+    OF_A_LIST,
+    TWO_GATES,
+    documented,
+    record,
+    record_of_2016,
+    shared,
+    sheet,
+)
 
 Limits = tuple[Signal, Signal]
 
@@ -155,12 +163,11 @@ AC8C = documented(
     (*AC8B.sheet, *ALTERNATOR_SUPPLY),
     "VC VI VD VR VE",
     aliases=("ESAC8C",),
-    records=record(
+    records=record_of_2016(
         "AC8C",
         "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN E1 SE1 E2 "
         "SE2 KP KI XL THETAP KC1 VBMAX",
-        icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1},
-        ignored="OEL UEL",
+        switches="VOS SW1",
         places=TWO_GATES,
         doubt="PSS/E 36 reads constants in this order as AC8CU1, a user's model of five integers",
     ),

@@ -16,6 +16,7 @@ from exfit.models.sheet import (
     OF_TWO_PROGRAMS,
     documented,
     record,
+    record_of_2016,
     renamed,
     shared,
     sheet,
@@ -130,11 +131,9 @@ DC1C = documented(
     (*DC1A.sheet, *shared(VEMAX=99.0, VEMIN=0.0)),
     STATES,
     aliases=("ESDC1C",),
-    records=record(
+    records=record_of_2016(
         "DC1C",
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         doubt=OF_TWO_PROGRAMS,
     ),
     setpoints=SETPOINTS,
@@ -223,11 +222,9 @@ DC2C = documented(
     (*DC2A.sheet, *shared(VEMAX=99.0, VEMIN=0.0)),
     STATES,
     aliases=("ESDC2C",),
-    records=record(
+    records=record_of_2016(
         "DC2C",
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
         doubt=OF_TWO_PROGRAMS,
     ),
     setpoints=SETPOINTS,

@@ -11,7 +11,7 @@ from exfit.models.blocks import (
     pid,
 )
 from exfit.models.exciter_parts import ALTERNATOR_SUPPLY, error_less_feedback, supply
-from exfit.models.sheet import documented, record, shared, sheet
+from exfit.models.sheet import documented, record, record_of_2016, shared, sheet
 
 
 def dc4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -144,12 +144,12 @@ DC4C = documented(
     ),
     "VC VI VD VR EFD VF",
     doubt="rests on one public diagram for the load of its supply (KC1), that of InterPSS",
-    records=record(
+    records=record_of_2016(
         "DC4C",
         "TR KPR KIR KDR TDR VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2 KP KI XL THETAP KC1 "
         "VBMAX",
-        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-        ignored="OEL UEL SCL",
+        flags="OEL UEL SCL",
+        switches="SW1",
         doubt="PSS/E 36 reads constants in this order as DC4CU1, a user's model",
     ),
 )

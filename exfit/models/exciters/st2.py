@@ -21,6 +21,7 @@ from exfit.models.sheet import (
     documented,
     not_searched,
     record,
+    record_of_2016,
     shared,
     sheet,
 )
@@ -138,12 +139,11 @@ ST2C = documented(
     (*not_searched(ST2A.sheet, "KA"), *PID, *shared(XL=0.081, THETAP=0.0, VBMAX=9.0)),
     "VC VI VD VR EFD VF",
     aliases=("ESST2C",),
-    records=record(
+    records=record_of_2016(
         "ST2C",
         "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN TE EFDMAX KE KF TF KP KI XL THETAP "
         "KC VBMAX",
-        icons={"OEL": 1, "UEL": 1, "SCL": 1},
-        ignored="OEL UEL SCL",
+        flags="OEL UEL SCL",
         doubt=OF_TWO_PROGRAMS,
     ),
 )

@@ -20,6 +20,7 @@ from exfit.models.sheet import (
     SearchRange,
     documented,
     record,
+    record_of_2016,
     shared,
     sheet,
 )
@@ -169,11 +170,8 @@ ST5C = documented(
     ),
     "VC VL1 VL2 VE VU1 VU2 VO1 VO2",
     aliases=("ESST5C",),
-    records=record(
-        "ST5C",
-        "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
-        icons={"OEL": 1, "UEL": 1},
-        ignored="OEL UEL",
+    records=record_of_2016(
+        "ST5C", "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2"
     ),
 )
 

@@ -12,6 +12,7 @@ from exfit.models.sheet import (
     documented,
     limits,
     record,
+    record_of_2016,
     shared,
     sheet,
 )
@@ -147,11 +148,11 @@ ST6C = documented(
     ),
     "VC VI VD VM VG",
     aliases=("ESST6C",),
-    records=record(
+    records=record_of_2016(
         "ST6C",
         "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG VMMAX VMMIN TA KP KI "
         "XL THETAP KC VBMAX",
-        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-        ignored="OEL UEL SCL",
+        flags="OEL UEL SCL",
+        switches="SW1",
     ),
 )

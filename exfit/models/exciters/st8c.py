@@ -49,7 +49,7 @@ from exfit.models.sheet import (
     SHORT_TIME,
     UP_TO_100,
     limits,
-    record,
+    record_of_2016,
     shared,
     sheet,
 )
@@ -78,12 +78,12 @@ SHEET = sheet(
     *shared(SW1=1.0),
 )
 
-RECORDS = record(
+RECORDS = record_of_2016(
     "ST8C",
     "TR KPR KIR VPIMAX VPIMIN KPA KIA VAMAX VAMIN KA TA VRMAX VRMIN KF TF KC1 KP KI1 XL THETAP "
     "VB1MAX KC2 KI2 VB2MAX",
-    icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-    ignored="OEL UEL SCL",
+    flags="OEL UEL SCL",
+    switches="SW1",
     places=ONE_GATE,
 )
 

@@ -29,7 +29,15 @@ which are 0, 10000, 2, 0.0018, 0 and 1.2 there: most leave out what they act on.
 
 from exfit.models.blocks import Signal, clip, lag, larger, smaller, washout
 from exfit.models.exciter_parts import STATIC_SUPPLY, supply
-from exfit.models.sheet import FREE, ONE_GATE, POSITIVE_TIME, SHORT_TIME, record, shared, sheet
+from exfit.models.sheet import (
+    FREE,
+    ONE_GATE,
+    POSITIVE_TIME,
+    SHORT_TIME,
+    record_of_2016,
+    shared,
+    sheet,
+)
 
 ALIASES = ("ESST9C",)
 
@@ -48,11 +56,11 @@ SHEET = sheet(
     *STATIC_SUPPLY,
 )
 
-RECORDS = record(
+RECORDS = record_of_2016(
     "ST9C",
     "TR TCD TBD ZA KA KU TA TAUEL VRMAX VRMIN KAS TAS KP THETAP KI XL KC VBMAX",
-    icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-    ignored="OEL UEL SCL",
+    flags="OEL UEL SCL",
+    switches="SW1",
     places=ONE_GATE,
 )
 
