@@ -14,6 +14,7 @@ from exfit.models.exciter_parts import error_less_feedback
 from exfit.models.sheet import (
     OF_A_LIST,
     OF_TWO_PROGRAMS,
+    Records,
     documented,
     record,
     record_of_2016,
@@ -23,6 +24,30 @@ from exfit.models.sheet import (
 )
 
 STATES, SETPOINTS = "VC VL VR EFD VF", "KE0 VRMAX0 VRMIN0"
+
+
+def record_of_psse(name: str, TF: str, times_speed: bool = False) -> Records:
+    """Return PSS/E's record of an exciter with a lead-lag; Switch is not used there."""
+    order = f"TR KA TA TB TC VRMAX VRMIN KE TE KF {TF} Switch E1 SE1 E2 SE2"
+    return record(name, order, absent={"Switch": 0.0}, times_speed=times_speed)
+
+
+def record_of_pslf(name: str) -> Records:
+    """Return PSLF's record of an exciter of 2005."""
+    return record(
+        name,
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
+        ignored="SPDMLT UELIN",
+        absent={"EXCLIM": 1.0},
+        spelled={"TF": "tf1"},
+        doubt=OF_A_LIST,
+    )
+
+
+def with_limits(name: str) -> Records:
+    """Return the record of an exciter of 2016."""
+    order = "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN"
+    return record_of_2016(name, order, doubt=OF_TWO_PROGRAMS)
 
 
 def excited(
@@ -82,19 +107,8 @@ DC1A = documented(
     ),
     STATES,
     aliases=("ESDC1A",),
-    records=record(
-        "ESDC1A",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
-        absent={"Switch": 0.0},
-    ),
-    pslf_records=record(
-        "esdc1a",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
-        ignored="SPDMLT UELIN",
-        absent={"EXCLIM": 1.0},
-        spelled={"TF": "tf1"},
-        doubt=OF_A_LIST,
-    ),
+    records=record_of_psse("ESDC1A", "TF"),
+    pslf_records=record_of_pslf("esdc1a"),
     setpoints=SETPOINTS,
 )
 
@@ -131,11 +145,7 @@ DC1C = documented(
     (*DC1A.sheet, *shared(VEMAX=99.0, VEMIN=0.0)),
     STATES,
     aliases=("ESDC1C",),
-    records=record_of_2016(
-        "DC1C",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
-        doubt=OF_TWO_PROGRAMS,
-    ),
+    records=with_limits("DC1C"),
     setpoints=SETPOINTS,
 )
 
@@ -174,19 +184,8 @@ DC2A = documented(
     ),
     STATES,
     aliases=("ESDC2A",),
-    records=record(
-        "ESDC2A",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
-        absent={"Switch": 0.0},
-    ),
-    pslf_records=record(
-        "esdc2a",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
-        ignored="SPDMLT UELIN",
-        absent={"EXCLIM": 1.0},
-        spelled={"TF": "tf1"},
-        doubt=OF_A_LIST,
-    ),
+    records=record_of_psse("ESDC2A", "TF"),
+    pslf_records=record_of_pslf("esdc2a"),
     setpoints=SETPOINTS,
 )
 
@@ -222,11 +221,7 @@ DC2C = documented(
     (*DC2A.sheet, *shared(VEMAX=99.0, VEMIN=0.0)),
     STATES,
     aliases=("ESDC2C",),
-    records=record_of_2016(
-        "DC2C",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
-        doubt=OF_TWO_PROGRAMS,
-    ),
+    records=with_limits("DC2C"),
     setpoints=SETPOINTS,
 )
 
@@ -308,11 +303,7 @@ IEEEX1 = documented(
         *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
     ),
     STATES,
-    records=record(
-        "IEEEX1",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
-        absent={"Switch": 0.0},
-    ),
+    records=record_of_psse("IEEEX1", "TF1"),
     pslf_records=record(
         "exdc1", "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 E1 SE1 E2 SE2", doubt=OF_A_LIST
     ),
@@ -351,12 +342,7 @@ EXDC2 = documented(
     rest,
     renamed(DC2A.sheet, TF="TF1"),
     STATES,
-    records=record(
-        "EXDC2",
-        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
-        absent={"Switch": 0.0},
-        times_speed=True,
-    ),
+    records=record_of_psse("EXDC2", "TF1", times_speed=True),
     pslf_records=record(
         "exdc2",
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2",

@@ -8,11 +8,22 @@ the stator's voltages, until a breaker opens (`plants.breaker`).
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from exfit.engine.trace import Signal
-from exfit.models.sheet import Records, Row, Sheet, record
+from exfit.models.sheet import (
+    LONG_TIME,
+    POSITIVE_TIME,
+    UP_TO_10,
+    UP_TO_100,
+    Records,
+    Sheet,
+    chosen,
+    record,
+    table,
+)
 
 Faults = Iterable[tuple[str, str]]
 
@@ -70,15 +81,22 @@ class Machine:
         return (*self.d_axis, *self.q_axis)
 
 
-SWING: tuple[Row, ...] = (
-    ("H", 3.25, "s", (0.01, 100.0), "inertia constant, on load"),
-    ("D", 0.0, "pu", (0.0, 100.0), "damping, on load"),
+# rows that machines share by name
+ROWS = table(
+    ("Tpd0", *POSITIVE_TIME, "d-axis transient time constant"),
+    ("Tppd0", *LONG_TIME, "d-axis subtransient time constant"),
+    ("Tppq0", "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
+    ("H", *POSITIVE_TIME, "inertia constant, on load"),
+    ("D", *UP_TO_100, "damping, on load"),
+    ("Xd", "pu", (0.01, 10.0), "d-axis synchronous reactance"),
+    ("Xq", "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
+    ("Xpd", "pu", (0.001, 10.0), "d-axis transient reactance"),
+    ("Xppd", "pu", (0.001, 10.0), "subtransient reactance"),
+    ("Xl", *UP_TO_10, "leakage reactance"),
+    ("S10", *UP_TO_10, "saturation at 1.0 pu"),
+    ("S12", *UP_TO_10, "saturation at 1.2 pu"),
 )
-
-SATURATION: tuple[Row, ...] = (
-    ("S10", 0.0, "pu", (0.0, 10.0), "saturation at 1.0 pu"),
-    ("S12", 0.0, "pu", (0.0, 10.0), "saturation at 1.2 pu"),
-)
+of_machine = partial(chosen, ROWS)
 
 
 def descending(values: Mapping[str, float], *symbols: str) -> Faults:

@@ -5,24 +5,22 @@ from collections.abc import Mapping
 from exfit.engine.trace import Signal
 from exfit.models.machines.d_axis import curve, unsaturated_quadrature
 from exfit.models.machines.machine import (
-    SATURATION,
-    SWING,
     Axes,
     Faults,
     Machine,
     Source,
     descending,
+    of_machine,
     saturation_order,
 )
-from exfit.models.sheet import POSITIVE_TIME, sheet
+from exfit.models.sheet import sheet
 
 SHEET = sheet(
-    ("Tpd0", 6.35, *POSITIVE_TIME, "d-axis transient time constant"),
-    *SWING,
+    *of_machine(Tpd0=6.35, H=3.25, D=0.0),
     ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance, on load"),
-    ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
+    *of_machine(Xq=1.7),
     ("Xpd", 0.3, "pu", (0.001, 10.0), "d-axis transient reactance, on load"),
-    *SATURATION,
+    *of_machine(S10=0.0, S12=0.0),
 )
 
 DRAWING = """\

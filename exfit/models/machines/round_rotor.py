@@ -19,8 +19,6 @@ from exfit.models.machines.d_axis import (
     unsaturated_field,
 )
 from exfit.models.machines.machine import (
-    SATURATION,
-    SWING,
     Axes,
     Faults,
     Machine,
@@ -28,25 +26,19 @@ from exfit.models.machines.machine import (
     d_axis_order,
     descending,
     not_rising,
+    of_machine,
     power_order,
     pslf_record,
     saturation_order,
 )
-from exfit.models.sheet import LONG_TIME, POSITIVE_TIME, TIME, UP_TO_10, record, sheet
+from exfit.models.sheet import TIME, record, sheet
 
 SHEET = sheet(
-    ("Tpd0", 6.35, *POSITIVE_TIME, "d-axis transient time constant"),
-    ("Tppd0", 0.06, *LONG_TIME, "d-axis subtransient time constant"),
+    *of_machine(Tpd0=6.35, Tppd0=0.06),
     ("Tpq0", 0.5, *TIME, "q-axis transient time constant, on load"),
-    ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
-    *SWING,
-    ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
-    ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
-    ("Xpd", 0.3, "pu", (0.001, 10.0), "d-axis transient reactance"),
+    *of_machine(Tppq0=0.077, H=3.25, D=0.0, Xd=1.8, Xq=1.7, Xpd=0.3),
     ("Xpq", 0.55, "pu", (0.001, 10.0), "q-axis transient reactance, on load"),
-    ("Xppd", 0.25, "pu", (0.001, 10.0), "subtransient reactance"),
-    ("Xl", 0.2, *UP_TO_10, "leakage reactance"),
-    *SATURATION,
+    *of_machine(Xppd=0.25, Xl=0.2, S10=0.0, S12=0.0),
 )
 
 DRAWING = f"""\

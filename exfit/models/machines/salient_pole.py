@@ -22,31 +22,22 @@ from exfit.models.machines.d_axis import (
     unsaturated_quadrature,
 )
 from exfit.models.machines.machine import (
-    SATURATION,
-    SWING,
     Axes,
     Faults,
     Machine,
     Source,
     d_axis_order,
     descending,
+    of_machine,
     power_order,
     pslf_record,
     saturation_order,
 )
-from exfit.models.sheet import LONG_TIME, POSITIVE_TIME, UP_TO_10, record, sheet
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
-    ("Tpd0", 6.35, *POSITIVE_TIME, "d-axis transient time constant"),
-    ("Tppd0", 0.06, *LONG_TIME, "d-axis subtransient time constant"),
-    ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
-    *SWING,
-    ("Xd", 1.071, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
-    ("Xq", 0.704, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
-    ("Xpd", 0.351, "pu", (0.001, 10.0), "d-axis transient reactance"),
-    ("Xppd", 0.296, "pu", (0.001, 10.0), "subtransient reactance"),
-    ("Xl", 0.154, *UP_TO_10, "leakage reactance"),
-    *SATURATION,
+    *of_machine(Tpd0=6.35, Tppd0=0.06, Tppq0=0.077, H=3.25, D=0.0, Xd=1.071, Xq=0.704),
+    *of_machine(Xpd=0.351, Xppd=0.296, Xl=0.154, S10=0.0, S12=0.0),
 )
 
 GENSAL_DRAWING = f"""\
@@ -112,46 +103,42 @@ def faults(values: Mapping[str, float]) -> Faults:
 
 def gensal_faults(values: Mapping[str, float]) -> Faults:
     """Yield them, and what contradicts itself in a quadratic saturation."""
-    yield from faults(values)
-    yield from saturation_order(values)
+    yield from (*faults(values), *saturation_order(values))
 
 
 def gensae_faults(values: Mapping[str, float]) -> Faults:
     """Yield them, and what contradicts itself in an exponential saturation."""
-    yield from faults(values)
-    yield from power_order(values)
+    yield from (*faults(values), *power_order(values))
 
 
-GENSAL = Machine(
-    name="GENSAL",
-    title="salient poles, quadratic saturation by E'q",
-    drawing=GENSAL_DRAWING,
+salient = partial(
+    Machine,
     sheet=SHEET,
     d_axis=D_AXIS,
     q_axis=("PSIQ",),
     source=source,
-    field=gensal_field,
     slopes=d_slopes,
-    q_slopes=gensal_q_slopes,
     rest=rest,
+)
+
+GENSAL = salient(
+    name="GENSAL",
+    title="salient poles, quadratic saturation by E'q",
+    drawing=GENSAL_DRAWING,
+    field=gensal_field,
+    q_slopes=gensal_q_slopes,
     quadrature=unsaturated_quadrature,
     faults=gensal_faults,
     records=record("GENSAL", CONS),
     pslf_records=pslf_record("gensal", CONS),
 )
 
-GENSAE = Machine(
+GENSAE = salient(
     name="GENSAE",
     title="salient poles, exponential saturation by the air-gap flux",
     drawing=GENSAE_DRAWING,
-    sheet=SHEET,
-    d_axis=D_AXIS,
-    q_axis=("PSIQ",),
-    source=source,
     field=gensae_field,
-    slopes=d_slopes,
     q_slopes=gensae_q_slopes,
-    rest=rest,
     quadrature=partial(quadrature, power_curve),
     faults=gensae_faults,
     records=record("GENSAE", CONS),
