@@ -16,7 +16,7 @@ from exfit.features.programme.results_at_rest import Array, MeasuredValue, Satur
 from exfit.inference.confidence import LEVEL, Interval
 from exfit.inference.quantiles import student_quantile
 from exfit.models.blocks import exponential_se
-from exfit.models.machines.d_axis import curve, power_curve
+from exfit.models.machines.machine import curve, power_curve
 
 EXCESS: Mapping[SaturationForm, Callable[[Array, float, float], Array]] = {
     "quadratic": lambda vt, S10, S12: np.asarray(curve(vt, SimpleNamespace(S10=S10, S12=S12))),

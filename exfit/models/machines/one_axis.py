@@ -3,15 +3,16 @@
 from collections.abc import Mapping
 
 from exfit.engine.trace import Signal
-from exfit.models.machines.d_axis import curve, unsaturated_quadrature
 from exfit.models.machines.machine import (
     Axes,
     Faults,
     Machine,
     Source,
+    curve,
     descending,
     of_machine,
     saturation_order,
+    unsaturated_quadrature,
 )
 from exfit.models.sheet import sheet
 

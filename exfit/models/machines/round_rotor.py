@@ -5,31 +5,29 @@ from functools import partial
 from typing import Literal
 
 from exfit.models.blocks import Signal, lag, where
-from exfit.models.machines.d_axis import (
+from exfit.models.machines.machine import (
     D_AXIS,
     D_AXIS_DRAWING,
     FIELD_CURRENT,
-    along_axes,
-    curve,
-    d_rest,
-    d_slopes,
-    power_curve,
-    quadrature,
-    subtransient_flux,
-    unsaturated_field,
-)
-from exfit.models.machines.machine import (
     Axes,
     Faults,
     Machine,
     Source,
+    along_axes,
+    curve,
     d_axis_order,
+    d_rest,
+    d_slopes,
     descending,
     not_rising,
     of_machine,
+    power_curve,
     power_order,
     pslf_record,
+    quadrature,
     saturation_order,
+    subtransient_flux,
+    unsaturated_field,
 )
 from exfit.models.sheet import TIME, record, sheet
 
