@@ -122,18 +122,10 @@ def grid_playback(
         measured = terminals
         if power_at == "recorded-voltage":
             measured = terminals._replace(v=Axes(recorded * sin(delta), recorded * cos(delta)))
-        outputs = {
-            "vref": vref,
-            "vt": recorded,
-            "efd": efd,
-            "ifd": ifd,
-            "p": measured.p,
-            "q": measured.q,
-            "it": modulus(i.d, i.q),
-            "delta": delta,
-            "speed": p[initial("speed")] + x["dw"],
-            MEASURED: vc1,
-        }
+        powers, it = (measured.p, measured.q), modulus(i.d, i.q)
+        speed = p[initial("speed")] + x["dw"]
+        shown = (vref, recorded, efd, ifd, *powers, it, delta, speed)
+        outputs = {**dict(zip(OUTPUTS, shown, strict=True)), MEASURED: vc1}
         return motion(d, unit.states, {**x, **outputs, **signals})
 
     return System(

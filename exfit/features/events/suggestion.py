@@ -26,14 +26,15 @@ def event_sections(inspection: Inspection, file: str, bases: Mapping[str, Base])
     if not inspection.is_event:
         return {}
     pmu = inspection.pmu
+    level = None if pmu is None else pmu.frequency_level
+    near = (f0 for f0 in RATED_FREQUENCIES if level is not None and abs(level - f0) < NEAR_RATED)
     network = {
-        "f0": Noted(_rated_frequency(pmu), "Hz, rated frequency"),
+        "f0": Noted(next(near, QUESTION), "Hz, rated frequency"),
         "R": Noted(0.0, "pu, from the terminals to the recorded voltage"),
         "X": Noted(0.0, "pu, as of a step-up transformer; 0: recorded at the terminals"),
     }
     kind = Noted("grid-playback", "the recorded voltage and angle drive the unit")
-    driving = _plain_driving(inspection, bases) if pmu is None else _driving(inspection, pmu)
-    channels = {**driving, **_compared(inspection, bases)}
+    channels = {**_driving(inspection, bases), **_compared(inspection, bases)}
     phasors = {} if pmu is None else {"phasors": _phasors(pmu, bases)}
     if pmu is not None and pmu.status is not None:
         phasors["status"] = {"column": pmu.status}
@@ -41,13 +42,6 @@ def event_sections(inspection: Inspection, file: str, bases: Mapping[str, Base])
         "plant": {"type": kind, "network": network},
         "record": record_of(inspection, file, channels, extra=phasors),
     }
-
-
-def _rated_frequency(pmu: PmuContent | None) -> float | str:
-    """Find the rated frequency by the recorded one; to be filled in where it shows none."""
-    level = None if pmu is None else pmu.frequency_level
-    near = (f0 for f0 in RATED_FREQUENCIES if level is not None and abs(level - f0) < NEAR_RATED)
-    return next(near, QUESTION)
 
 
 def _phasors(pmu: PmuContent, bases: Mapping[str, Base]) -> Section:
@@ -80,16 +74,12 @@ def _about(phasor: InspectedPhasor, what: str) -> str:
 
 
 def _phasor(phasor: InspectedPhasor) -> Section:
+    columns = {"magnitude": phasor.magnitudes, "angle": phasor.angles}
     return {
-        "magnitude": _columns(phasor.magnitudes),
-        "angle": _columns(phasor.angles),
+        **{key: names[0] if len(names) == 1 else list(names) for key, names in columns.items()},
         "unit": Noted(phasor.unit or QUESTION, f"{phasor.level:.5g} at rest"),
         "angle_unit": phasor.angle_unit or QUESTION,
     }
-
-
-def _columns(names: tuple[str, ...]) -> str | list[str]:
-    return names[0] if len(names) == 1 else list(names)
 
 
 def _connection(voltage: InspectedPhasor, kv: Base | None) -> Section:
@@ -109,20 +99,11 @@ def _connection(voltage: InspectedPhasor, kv: Base | None) -> Section:
     return {"connection": Noted(text, why)}
 
 
-def _driving(inspection: Inspection, pmu: PmuContent) -> Section:
-    """Suggest the channels that drive the unit, of phasors."""
-    section: Section = {"vt": f"{PHASOR_COLUMNS}vt", "angle": f"{PHASOR_COLUMNS}angle"}
-    if pmu.frequency is not None:
-        named = (each.unit for each in inspection.channels if each.name == pmu.frequency)
-        entry = {"column": pmu.frequency, "unit": next(named, None) or QUESTION}
-        text = f"frequency: {in_braces(entry)}  # drives in place of the angle"
-        section[Remark(text)] = None
-    return section
-
-
-def _plain_driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
-    """Suggest the channels that drive the unit, of columns of their own."""
-    voltage, angle = (inspection.channel_of(signal) for signal in ("vt", "angle"))
+def _driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
+    """Suggest the channels that drive the unit: of phasors, or columns of their own."""
+    if inspection.pmu is not None:
+        return _driving_phasors(inspection, inspection.pmu)
+    voltage, angle, frequency = map(inspection.channel_of, ("vt", "angle", "frequency"))
     section: Section = {}
     if voltage is not None:
         section["vt"] = channel_entry(voltage, bases.get("vt"))
@@ -130,9 +111,18 @@ def _plain_driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section
         unit = angle.unit or unit_by_range(inspection.samples[angle.name]) or QUESTION
         why = "deg or rad" if unit == QUESTION else "by its range" if angle.unit is None else ""
         section["angle"] = Noted({"column": angle.name, "unit": unit}, why)
-    frequency = inspection.channel_of("frequency")
-    if angle is None and frequency is not None:
+    elif frequency is not None:
         section["frequency"] = {"column": frequency.name, "unit": frequency.unit or QUESTION}
+    return section
+
+
+def _driving_phasors(inspection: Inspection, pmu: PmuContent) -> Section:
+    section: Section = {signal: f"{PHASOR_COLUMNS}{signal}" for signal in ("vt", "angle")}
+    if pmu.frequency is not None:
+        units = (each.unit for each in inspection.channels if each.name == pmu.frequency)
+        entry = {"column": pmu.frequency, "unit": next(units, None) or QUESTION}
+        remark = f"frequency: {in_braces(entry)}  # drives in place of the angle"
+        section[Remark(remark)] = None
     return section
 
 
