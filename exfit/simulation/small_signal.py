@@ -118,6 +118,10 @@ class StateSpace:
         """Return the frequency response at frequencies (M,) in Hz."""
         return self.response(np.asarray(2j * pi * frequency, dtype=np.complex128))
 
+    def bode(self, frequency: Array) -> Bode:
+        """Return it with the frequencies."""
+        return Bode(frequency, self.at(frequency))
+
     def broken(self) -> "StateSpace":
         """Return the gain of the loop that feeds y back into u, as a negative feedback has it.
 
@@ -161,12 +165,12 @@ def small_signal(system: System, values: Values, frequency: Array | None = None)
         rates += list(np.linalg.eigvals(loop.A))
     dense = spanning(rates)
     frequencies = dense if frequency is None else np.asarray(frequency, dtype=np.float64)
-    closed = _bode(forward, frequencies)
-    around_peaks = closed if frequencies is dense else _bode(forward, dense)
+    closed = forward.bode(frequencies)
+    around_peaks = closed if frequencies is dense else forward.bode(dense)
     return SmallSignal(
         poles=poles,
         closed=closed,
-        open=None if loop is None else _bode(loop, frequencies),
+        open=None if loop is None else loop.bode(frequencies),
         margins=None if loop is None else margins(loop, dense),
         bandwidth=bandwidth(forward, around_peaks),
         peak=_decibels(float(np.max(np.abs(around_peaks.response)))),
@@ -193,11 +197,11 @@ def linearised(system: System, values: Values) -> LinearSystem:
     system, traced, derived = _traced(system)
     start = at_rest(traced, values)
     seeds = np.eye(len(traced.x) + len(traced.u))
-    moving: list[Node] = [node for node in (*derived.x, *derived.u) if node is not None]
+    driven: list[Node] = [node for node in (*derived.x, *derived.u) if node is not None]
     symbols = {
         **start,
         **dict.fromkeys(derived.r, np.zeros(len(seeds))),
-        **dict(zip(moving, seeds, strict=True)),
+        **dict(zip(driven, seeds, strict=True)),
     }
     derivatives = evaluate([*traced.slopes, *derived.slopes, *derived.outputs], symbols)
 
@@ -205,13 +209,13 @@ def linearised(system: System, values: Values) -> LinearSystem:
         return np.stack([np.broadcast_to(derivatives[node], (len(seeds),)) for node in nodes])
 
     slopes, count = rows(derived.slopes), len(traced.x)
-    _refuse_motion(
-        system,
-        values,
-        x=np.array([float(start[node]) for node in traced.x]),
-        moving=np.array([float(derivatives[node]) for node in traced.slopes]),
-        jacobian=slopes[:, :count],
-    )
+    x = np.array([float(start[node]) for node in traced.x])
+    moving = np.array([float(derivatives[node]) for node in traced.slopes])
+    radius = float(spectral_radii(slopes[None, :, :count])[0])
+    rounding = STATE_ROUNDING * float(np.max(np.abs(x), initial=0.0)) * radius
+    if not (np.isfinite(rounding) and np.all(np.abs(moving) <= REST_TOLERANCE + rounding)):
+        why = limits_passed(system, values) or "the values do not define one"
+        raise SimulationError(f"no state of rest: {why}")
     # the state of a bypassed block, and one held at its limit, stays put
     moves = np.any(slopes != 0.0, axis=1)
     outputs = (*system.outputs, MEASURED)[: len(traced.outputs)]
@@ -227,20 +231,6 @@ def linearised(system: System, values: Values) -> LinearSystem:
     )
 
 
-def _refuse_motion(
-    system: System, values: Values, x: Array, moving: Array, jacobian: Array
-) -> None:
-    """Raise SimulationError where slopes at rest are not zero, but for rounding."""
-    rounding = (
-        STATE_ROUNDING
-        * float(np.max(np.abs(x), initial=0.0))
-        * float(spectral_radii(jacobian[None])[0])
-    )
-    if not (np.isfinite(rounding) and np.all(np.abs(moving) <= REST_TOLERANCE + rounding)):
-        why = limits_passed(system, values) or "the values do not define one"
-        raise SimulationError(f"no state of rest: {why}")
-
-
 def poles_of(linear: LinearSystem) -> tuple[Pole, ...]:
     """Return the modes of a linear system, the slowest first.
 
@@ -252,24 +242,17 @@ def poles_of(linear: LinearSystem) -> tuple[Pole, ...]:
     size = np.max(np.abs(values), initial=0.0)
     values = np.where(np.abs(values.imag) > SPLIT * np.abs(values), values, values.real + 0j)
     taking_part = np.abs(np.linalg.pinv(right).T * right)
-    poles = [
-        _pole(complex(value), taking_part[:, k], linear.states, size)
-        for k, value in enumerate(values)
-        if value.imag >= 0.0
-    ]
+    poles = []
+    for value, own in zip(values.tolist(), taking_part.T, strict=True):
+        if value.imag < 0.0:
+            continue
+        at = value if abs(value) > NO_POLE * size else 0j
+        ranked = np.argsort(-own, kind="stable")[:MOST_STATES]
+        least = TAKES_PART * own[ranked[0]]
+        states = tuple(linear.states[k] for k in ranked if own[k] >= least)
+        damping = -at.real / abs(at) if at else 0.0
+        poles.append(Pole(at, damping, at.imag / (2.0 * pi), states))
     return tuple(sorted(poles, key=lambda pole: abs(pole.value)))
-
-
-def _pole(value: complex, taking_part: Array, states: Sequence[str], size: float) -> Pole:
-    value = value if abs(value) > NO_POLE * size else 0j
-    ranked = np.argsort(-taking_part, kind="stable")[:MOST_STATES]
-    least = TAKES_PART * taking_part[ranked[0]]
-    return Pole(
-        value=value,
-        damping=-value.real / abs(value) if value else 0.0,
-        frequency=value.imag / (2.0 * pi),
-        states=tuple(states[k] for k in ranked if taking_part[k] >= least),
-    )
 
 
 def spanning(rates: Sequence[complex], points: int = POINTS) -> Array:
@@ -286,28 +269,23 @@ def spanning(rates: Sequence[complex], points: int = POINTS) -> Array:
     return np.asarray(distinct(every[every >= low / DECADE]) / (2.0 * pi))
 
 
-def _bode(of: StateSpace, frequency: Array) -> Bode:
-    return Bode(frequency, of.at(frequency))
-
-
 def margins(loop: StateSpace, frequency: Array) -> Margins:
     """Return the smallest margins of a loop gain, all its crossovers between frequencies (Hz)."""
     places = np.linspace(0.0, len(frequency) - 1.0, FINER * (len(frequency) - 1) + 1)
     fine = np.exp(np.interp(places, np.arange(len(frequency)), np.log(frequency)))
     L = loop.at(fine)
-    at_phase = [f for f in _crossings(lambda z: z.imag, loop, fine, L) if _at(loop, f).real < 0.0]
+
+    def at(f: float) -> complex:
+        return complex(loop.at(np.array([f]))[0])
+
+    def smallest(margins_at: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
+        return min(margins_at, key=lambda margin_at: abs(margin_at[0]), default=(None, None))
+
+    at_phase = [f for f in _crossings(lambda z: z.imag, loop, fine, L) if at(f).real < 0.0]
     at_gain = _crossings(lambda z: np.abs(z) - 1.0, loop, fine, L)
-    gain, gain_at = _smallest([(-_decibels(abs(_at(loop, f))), f) for f in at_phase])
-    phase, phase_at = _smallest([(float(np.degrees(np.angle(-_at(loop, f)))), f) for f in at_gain])
+    gain, gain_at = smallest([(-_decibels(abs(at(f))), f) for f in at_phase])
+    phase, phase_at = smallest([(float(np.degrees(np.angle(-at(f)))), f) for f in at_gain])
     return Margins(gain, phase, gain_at, phase_at)
-
-
-def _smallest(margins_at: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
-    return min(margins_at, key=lambda margin_at: abs(margin_at[0]), default=(None, None))
-
-
-def _at(of: StateSpace, frequency: float) -> complex:
-    return complex(of.at(np.array([frequency]))[0])
 
 
 def _crossings(
@@ -337,17 +315,13 @@ def bandwidth(of: StateSpace, at: Bode) -> float | None:
 
     ``at`` is the response at frequencies between which it is looked for.
     """
-    still = _gain_at_rest(of)
+    try:
+        still = abs(float(of.d - of.c @ np.linalg.solve(of.A, of.b)))
+    except np.linalg.LinAlgError:  # an integrator that nothing holds
+        return None
     level = HALF_POWER * still
     crossings = _crossings(lambda z: level - np.abs(z), of, at.frequency, at.response)
     return crossings[0] if crossings and 0.0 < still < inf else None
-
-
-def _gain_at_rest(of: StateSpace) -> float:
-    try:
-        return abs(float(of.d - of.c @ np.linalg.solve(of.A, of.b)))
-    except np.linalg.LinAlgError:  # an integrator that nothing holds
-        return inf
 
 
 def _decibels(gain: float) -> float:

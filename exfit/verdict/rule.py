@@ -1,6 +1,6 @@
 """The verdict on a fit, by one rule, which docs/verdict.md states."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -146,21 +146,17 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
         yield f"typical values matter: {first_of([*evidence.typical_values])}"
     if evidence.averages is not None and evidence.averages.matters:
         yield evidence.averages.reason
-    yield from _not_noise(tests, evidence)
-    if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
-        yield "the search ended before a minimum"
-
-
-def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[str]:
-    def signals(chosen: Iterable[ResidualTests]) -> str:
-        return listed([_label(t.record, t.signal, evidence) or t.signal for t in chosen])
-
     coloured = [test for test in tests if not test.are_white]
     larger = [test for test in tests if test.are_white and not test.are_noise]
-    if coloured:
-        yield f"the residuals of {signals(coloured)} are not noise"
-    if larger:
-        yield f"the residuals of {signals(larger)} exceed the scatter of the record"
+    for chosen, doubt in (
+        (coloured, "are not noise"),
+        (larger, "exceed the scatter of the record"),
+    ):
+        if chosen:
+            signals = [_label(test.record, test.signal, evidence) or test.signal for test in chosen]
+            yield f"the residuals of {listed(signals)} {doubt}"
+    if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
+        yield "the search ended before a minimum"
 
 
 def _undetermined(evidence: Evidence) -> Iterator[Cause]:

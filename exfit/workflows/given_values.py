@@ -34,15 +34,24 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
     Raises CaseError, naming ``place``, for a name that the case does not have, a value that the
     equations exclude, or values that contradict each other.
     """
-    rows = case.rows()
-    faults = [*_wrong_names(case, given, rows), *_outside(rows, given)]
+    rows, faults = case.rows(), list[str]()
+    names = [*rows, *(name for name in case.values() if name not in rows), *_of_records(case)]
+    for name, value in given.items():
+        if name not in names:
+            faults.append(f"{name}: not a parameter; {near(name, names)}")
+        elif name not in rows and (fault := magnitude_fault(value)):
+            faults.append(f"{name}: {fault}")
+    faults += _outside(rows, given)
     if not faults:
         try:
             values = values_of(case, given)
-        except TieError as fault:
-            raise CaseError([f"{place}: {fault}"]) from None
+        except TieError as tied:
+            raise CaseError([f"{place}: {tied}"]) from None
         following = {name: values[name] for name in case.ties.by_name if name not in given}
-        faults = [*_outside(rows, following), *contradictions(case, values)]
+        faults += _outside(rows, following)
+        for part in case.parts.all:  # contradictions among the values of a system
+            own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
+            faults += [f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own)]
     if faults:
         raise CaseError(f"{place}: {fault}" for fault in faults)
     return dict(given)
@@ -71,32 +80,12 @@ def with_given_values(
     return changed
 
 
-def _wrong_names(
-    case: Case, given: Mapping[str, float], rows: Mapping[str, Parameter]
-) -> Iterator[str]:
-    """Yield the names that the case does not have, and values without a sheet that are unusable."""
-    helpers = [name for name in case.values() if name not in rows]
-    names = [*rows, *helpers, *_of_records(case)]
-    for name, value in given.items():
-        if name not in names:
-            yield f"{name}: not a parameter; {near(name, names)}"
-        elif name not in rows and (fault := magnitude_fault(value)):
-            yield f"{name}: {fault}"
-
-
 def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
     """Yield the values that the equations exclude."""
     for name, value in values.items():
         fault = rows[name].range_fault(value) if name in rows else None
         if fault is not None:
             yield f"{name}: {fault}"
-
-
-def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield contradictions among the values of a system."""
-    for part in case.parts.all:
-        own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
-        yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
 
 
 class CodeHashes(NamedTuple):
@@ -139,12 +128,16 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
     of another model.
     """
     content, texts = _content(path)
-    parameters, about = content["parameters"], content.get("records", {})
     if str(content.get("model", case.subject)).upper() != case.subject:
         texts.append(f"model: {content['model']}, but {case.path} has {case.subject}")
-    texts += _no_numbers("parameters", parameters)
-    texts += _no_numbers("records", about)
-    texts += _wrong_sources(content.get("sources", {}))
+    parameters, about = (_mapping(key, content, texts) for key in ("parameters", "records"))
+    for key, section in (("parameters", parameters), ("records", about)):
+        for name, value in section.items():
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                texts.append(f"{key}.{name}: {value!r} is not a number")
+    for name, word in _mapping("sources", content, texts).items():
+        if word not in SOURCES:
+            texts.append(f"sources.{name}: {word!r} is not a source; {near(str(word), SOURCES)}")
     if texts:
         raise CaseError(f"{path}: {text}" for text in texts)
     return taken_over(case, parameters, about, str(path))
@@ -164,38 +157,22 @@ def taken_over(
     """
     names = _of_records(case)
     of_records = {name: value for name, value in about.items() if name in names}
-    return _without_agreeing_ties(case, changed_values(case, {**parameters, **of_records}, place))
-
-
-def _without_agreeing_ties(case: Case, given: Mapping[str, float]) -> dict[str, float]:
-    """Return changes without those of tied parameters that the ties give as well."""
-    others = {name: value for name, value in given.items() if name not in case.ties.by_name}
-    following = values_of(case, others)
-    return {
+    given = changed_values(case, {**parameters, **of_records}, place)
+    following = values_of(case, {n: v for n, v in given.items() if n not in case.ties.by_name})
+    return {  # without those of tied parameters that the ties give as well
         name: value
         for name, value in given.items()
-        if name in others or not isclose(value, following[name])
+        if name not in case.ties.by_name or not isclose(value, following[name])
     }
 
 
-def _no_numbers(key: str, given: Any) -> Iterator[str]:
-    """Yield the values of a section that are no numbers."""
-    if not isinstance(given, dict):
-        yield f"{key}: not a mapping (key: value)"
-        return
-    for name, value in given.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            yield f"{key}.{name}: {value!r} is not a number"
-
-
-def _wrong_sources(given: Any) -> Iterator[str]:
-    """Yield the words that are no source of a value."""
-    if not isinstance(given, dict):
-        yield "sources: not a mapping (key: value)"
-        return
-    for name, word in given.items():
-        if word not in SOURCES:
-            yield f"sources.{name}: {word!r} is not a source; {near(str(word), SOURCES)}"
+def _mapping(key: str, content: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
+    """Return a section of a file, empty where it is no mapping, which is a fault then."""
+    given = content.get(key, {})
+    if isinstance(given, dict):
+        return given
+    faults.append(f"{key}: not a mapping (key: value)")
+    return {}
 
 
 def _of_records(case: Case) -> list[str]:

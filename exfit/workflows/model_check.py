@@ -1,15 +1,13 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
-from exfit.fitting.experiment import Experiment, ExperimentSetup
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
@@ -20,7 +18,6 @@ from exfit.verdict.diagnostics import diagram_notes, search_range_notes
 from exfit.verdict.run_quality import typical_notes, unstable_rest_notes
 from exfit.workflows.responses import FLAT_DRIFT, flat_drift
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
@@ -66,18 +63,24 @@ class Check:
 def check(case: Case, program: Program | None = None) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     of_events = tuple(event_warnings(case))
-    if case.recordings:
-        setups = _ready(case, of_events)
-        experiments = [setup.experiment for setup in setups]
-    else:
-        setups, experiments = (), [planned(case)]
+    try:
+        setups = tuple(
+            setup.with_enough_substeps(setup.with_start_values(case.values()))
+            for setup in (build_experiments(case) if case.recordings else ())
+        )
+    except ExfitError as fault:
+        if not of_events:
+            raise
+        raise ExfitError("\n".join([*of_events, str(fault)])) from fault
+    experiments = [setup.experiment for setup in setups] or [planned(case)]
     free = free_parameters(case, setups)
     names = {parameter.name for parameter in free}
     values = {**{parameter.name: parameter.start for parameter in free}, **case.values()}
     fixed = {name: value for name, value in values.items() if name not in names}
-    drift, error, substeps = 0.0, 0.0, 1
+    drift, error, substeps, of_rest = 0.0, 0.0, 1, list[str]()
     for experiment in experiments:
         simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        of_rest += unstable_rest_notes(simulator, at)
         signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))
         error = max(error, simulator.step_error(at, signals))
@@ -103,31 +106,12 @@ def check(case: Case, program: Program | None = None) -> Check:
             *search_range_notes(case),
             *own_values,
             *(note for setup in setups for note in setup.record.notes),
-            *dict.fromkeys(_rest_notes(experiments, values)),
+            *dict.fromkeys(of_rest),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
         has_equations=not case.has_no_equations,
         from_program=from_program,
     )
-
-
-def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
-    """Return the tests of a case at its values; a fault follows what is wrong with the records."""
-    try:
-        return tuple(
-            setup.with_enough_substeps(setup.with_start_values(case.values()))
-            for setup in build_experiments(case)
-        )
-    except ExfitError as fault:
-        if not warnings:
-            raise
-        raise ExfitError("\n".join([*warnings, str(fault)])) from fault
-
-
-def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[str]:
-    for experiment in experiments:
-        simulator = experiment.with_inputs(values)
-        yield from unstable_rest_notes(simulator, experiment.parameters(values))
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

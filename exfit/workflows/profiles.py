@@ -1,6 +1,6 @@
 """The profile likelihood of a case's parameters: how far each can move if the others follow."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import inf, isinf
 from typing import Any, NamedTuple
@@ -13,9 +13,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.channel_weights import as_fitted
-from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.global_search import SearchResult
-from exfit.fitting.problem import FitProblem, with_setups
+from exfit.fitting.problem import with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
@@ -24,7 +22,6 @@ from exfit.inference.confidence import LEVEL, Interval
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.intervals.determination import (
     FoundMinimum,
-    ProfilesAboutMinima,
     limits_of,
     other_minima,
     profiles_about,
@@ -154,19 +151,30 @@ def profile(
     names = tuple(names)
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
-    state = _searched(case, setups, problem, progress, program)
-    setups, problem, found = state.setups, state.problem, state.found
-    x, records = found.best.x, names_of_records(setups)
+    options = case.estimate.to_the_minimum()
+    start, judged = case.values(), case.validations if options.strategy == "auto" else ()
+    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
+    at = case, setups, unseen, problem, options.strategy, options, program
+    state = in_turn(SEARCH, SearchState(*at, watch=progress))
+    if state.interrupted:
+        raise KeyboardInterrupt
+    setups, problem, best = state.setups, state.problem, state.found.best
+    x, records = best.x, names_of_records(setups)
     uncertainty = uncertainty_at(problem, x, records)
-    verdict = _verdict(case, setups, problem, found, uncertainty)
+    values = problem.residuals.values(x)
+    compared = []
+    for recording, setup in zip(case.recordings, setups, strict=True):
+        fine = setup.with_enough_substeps(values)
+        match = compare_with_record(fine, setup.name, values)
+        compared.append(FittedRecord(recording.test, fine, match))
+    verdict = verdict_alone(Evidence(case, problem.residuals, best, compared, uncertainty))
     by_twin = program is not None and program.has_twin
     if program is not None and by_twin:
-        values = problem.residuals.values(x)
         setups = program.settled(as_fitted(setups, problem), values)
         problem = with_setups(problem, setups)
         uncertainty = uncertainty_at(problem, x, records)
     wanted = _indices(case, problem.residuals, names)
-    residuals, others = problem.compressed, other_minima(found)
+    residuals, others = problem.compressed, other_minima(state.found)
     for further in range(MOST_MINIMA):
         if further:  # the residuals of another minimum, and so the rise, are others
             uncertainty = uncertainty_at(problem, x, records)
@@ -177,6 +185,18 @@ def profile(
             break
         x = profiles.lower
     first = next(iter(profiles.by_index.values()))[0]
+    notes = [f"no parameter has an interval: {verdict.misfit}"] if verdict.misfit else []
+    notes += search_range_notes(case)
+    if not best.success:
+        notes.append(f"the fit did not end at a minimum: {best.message}")
+    if by_twin and profiles.lower is not None:
+        notes.append(LOWER_BY_TWIN)
+    if not np.array_equal(first.x, best.x):
+        notes.append(LOWER)
+    if any(others for _, *others in profiles.by_index.values()):
+        notes.append(ENCLOSED)
+    if program is not None:
+        notes += program.notes(setups, "profiles")
     return Profiles(
         name=case.path.stem,
         cost=first.cost,
@@ -184,32 +204,10 @@ def profile(
             _profile(case, residuals, uncertainty, each, verdict)
             for each in profiles.by_index.values()
         ),
-        notes=(
-            *([f"no parameter has an interval: {verdict.misfit}"] if verdict.misfit else []),
-            *search_range_notes(case),
-            *_notes(found.best, profiles, by_twin),
-            *([] if program is None else program.notes(setups, "profiles")),
-        ),
+        notes=tuple(notes),
         interrupted=profiles.interrupted,
         verdict=verdict,
     )
-
-
-def _verdict(
-    case: Case,
-    setups: Sequence[ExperimentSetup],
-    problem: FitProblem,
-    found: SearchResult,
-    uncertainty: UncertaintyAnalysis | None,
-) -> Verdict:
-    """Judge the fit, without its causes."""
-    values = problem.residuals.values(found.best.x)
-    fine = [setup.with_enough_substeps(values) for setup in setups]
-    records = (
-        FittedRecord(recording.test, setup, compare_with_record(setup, setup.name, values))
-        for recording, setup in zip(case.recordings, fine, strict=True)
-    )
-    return verdict_alone(Evidence(case, problem.residuals, found.best, tuple(records), uncertainty))
 
 
 def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:
@@ -223,36 +221,6 @@ def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str
     if unknown:
         raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
     return {name: free[name] for name in wanted}
-
-
-def _searched(
-    case: Case,
-    setups: tuple[ExperimentSetup, ...],
-    problem: FitProblem,
-    progress: Callable[[estimate.Progress], None],
-    program: Program | None,
-) -> SearchState:
-    """Search a case to its minimum; raises KeyboardInterrupt at an interruption."""
-    options = case.estimate.to_the_minimum()
-    start, judged = case.values(), case.validations if options.strategy == "auto" else ()
-    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
-    at = case, setups, unseen, problem, options.strategy, options, program
-    state = in_turn(SEARCH, SearchState(*at, watch=progress))
-    if state.interrupted:
-        raise KeyboardInterrupt
-    return state
-
-
-def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:
-    """Yield notes on the minimum that the profiles are about, and on others."""
-    if not best.success:
-        yield f"the fit did not end at a minimum: {best.message}"
-    if by_twin and profiles.lower is not None:
-        yield LOWER_BY_TWIN
-    if not np.array_equal(next(iter(profiles.by_index.values()))[0].x, best.x):
-        yield LOWER
-    if any(others for _, *others in profiles.by_index.values()):
-        yield ENCLOSED
 
 
 def _profile(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import RecordFile, Recording, start_value
+from exfit.case.schema import Recording, start_value
 from exfit.dsp.quality import noise_of
 from exfit.dsp.sampling import present_samples
 from exfit.fitting.experiment import ExperimentSetup
@@ -34,45 +34,30 @@ FAR_FROM_FREE_MACHINE = 0.25  # of a level at rest: what data of the machine may
 
 def case_warnings(case: Case) -> Iterator[str]:
     """Warn of steps of no test, and of records that validate nothing, by the case alone."""
-    for recording in (*case.recordings, *case.validations):
-        if case.seen_from(recording).kind.per_unit:
-            yield from _large_steps(recording)
-    for fitted, validation in product(case.recordings, case.validations):
-        yield from _overlap(fitted, validation)
-
-
-def _large_steps(recording: Recording) -> Iterator[str]:
     from exfit.records.contradictions import LARGEST_STEP, size_in_words
 
-    for k, event in enumerate(recording.test.events("vref")):
-        size = start_value(event.step)
-        if size is not None and abs(size) > LARGEST_STEP:
-            yield f"{prefix_from(recording.name)}test.vref[{k}].step: {size_in_words(size)}"
-
-
-def _overlap(fitted: Recording, validation: Recording) -> Iterator[str]:
-    """Warn of a validation that sees samples of a fitted record."""
-    if fitted.record.file != validation.record.file:
-        return
-    (begin, end), (first, last) = _window(fitted.record), _window(validation.record)
-    if max(begin, first) < min(end, last):
-        common = _in_words(max(begin, first), min(end, last))
+    for recording in (*case.recordings, *case.validations):
+        per_unit = case.seen_from(recording).kind.per_unit
+        for k, event in enumerate(recording.test.events("vref") if per_unit else ()):
+            size = start_value(event.step)
+            if size is not None and abs(size) > LARGEST_STEP:
+                yield f"{prefix_from(recording.name)}test.vref[{k}].step: {size_in_words(size)}"
+    for fitted, validation in product(case.recordings, case.validations):
+        (begin, end), (first, last) = (
+            each.record.window or (-inf, inf) for each in (fitted, validation)
+        )
+        begin, end = max(begin, first), min(end, last)
+        if fitted.record.file != validation.record.file or not begin < end:
+            continue
+        common = f"{show(begin)} ... {show(end)} s"
+        if begin == -inf:
+            common = "the whole" if end == inf else f"what is before {show(end)} s"
+        elif end == inf:
+            common = f"what is after {show(begin)} s"
         yield (
             f"validate {validation.name}: {common} of {validation.record.file} is fitted as well, "
             "and validates nothing: give both a window, [start, end] in s, that do not overlap"
         )
-
-
-def _window(record: RecordFile) -> tuple[float, float]:
-    return record.window or (-inf, inf)
-
-
-def _in_words(begin: float, end: float) -> str:
-    if begin == -inf and end == inf:
-        return "the whole"
-    if end == inf:
-        return f"what is after {show(begin)} s"
-    return f"what is before {show(end)} s" if begin == -inf else f"{show(begin)} ... {show(end)} s"
 
 
 def causes_before_fit(case: Case, recording: Recording) -> Iterator[Cause]:
@@ -118,7 +103,11 @@ def _beside_response(
 ) -> Iterator[str]:
     """Warn of channels that rest or move unlike the response, or are not at rest."""
     comparison = compare_with_record(setup, setup.name, values)
-    given = _not_rescaled(setup, comparison.overlays)
+    given = {
+        signal: overlay
+        for signal, overlay in comparison.overlays.items()
+        if not any(each.rescales(signal) for each in setup.experiment.nuisances)  # left to the fit
+    }
     before = comparison.time < steady
     against = {name: text for name, y in given.items() if (text := _against(name, y, before))}
     # where vt goes the other way, the step has the other sign, and all follow it
@@ -130,17 +119,6 @@ def _beside_response(
         *unsteady_signals(setup.record, steady, setup.channels),
     ):
         yield f"{cause.cause}: {cause.remedy}"
-
-
-def _not_rescaled(setup: ExperimentSetup, overlays: Mapping[str, Overlay]) -> dict[str, Overlay]:
-    """Return the signals whose scale and offset are not left to the fit."""
-    rescaled = {
-        channel.signal
-        for channel in setup.channels
-        for nuisance in setup.experiment.nuisances
-        if nuisance.rescales(channel.signal)
-    }
-    return {name: overlay for name, overlay in overlays.items() if name not in rescaled}
 
 
 def _against(signal: str, overlay: Overlay, before: Mask) -> str:
