@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.results.comparisons import Comparison
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.results.comparisons import Comparison, PlayedRecord
 from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported, ValidationResult
 
@@ -32,15 +33,18 @@ def contradictions(result: FitResult) -> Iterator[str]:
     ):
         yield "typical_values: what they move are not the parameters of the fit"
     if result.knowledge is not None:
-        confidence = result.knowledge.confidence
-        count = len(confidence.names)
-        if confidence.correlation.matrix.shape != (count, count):
-            yield "knowledge: confidence.correlation: not one row and column for each parameter"
-        for channel in result.knowledge.sensitivity:
-            if any(line.shape != channel.time.shape for line in channel.moved.values()):
-                yield f"knowledge: sensitivity: {channel.label}: {UNEVEN}"
-            if not _increases(channel.time):
-                yield f"knowledge: sensitivity: {channel.label}: time: does not increase"
+        yield from (f"knowledge: {text}" for text in _of_knowledge(result.knowledge))
+
+
+def _of_knowledge(knowledge: UncertaintyAnalysis) -> Iterator[str]:
+    count = len(knowledge.confidence.names)
+    if knowledge.confidence.correlation.matrix.shape != (count, count):
+        yield "confidence.correlation: not one row and column for each parameter"
+    for channel in knowledge.sensitivity:
+        if any(line.shape != channel.time.shape for line in channel.moved.values()):
+            yield f"sensitivity: {channel.label}: {UNEVEN}"
+        if not _increases(channel.time):
+            yield f"sensitivity: {channel.label}: time: does not increase"
 
 
 def validation_contradictions(result: ValidationResult) -> Iterator[str]:
@@ -77,14 +81,7 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
         if any(line is not None and line.shape != match.time.shape for line in lines):
             yield f"overlays: {signal}: {UNEVEN}"
     if match.played is not None:
-        for signal, driving in match.played.driving.items():
-            if driving.samples.shape != match.time.shape:
-                yield f"played: {signal}: {UNEVEN}"
-        for signal, left_out in match.played.left_out.items():
-            if not left_out.measured.shape == left_out.simulated.shape == match.time.shape:
-                yield f"played: left_out: {signal}: {UNEVEN}"
-        if not match.played.errors.keys() <= match.channels.keys():
-            yield "played: its errors are not those of the channels"
+        yield from (f"played: {text}" for text in _of_played(match.played, match))
     responses = match.iteration_responses
     if responses is not None:
         shape = (len(responses.numbers), len(responses.time))
@@ -92,6 +89,17 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
             yield f"iteration_responses: {UNEVEN}"
         if not _increases(responses.time):
             yield "iteration_responses: time: does not increase"
+
+
+def _of_played(played: PlayedRecord, match: Comparison) -> Iterator[str]:
+    for signal, driving in played.driving.items():
+        if driving.samples.shape != match.time.shape:
+            yield f"{signal}: {UNEVEN}"
+    for signal, left_out in played.left_out.items():
+        if not left_out.measured.shape == left_out.simulated.shape == match.time.shape:
+            yield f"left_out: {signal}: {UNEVEN}"
+    if not played.errors.keys() <= match.channels.keys():
+        yield "its errors are not those of the channels"
 
 
 def _increases(time: Array) -> bool:

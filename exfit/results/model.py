@@ -3,7 +3,7 @@
 The classes describe result.json, too: `results.io` writes and reads it by their annotations.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, nan
 from pathlib import Path
@@ -195,30 +195,34 @@ class Minima:
     def summary(self, cost: float) -> str:
         """Say from where the search went, and where its descents led; ``cost`` is the result's."""
         further = self.starts - max(1, self.ways.count("strategy"))
-        others = [minimum for minimum in self.minima if minimum.cost != cost]
         here = sum(minimum.starts for minimum in self.minima if minimum.cost == cost)
-        along = sum(minimum.starts for minimum in others if minimum.valley == 0)
-        refuted = [minimum for minimum in others if minimum.refuted]
         unfinished = int(np.count_nonzero(np.isnan(self.end_costs))) - self.failed
         ends = [f"{here} of {self.starts} descents lead to this {'minimum' if here else 'point'}"]
-        if along:
-            ends.append(f"{along} to others in its flat valley")
-        for minimum in others:
-            if minimum.valley != 0 and not minimum.refuted:
-                verdict = "" if minimum.refuted is None else " (not refuted)"
-                ends.append(f"{minimum.starts} to one {minimum.height(cost)}{verdict}")
-        if len(refuted) == 1:
-            ends.append(f"{refuted[0].starts} to one {refuted[0].height(cost)} (refuted)")
-        elif refuted:
-            descents = sum(minimum.starts for minimum in refuted)
-            height = f"{refuted[0].height(cost)} or more"
-            ends.append(f"{descents} to {len(refuted)} others, {height} (refuted)")
+        ends += self._elsewhere(cost)
         if self.failed:
             ends.append(f"{self.failed} to none: no response")
         if unfinished > 0:
             ends.append(f"{unfinished} not done")
         starts = "1 further start" if further == 1 else f"{further} further starts"
         return f"from the start of the case and {starts}: {', '.join(ends)}"
+
+    def _elsewhere(self, cost: float) -> Iterator[str]:
+        """Yield the counts of descents to other minima: in the valley, open ones, refuted ones."""
+        others = [minimum for minimum in self.minima if minimum.cost != cost]
+        along = sum(minimum.starts for minimum in others if minimum.valley == 0)
+        if along:
+            yield f"{along} to others in its flat valley"
+        for minimum in others:
+            if minimum.valley != 0 and not minimum.refuted:
+                verdict = "" if minimum.refuted is None else " (not refuted)"
+                yield f"{minimum.starts} to one {minimum.height(cost)}{verdict}"
+        refuted = [minimum for minimum in others if minimum.refuted]
+        if len(refuted) == 1:
+            yield f"{refuted[0].starts} to one {refuted[0].height(cost)} (refuted)"
+        elif refuted:
+            descents = sum(minimum.starts for minimum in refuted)
+            height = f"{refuted[0].height(cost)} or more"
+            yield f"{descents} to {len(refuted)} others, {height} (refuted)"
 
 
 @dataclass(frozen=True, repr=False, eq=False)

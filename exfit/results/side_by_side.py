@@ -81,8 +81,9 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
     rows = []
     for k, (run, (case, fit)) in enumerate(results.items()):
         errors = {match.name: _number(match.rmse) for match in fit.validation}
-        own = {name: column[k] for name, column in parameters.items()}
-        known = {name: value for name, value in own.items() if value is not None}
+        known = {name: value for name, each in parameters.items() if (value := each[k]) is not None}
+        on_bounds = [name for name, value in known.items() if value.at_bound]
+        unresolved = [name for name, value in known.items() if not value.resolved]
         rows.append(
             {
                 "run": run,
@@ -101,10 +102,10 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
                 "simulations": f"{fit.simulations}",
                 "seconds": f"{fit.seconds:.3f}",
                 **{f"rmse {name}": errors.get(name, "") for name in validations},
-                **dict.fromkeys(own, ""),
+                **dict.fromkeys(parameters, ""),
                 **{name: _number(value.value) for name, value in known.items()},
-                "at_bound": " ".join(name for name, value in known.items() if value.at_bound),
-                "unresolved": " ".join(name for name, value in known.items() if not value.resolved),
+                "at_bound": " ".join(on_bounds),
+                "unresolved": " ".join(unresolved),
             }
         )
     out = io.StringIO()

@@ -159,14 +159,18 @@ def show(console: Console, blocks: Iterable[Block]) -> None:
             case Note(label=""):
                 paragraph(console, block.text, STYLES[block.mark], INDENT * block.indent)
             case Note():
-                label = " " * INDENT * block.indent + block.label
-                indent = len(label) + 1 if len(label) < DEEPEST_INDENT else INDENT
-                line = f"{label.replace(' ', NO_BREAK)} {block.text}"
-                sentence = Text(wrapped(console, line, indent))
-                sentence.stylize(STYLES[block.mark], 0, len(label))
-                console.print(sentence, soft_wrap=True)
+                _labelled(console, block)
             case Verbatim(text):
                 console.print(Text(text), soft_wrap=True)
+
+
+def _labelled(console: Console, note: Note) -> None:
+    label = " " * INDENT * note.indent + note.label
+    indent = len(label) + 1 if len(label) < DEEPEST_INDENT else INDENT
+    line = f"{label.replace(' ', NO_BREAK)} {note.text}"
+    sentence = Text(wrapped(console, line, indent))
+    sentence.stylize(STYLES[note.mark], 0, len(label))
+    console.print(sentence, soft_wrap=True)
 
 
 def show_shortest(console: Console, versions: Iterable[Sequence[Block]]) -> None:

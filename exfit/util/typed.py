@@ -60,15 +60,7 @@ def is_named_values(kind: Any) -> bool:
 def plain(content: Any, whole: bool = False) -> Any:
     """Return the plain data of a data class and of all in it; ``whole``: what is stored, too."""
     if has_entries(content):
-        kind: Any = type(content)
-        data = {}
-        for entry in entries(kind):
-            if whole or not entry.stored:
-                value = getattr(content, entry.name)
-                value = dict(value) if is_named_values(entry.kind) else value
-                data[entry.key] = plain(value, whole)
-        derived: Mapping[str, str] = getattr(content, "DERIVED", {})
-        return data | {key: plain(getattr(content, name)) for key, name in derived.items()}
+        return _plain_entries(content, whole)
     if isinstance(content, Mapping):
         return {key: plain(value, whole) for key, value in content.items()}
     if isinstance(content, list | tuple):
@@ -80,6 +72,17 @@ def plain(content: Any, whole: bool = False) -> Any:
     if isinstance(content, Path):
         return str(content)
     return None if isinstance(content, float) and not isfinite(content) else content
+
+
+def _plain_entries(content: Any, whole: bool) -> dict[str, Any]:
+    kind: Any = type(content)
+    data = {}
+    for entry in entries(kind):
+        if whole or not entry.stored:
+            value = getattr(content, entry.name)
+            data[entry.key] = plain(dict(value) if is_named_values(entry.kind) else value, whole)
+    derived: Mapping[str, str] = getattr(content, "DERIVED", {})
+    return data | {key: plain(getattr(content, name)) for key, name in derived.items()}
 
 
 def _plain_array(samples: Any) -> Any:

@@ -49,23 +49,32 @@ def read(kind: Any, data: Any, place: Place = ()) -> Any:
         content, each = _of_type(dict, data, place), get_args(args[0])[1]
         return tuple((key, read(each, value, (*place, key))) for key, value in content.items())
     if origin is tuple:
-        items = _of_type(list, data, place)
-        kinds = (args[0],) * len(items) if args[1:] == (...,) else args
-        if len(kinds) != len(items):
-            raise FormError.at(place, f"{len(items)} values, not {len(kinds)}")
-        pairs = enumerate(zip(kinds, items, strict=True))
-        return tuple(read(each, value, (*place, k)) for k, (each, value) in pairs)
+        return _tuple(args, data, place)
     if isinstance(origin, type) and issubclass(origin, Mapping):
         content = _of_type(dict, data, place)
         return {key: read(args[1], value, (*place, key)) for key, value in content.items()}
     if has_entries(kind):
-        content, values = _of_type(dict, data, place), {}
-        for entry in entries(kind):
-            if entry.key not in content:
-                raise FormError.at((*place, entry.key), "missing")
-            values[entry.name] = read(entry.kind, content[entry.key], (*place, entry.key))
-        return kind(**values)
+        return _entries(kind, data, place)
     return _scalar(kind, data, place)
+
+
+def _tuple(kinds: tuple[Any, ...], data: Any, place: Place) -> tuple[Any, ...]:
+    items = _of_type(list, data, place)
+    if kinds[1:] == (...,):
+        kinds = (kinds[0],) * len(items)
+    if len(kinds) != len(items):
+        raise FormError.at(place, f"{len(items)} values, not {len(kinds)}")
+    pairs = enumerate(zip(kinds, items, strict=True))
+    return tuple(read(kind, value, (*place, k)) for k, (kind, value) in pairs)
+
+
+def _entries(kind: Any, data: Any, place: Place) -> Any:
+    content, values = _of_type(dict, data, place), {}
+    for entry in entries(kind):
+        if entry.key not in content:
+            raise FormError.at((*place, entry.key), "missing")
+        values[entry.name] = read(entry.kind, content[entry.key], (*place, entry.key))
+    return kind(**values)
 
 
 def _one_of(kinds: tuple[Any, ...], data: Any, place: Place) -> Any:

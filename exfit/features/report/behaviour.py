@@ -33,7 +33,7 @@ from exfit.show.blocks import (
     columns,
     row,
 )
-from exfit.simulation.small_signal import Bode
+from exfit.simulation.small_signal import Bode, Margins, Pole, SmallSignal
 
 NOT_HELD = "not stated: the fit was interrupted"
 RESTING = 1e-9  # 1/s: a pole within it is at zero but for rounding
@@ -80,13 +80,11 @@ def _damping(views: tuple[SmallSignalView, ...]) -> tuple[bool | None, str]:
     """Check that all modes of all tests decay, and find the least damped."""
     ratios, growing = [], []
     for each in views:
-        if each.view is not None and each.view.poles:
-            poles, tests = each.view.poles, ", ".join(each.tests)
-            if each.view.path[1] != "vt":  # what integrates a recorded voltage stays where it is
-                poles = tuple(pole for pole in poles if abs(pole.value) > RESTING) or poles
-            ratios.append((min(pole.damping for pole in poles), tests))
-            if not all(pole.value.real < 0.0 for pole in poles):
-                growing.append(tests)
+        poles = _moving_poles(each)
+        if poles:
+            ratios.append((min(pole.damping for pole in poles), ", ".join(each.tests)))
+            if max(pole.value.real for pole in poles) >= 0.0:
+                growing.append(", ".join(each.tests))
     if growing:
         return False, f"a mode does not decay in {', '.join(growing)}"
     if not ratios:
@@ -96,6 +94,14 @@ def _damping(views: tuple[SmallSignalView, ...]) -> tuple[bool | None, str]:
     if ratio >= 1.0:
         return True, "all modes decay, none oscillates"
     return True, f"all modes decay; the least damping ratio is {ratio:.3f}, in {tests}"
+
+
+def _moving_poles(of_tests: SmallSignalView) -> tuple[Pole, ...]:
+    """Return the poles but for what integrates a recorded voltage, which stays where it is."""
+    view = of_tests.view
+    if view is None or view.path[1] == "vt":
+        return () if view is None else view.poles
+    return tuple(pole for pole in view.poles if abs(pole.value) > RESTING) or view.poles
 
 
 def usability_table(result: Reported) -> Iterator[Block]:
@@ -131,19 +137,11 @@ def _near_rest(key: str, of_tests: SmallSignalView) -> Iterator[Block]:
         return
     source, output = view.path
     closed = output == "vt"  # of a record that is played in there is no closed loop
+    gains, phases = _margins(view.margins)
     gain = phase = "no voltage loop"
-    gains, phases = list[Rule](), list[Rule]()
-    if view.margins is not None:
-        margin, at = view.margins.gain, view.margins.gain_at
-        if margin is not None and at is not None:
-            gains.append(Rule(at, f"gain margin {margin:.1f} dB at {at:.3g} Hz", upright=True))
-        if closed:
-            gain = "no crossover" if margin is None else f"{margin:.2f} dB at {number(at, 4)} Hz"
-        margin, at = view.margins.phase, view.margins.phase_at
-        if margin is not None and at is not None:
-            phases.append(Rule(at, f"phase margin {margin:.1f}° at {at:.3g} Hz", upright=True))
-        if closed:
-            phase = "no crossover" if margin is None else f"{margin:.2f}° at {number(at, 4)} Hz"
+    if closed and view.margins is not None:
+        gain = _margin(view.margins.gain, view.margins.gain_at, " dB")
+        phase = _margin(view.margins.phase, view.margins.phase_at, "°")
     width = "none" if view.bandwidth is None else f"{number(view.bandwidth, 4)} Hz"
     response = "closed loop" if closed else f"response from {source} to {output}"
     yield Heading(tests, 2)
@@ -155,23 +153,7 @@ def _near_rest(key: str, of_tests: SmallSignalView) -> Iterator[Block]:
             (f"peak of the {response}", f"{view.peak:.2f} dB"),
         )
     )
-    numbers = ("real part (1/s)", "imaginary part (1/s)", "damping ratio", "frequency (Hz)")
-    poles = (
-        row(
-            number(pole.value.real),
-            f"± {number(abs(pole.value.imag))}" if pole.value.imag else "0",
-            f"{pole.damping:.3f}",
-            number(pole.frequency, 4) if pole.frequency else DASH,
-            ", ".join(pole.states),
-        )
-        for pole in view.poles
-    )
-    yield Table(
-        (*columns(*numbers, numbers=numbers), TableColumn("states that take part", folds=True)),
-        tuple(poles),
-        f"Poles{' of the closed loop' if closed else ''}, {tests}",
-        leading=0,
-    )
+    yield _poles(view, f"Poles{' of the closed loop' if closed else ''}, {tests}")
     if view.open is not None and np.any(view.open.response):  # nothing passes: no gain to draw
         crossovers = " and ".join(rule.label for rule in (*gains, *phases))
         text = (
@@ -189,6 +171,39 @@ def _near_rest(key: str, of_tests: SmallSignalView) -> Iterator[Block]:
         f"bandwidth {width}."
     )
     yield _bode(f"{key}-closed", title, text, view.closed, ((LEVEL,), ()))
+
+
+def _poles(view: SmallSignal, title: str) -> Table:
+    numbers = ("real part (1/s)", "imaginary part (1/s)", "damping ratio", "frequency (Hz)")
+    rows = (
+        row(
+            number(pole.value.real),
+            f"± {number(abs(pole.value.imag))}" if pole.value.imag else "0",
+            f"{pole.damping:.3f}",
+            number(pole.frequency, 4) if pole.frequency else DASH,
+            ", ".join(pole.states),
+        )
+        for pole in view.poles
+    )
+    heads = (*columns(*numbers, numbers=numbers), TableColumn("states that take part", folds=True))
+    return Table(heads, tuple(rows), title, leading=0)
+
+
+def _margin(margin: float | None, at: float | None, unit: str) -> str:
+    return "no crossover" if margin is None else f"{margin:.2f}{unit} at {number(at, 4)} Hz"
+
+
+def _margins(margins: Margins | None) -> tuple[tuple[Rule, ...], tuple[Rule, ...]]:
+    """Mark the gain margin and the phase margin, each at its frequency, where there is one."""
+    gains: tuple[Rule, ...] = ()
+    phases: tuple[Rule, ...] = ()
+    if margins is not None and margins.gain is not None and margins.gain_at is not None:
+        text = f"gain margin {margins.gain:.1f} dB at {margins.gain_at:.3g} Hz"
+        gains = (Rule(margins.gain_at, text, upright=True),)
+    if margins is not None and margins.phase is not None and margins.phase_at is not None:
+        text = f"phase margin {margins.phase:.1f}° at {margins.phase_at:.3g} Hz"
+        phases = (Rule(margins.phase_at, text, upright=True),)
+    return gains, phases
 
 
 def _bode(

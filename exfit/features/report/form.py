@@ -118,28 +118,12 @@ def form_table(rows: Sequence[FormRow]) -> Iterator[Block]:
 
 def form(result: Reported) -> tuple[FormRow, ...]:
     """Return the rows of the form for a fit (cf. NERC MOD-026-1 R2.1 and R6)."""
-    every, unit = (*result.comparisons, *result.validation), result.as_found
-    fitted = ", ".join(match.name for match in result.comparisons)
-    unseen = ", ".join(match.name for match in result.validation)
-    events = [match for match in every if match.is_event and match.played is not None]
-    responses = f"fitted: {fitted}; " if fitted else "nothing fitted; "
-    responses += f"validated on: {unseen}" if unseen else "no validation"
-    if events:
-        names = ", ".join(match.name for match in events)
-        responses += f"; measured system disturbances, played in: {names}"
-    excursions = []
-    for match in events:
-        texts = (
-            f"{name} {signal.excursion.text(signal.unit)}"
-            for name, signal in (match.played.driving.items() if match.played else ())
-            if signal.excursion is not None
-        )
-        excursions.append(f"{match.name}: {', '.join(texts)}")
+    unit = result.as_found
     before = NOT_STATED if unit is None else f"{unit.model}, {unit.source}"
     if isinstance(result, FitResult) and (unit is None or not unit.is_stated):
         before = f"{NOT_STATED}; the start values of the fit are shown"
     answers = FormAnswers(
-        responses=f"{responses}; {judged_by_criteria(result).sentence}",
+        responses=_responses(result),
         parts=result.parts,
         machine=result.values_of("machine."),
         source_of=result.source_of,
@@ -147,7 +131,7 @@ def form(result: Reported) -> tuple[FormRow, ...]:
         before=before,
         compensation=_compensation(result),
         usable=usability(result),
-        excursions="; ".join(excursions),
+        excursions="; ".join(_excursions(result)),
     )
     if answers.part("exciter") is not None:
         own = [name for name in result.values if "." not in name and name not in result.of_records]
@@ -162,6 +146,32 @@ def form(result: Reported) -> tuple[FormRow, ...]:
         each._replace(section="validation" if each.section == "fit" else each.section)
         for each in rows
     )
+
+
+def _responses(result: Reported) -> str:
+    fitted = ", ".join(match.name for match in result.comparisons)
+    unseen = ", ".join(match.name for match in result.validation)
+    every = (*result.comparisons, *result.validation)
+    events = ", ".join(match.name for match in every if match.is_event)
+    texts = (
+        f"fitted: {fitted}" if fitted else "nothing fitted",
+        f"validated on: {unseen}" if unseen else "no validation",
+        f"measured system disturbances, played in: {events}" if events else "",
+        judged_by_criteria(result).sentence,
+    )
+    return "; ".join(filter(None, texts))
+
+
+def _excursions(result: Reported) -> Iterator[str]:
+    """Yield the departures of voltage and frequency from rest in each grid event."""
+    for match in (*result.comparisons, *result.validation):
+        if match.played is not None and match.is_event:
+            texts = (
+                f"{name} {signal.excursion.text(signal.unit)}"
+                for name, signal in match.played.driving.items()
+                if signal.excursion is not None
+            )
+            yield f"{match.name}: {', '.join(texts)}"
 
 
 def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
@@ -185,15 +195,48 @@ def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
 
 
 def _rows(about: facts.Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
-    exciter, stabiliser = answers.part("exciter"), stated(about, facts.STABILISER)
-    kind = stated(about, facts.TYPE)
-    if kind is None and exciter is not None and (family := family_of(exciter.name)) is not None:
-        kind = f"{TYPES[family]}, by its model {exciter.name}"
-    if answers.part("stabiliser") is not None:
-        model = answers.model("stabiliser", "")
-        stabiliser = f"{model}; {stabiliser}" if stabiliser else model
+    stabiliser = answers.model("stabiliser", "")
+    stabiliser = "; ".join(filter(None, (stabiliser, stated(about, facts.STABILISER))))
     unknown = f"{NOT_STATED} whether the unit has one; none in the model"
-    generator = []
+    usable = (
+        (name, text if passed is None else f"{'passed' if passed else 'FAILED'}: {text}")
+        for name, passed, text in answers.usable
+    )
+    ambient = {f"{key.key}{f' ({words})' if words else ''}": key for key, words in AMBIENT.items()}
+    kind, machine = _excitation_type(about, answers), answers.model("machine", NOT_STATED)
+    return (
+        *(_fact(about, "", fact, "test") for fact in (facts.PLANT, facts.UNIT)),
+        FormRow("", facts.RATED.key, rated(about), "test"),
+        FormRow("R2.1.1", "Model response beside a recorded response", answers.responses, "fit"),
+        _fact(about, "R2.1.2", facts.MAKER),
+        _fact(about, "R2.1.2", facts.MODEL),
+        FormRow("R2.1.2", "Excitation type", kind, "model"),
+        FormRow("R2.1.3", "Generator model", machine, "model"),
+        *_generator(answers),
+        FormRow("R2.1.4", "Excitation model and data", answers.excitation, "parameters"),
+        _fact(about, "R2.1.4", facts.REGULATOR),
+        FormRow("R2.1.4", "Model in the planner's base", answers.before, "as-found"),
+        FormRow("R2.1.5", "Compensation (droop, line drop)", answers.compensation),
+        FormRow("R2.1.6", "Stabiliser", stabiliser or unknown, "parameters"),
+        *_governor(answers),
+        *(FormRow("R6", name, text, "flat") for name, text in usable),
+        *(_fact(about, "", fact, "test") for fact in TESTS),
+        *(FormRow("", asked, answer(about, key), "test") for asked, key in ambient.items()),
+        *(_fact(about, "", fact, "signatures") for fact in REPORT),
+    )
+
+
+def _excitation_type(about: facts.Facts, answers: FormAnswers) -> str:
+    """Return the type of the excitation system, as stated or as its model is."""
+    given, exciter = stated(about, facts.TYPE), answers.part("exciter")
+    family = None if exciter is None else family_of(exciter.name)
+    if given is not None or exciter is None or family is None:
+        return given or NOT_STATED
+    return f"{TYPES[family]}, by its model {exciter.name}"
+
+
+def _generator(answers: FormAnswers) -> Iterator[FormRow]:
+    """Yield the rows of each kind of data of the generator, with their sources."""
     for letter, asked in MACHINE_DATA.items():
         symbols = [symbol for symbol in answers.machine if symbol.startswith(letter)]
         sources = {symbol: answers.source_of(f"machine.{symbol}") for symbol in symbols}
@@ -203,43 +246,16 @@ def _rows(about: facts.Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
             for word, group in by_source(symbols, sources).items()
         )
         data = "; ".join(texts) or f"{NOT_STATED}: the model has none"
-        generator.append(FormRow("R2.1.3", asked, data, "parameters"))
-    governor = []
+        yield FormRow("R2.1.3", asked, data, "parameters")
+
+
+def _governor(answers: FormAnswers) -> Iterator[FormRow]:
+    """Yield the rows on a governor where a grid event was played in, or the unit has one."""
     if answers.excursions or answers.part("governor") is not None:
-        asked, model = (
-            "Turbine governor and load control",
-            answers.model("governor", CONSTANT_POWER),
-        )
-        governor.append(FormRow("MOD-027-1 R2", asked, model, "parameters"))
+        model = answers.model("governor", CONSTANT_POWER)
+        yield FormRow("MOD-027-1 R2", "Turbine governor and load control", model, "parameters")
     if answers.excursions:
-        asked = "Recorded disturbances, from rest"
-        governor.append(FormRow("", asked, answers.excursions, "fit"))
-    usable = (
-        (name, text if passed is None else f"{'passed' if passed else 'FAILED'}: {text}")
-        for name, passed, text in answers.usable
-    )
-    ambient = {f"{key.key}{f' ({words})' if words else ''}": key for key, words in AMBIENT.items()}
-    machine = answers.model("machine", NOT_STATED)
-    return (
-        *(_fact(about, "", fact, "test") for fact in (facts.PLANT, facts.UNIT)),
-        FormRow("", facts.RATED.key, rated(about), "test"),
-        FormRow("R2.1.1", "Model response beside a recorded response", answers.responses, "fit"),
-        _fact(about, "R2.1.2", facts.MAKER),
-        _fact(about, "R2.1.2", facts.MODEL),
-        FormRow("R2.1.2", "Excitation type", kind or NOT_STATED, "model"),
-        FormRow("R2.1.3", "Generator model", machine, "model"),
-        *generator,
-        FormRow("R2.1.4", "Excitation model and data", answers.excitation, "parameters"),
-        _fact(about, "R2.1.4", facts.REGULATOR),
-        FormRow("R2.1.4", "Model in the planner's base", answers.before, "as-found"),
-        FormRow("R2.1.5", "Compensation (droop, line drop)", answers.compensation),
-        FormRow("R2.1.6", "Stabiliser", stabiliser or unknown, "parameters"),
-        *governor,
-        *(FormRow("R6", name, text, "flat") for name, text in usable),
-        *(_fact(about, "", fact, "test") for fact in TESTS),
-        *(FormRow("", asked, answer(about, key), "test") for asked, key in ambient.items()),
-        *(_fact(about, "", fact, "signatures") for fact in REPORT),
-    )
+        yield FormRow("", "Recorded disturbances, from rest", answers.excursions, "fit")
 
 
 def _fact(about: facts.Facts, cf: str, fact: AskedFact, section: str = "") -> FormRow:

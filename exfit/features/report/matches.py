@@ -28,7 +28,6 @@ from exfit.show.blocks import (
     Range,
     Series,
     Table,
-    TableColumn,
     columns,
     row,
 )
@@ -139,11 +138,9 @@ def _features(match: Comparison) -> Iterator[Block]:
         return
     rows = []
     for label, name, unit in LABELS:
-        both = [getattr(features, name, None) for features in (measured, simulated)]
-        known = [value for value in both if value is not None and np.isfinite(value)]
-        difference = DASH
-        if len(known) > 1:
-            difference = number(round(known[1] - known[0], 9) + 0.0, 2)
+        pair = (getattr(measured, name, None), getattr(simulated, name, None))
+        known = [value for value in pair if value is not None and np.isfinite(value)]
+        difference = number(round(known[1] - known[0], 9) + 0.0, 2) if len(known) > 1 else DASH
         cells = (DASH if cell == "-" else cell for cell in match.features.cells(name))
         rows.append(row(label, *cells, difference, unit))
     numbers = ("measured", "±", "simulated", "difference")
@@ -292,10 +289,17 @@ def as_found(result: Reported) -> Iterator[Block]:
     if unit.why:
         which = "as found" if unit.is_stated else "at the start"
         yield Note(f"The model {which} has no response: {unit.why}.", mark="faint")
+    yield from _responses_before(result, unit.comparisons, before, now)
+
+
+def _responses_before(
+    result: Reported, found: Sequence[Comparison], before: str, now: str
+) -> Iterator[Block]:
+    """Yield the errors and the responses of the model as ``found`` and ``now``."""
     every = (*result.comparisons, *result.validation)
     pairs = [
         (k, signal, old, new)
-        for k, (old, new) in enumerate(zip(unit.comparisons, every, strict=False))
+        for k, (old, new) in enumerate(zip(found, every, strict=False))
         for signal in new.judging
         if signal in old.channels
     ]
@@ -376,48 +380,51 @@ def _before_and_now(key: str, signal: str, before: Comparison, now: Comparison, 
 def against(result: FitResult, other: FitResult) -> Iterator[Block]:
     """Yield a fit beside another one: what each comes to, their parameters, their responses."""
     pair = (result, other)
-    this, older = (
-        ", ".join(
-            text if fact is PLANT else f"{fact.key.lower()} {text}"
-            for fact in (PLANT, UNIT, REVISION)
-            if (text := stated(fit.about, fact)) is not None
-        )
-        or fit.name
-        for fit in pair
-    )
+    this, older = map(_name, pair)
     if this == older:
         this, older = f"{this} (this report)", f"{older} (the other)"
     matches = [{m.name: m for m in (*fit.comparisons, *fit.validation)} for fit in pair]
     facts = [
         row("case", *(str(fit.case) for fit in pair)),
         row("model", *(fit.model for fit in pair)),
-        row("verdict", *(outcome_of(fit) for fit in pair)),
+        row("verdict", *map(outcome_of, pair)),
         row("criteria", *(judged_by_criteria(fit).sentence for fit in pair)),
     ]
-    for name in dict.fromkeys(name for own in matches for name in own):
+    for name in matches[0] | matches[1]:
         errors = (_error(own.get(name)) for own in matches)
         facts.append(row(f"rmse of {name} (pu)", *errors))
     yield Table(columns("fact", this, older), tuple(facts), f"Facts of {this} and {older}")
-    units = {name: each.unit for fit in (other, result) for name, each in fit.parameters.items()}
-    heads = (
-        *columns("parameter", this, older, "difference", numbers=(this, older, "difference")),
-        TableColumn("unit"),
-    )
-    rows = []
-    for name, (one, two) in parameters_beside(pair).items():
-        difference = None if one is None or two is None else one.value - two.value
-        cells = (_value(one), _value(two), number(difference, 3), units[name])
-        rows.append(row(name, *cells))
-    yield Table(heads, tuple(rows), "Fitted parameters of either fit", style="parameters")
-    charts = [
-        _two_fits(f"against-{k}", match, matches[1][name], this, older)
-        for k, (name, match) in enumerate(matches[0].items())
-        if match.overlays and name in matches[1]
-        if match.judged_by in matches[1][name].overlays
-    ]
-    yield from charts
-    if not charts:
+    yield _both_parameters(result, other, this, older)
+    alike = False
+    for k, (name, match) in enumerate(matches[0].items()):
+        beside = matches[1].get(name)
+        if beside is not None and match.overlays and match.judged_by in beside.overlays:
+            alike = True
+            yield _two_fits(f"against-{k}", match, beside, this, older)
+    if not alike:
         yield Note(NOTHING_ALIKE, mark="faint")
+
+
+def _both_parameters(result: FitResult, other: FitResult, this: str, older: str) -> Table:
+    units = {name: each.unit for fit in (other, result) for name, each in fit.parameters.items()}
+    rows = []
+    for name, (one, two) in parameters_beside((result, other)).items():
+        difference = None if one is None or two is None else one.value - two.value
+        rows.append(row(name, _value(one), _value(two), number(difference, 3), units[name]))
+    numbers = (this, older, "difference")
+    heads = columns("parameter", *numbers, "unit", numbers=numbers)
+    return Table(heads, tuple(rows), "Fitted parameters of either fit", style="parameters")
+
+
+def _name(fit: FitResult) -> str:
+    """Name a fit by plant, unit and revision, else by its case."""
+    words = {fact: stated(fit.about, fact) for fact in (PLANT, UNIT, REVISION)}
+    texts = (
+        text if fact is PLANT else f"{fact.key.lower()} {text}"
+        for fact, text in words.items()
+        if text is not None
+    )
+    return ", ".join(texts) or fit.name
 
 
 def _error(match: Comparison | None) -> str:

@@ -1,9 +1,10 @@
 """How the parameters were found, and how well the records determine them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exfit.features.report.charts import (
     BINS,
@@ -18,6 +19,7 @@ from exfit.features.report.charts import (
 )
 from exfit.features.report.matches import line, range_of
 from exfit.features.report.words import DASH, number
+from exfit.fitting.uncertainty import Sensitivity
 from exfit.results.comparisons import IterationResponses
 from exfit.results.influences import by_weight
 from exfit.results.model import FitResult, FittedParameter, Iteration, Minima
@@ -41,6 +43,8 @@ from exfit.show.blocks import (
 from exfit.signals import label_of
 from exfit.util.strategies import HISTORY_PHASES
 from exfit.util.text import show
+
+Array = NDArray[np.float64]
 
 SHADES = 9  # of the style sheet, from the start to the fit
 MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
@@ -270,21 +274,7 @@ def identifiability(result: FitResult) -> Iterator[Block]:
     labels = {effect.parameter: effect.label for effect in known.effects}
     for k, channel in enumerate(known.sensitivity):
         moved = {labels.get(name, name): PERCENT * each for name, each in channel.moved.items()}
-        lines = tuple(
-            line(name, channel.time, MILLI * samples, line_style(place), BINS // 2)
-            for place, (name, samples) in enumerate(moved.items())
-        )
-        most = [(float(np.max(np.abs(samples))), name) for name, samples in moved.items()]
-        largest = (f"{name} {MILLI * size:.2g}" for size, name in sorted(most, reverse=True))
-        title, what = f"change of {channel.label} (1e-3 pu)", "1 % more of each parameter"
-        yield Chart(
-            key=f"moved-{k}",
-            title=f"What {what} does to {channel.label}",
-            text=f"Largest change of {channel.label} in 1e-3 pu for {what}: {', '.join(largest)}.",
-            x_title=TIME,
-            panels=(Panel(title, lines, TALL, rules=(LEVEL,)),),
-            x_range=range_of(channel.time),
-        )
+        yield sensitivity(f"moved-{k}", channel, moved)
     yield Note(TOGETHER)
     correlation = known.confidence.correlation
     cells = (
@@ -293,6 +283,25 @@ def identifiability(result: FitResult) -> Iterator[Block]:
     )
     heads = columns("", *correlation.names, numbers=correlation.names)
     yield Table(heads, tuple(cells), "Correlation of the estimates", style="correlation")
+
+
+def sensitivity(key: str, channel: Sensitivity, moved: Mapping[str, Array]) -> Chart:
+    """Draw the change (M,) of a signal over time for 1 % more of each parameter."""
+    lines = tuple(
+        line(name, channel.time, MILLI * samples, line_style(place), BINS // 2)
+        for place, (name, samples) in enumerate(moved.items())
+    )
+    most = [(float(np.max(np.abs(samples))), name) for name, samples in moved.items()]
+    largest = ", ".join(f"{name} {MILLI * size:.2g}" for size, name in sorted(most, reverse=True))
+    title, what = f"change of {channel.label} (1e-3 pu)", "1 % more of each parameter"
+    return Chart(
+        key=key,
+        title=f"What {what} does to {channel.label}",
+        text=f"Largest change of {channel.label} in 1e-3 pu for {what}: {largest}.",
+        x_title=TIME,
+        panels=(Panel(title, lines, TALL, rules=(LEVEL,)),),
+        x_range=range_of(channel.time),
+    )
 
 
 def _correlation(value: float) -> Cell:

@@ -39,6 +39,18 @@ MOST_SAMPLES = 100_000  # of all records: so many are no low rate
 UNSEEN = 1e-9  # of the largest singular value: rounding
 
 
+class AveragesTried(NamedTuple):
+    """Residuals with averages over a window (s), and what they gain in chi-square by linear theory.
+
+    ``of_rate``: over the time between samples, about each of them.
+    """
+
+    gain: float
+    window: float
+    of_rate: bool
+    averaged: Residuals
+
+
 def recorder_averages(
     case: Case, residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
 ) -> RecorderAverages | None:
@@ -51,19 +63,38 @@ def recorder_averages(
     numbers = [*_unstated(case, residuals)]
     if not numbers or sum(residuals.sizes) > MOST_SAMPLES:
         return None
+    of_records = {nuisance.name for each in residuals.experiments for nuisance in each.nuisances}
+    found = []
     try:
         errors, slopes = residuals.errors(theta)
-        low, high = residuals.bounds
-        basis = _basis(slopes[:, (theta > low) & (theta < high)])
-        variance = variance_of(residuals, 0.5 * float(errors @ errors), uncertainty)
-        found = [
-            _compared(residuals, theta, averaged, window, variance, uncertainty)
-            for averaged, window in _likeliest(residuals, theta, numbers, errors, basis, variance)
-        ]
+        cost = 0.5 * float(errors @ errors)
+        variance = variance_of(residuals, cost, uncertainty)
+        for window, averaged in _likeliest(residuals, theta, numbers, errors, slopes, variance):
+            end, without = descent_near(averaged, theta), residuals(theta)
+            values = own_values(averaged, end.x)
+            beyond = [
+                name
+                for name, own in uncertainty.confidence.parameters.items()
+                if name not in of_records and _is_beyond(values[name], own.interval)
+            ]
+            found.append(
+                RecorderAverages(
+                    window=window,
+                    chi_square=2.0 * (0.5 * float(without @ without) - end.cost) / variance,
+                    given=own_values(residuals, theta),
+                    values=values,
+                    beyond=tuple(beyond),
+                )
+            )
     except SimulationError:
         return None
     likeliest = max(found, key=lambda each: each.chi_square, default=None)
     return None if likeliest is None or likeliest.chi_square < -STRONG else likeliest
+
+
+def _is_beyond(value: float, interval: Interval | None) -> bool:
+    low, high = interval or (None, None)
+    return (low is not None and value < low) or (high is not None and value > high)
 
 
 def _unstated(case: Case, residuals: Residuals) -> Iterator[int]:
@@ -83,46 +114,31 @@ def _unstated(case: Case, residuals: Residuals) -> Iterator[int]:
             yield number
 
 
-def _basis(slopes: Array) -> Array:
-    """Return an orthonormal basis (M, K) of what the parameters can do; raises SimulationError."""
-    if not np.isfinite(slopes).all():
-        raise SimulationError("no finite derivatives")
-    left, singular, _ = np.linalg.svd(slopes, full_matrices=False)
-    return np.asarray(left[:, singular > UNSEEN * np.max(singular, initial=0.0)])
-
-
-class AveragesTried(NamedTuple):
-    """Residuals with averages over a window (s), and what they gain in chi-square by linear theory.
-
-    ``of_rate``: over the time between samples, about each of them.
-    """
-
-    gain: float
-    window: float
-    of_rate: bool
-    averaged: Residuals
-
-
 def _likeliest(
     residuals: Residuals,
     theta: Array,
     numbers: Sequence[int],
     errors: Array,
-    basis: Array,
+    slopes: Array,
     variance: float,
-) -> Iterator[tuple[Residuals, float]]:
-    """Yield residuals with averages that matter, and their window (s), by linear theory.
+) -> Iterator[tuple[float, Residuals]]:
+    """Yield a window (s) and residuals with averages over it that matter, by linear theory.
 
     Those over the time between samples, and those that match best, if clearly better.
     """
+    low, high = residuals.bounds
+    free = slopes[:, (theta > low) & (theta < high)]
+    if not np.isfinite(free).all():
+        raise SimulationError("no finite derivatives")
+    left, singular, _ = np.linalg.svd(free, full_matrices=False)
+    # what the parameters can do, orthonormal
+    basis = np.asarray(left[:, singular > UNSEEN * np.max(singular, initial=0.0)])
     candidates = list[AveragesTried]()
     for window, of_rate, averaged in _averaged(residuals, numbers):
-        off = replace(averaged, robust=None)(theta)[: averaged.count]
-        if not np.isfinite(off).all():
-            raise SimulationError("no response with averages")
+        off, _ = averaged.errors(theta)
         made_up_for = basis.T @ off
-        left = float(off @ off - made_up_for @ made_up_for)
-        gain = (float(errors @ errors) - left) / variance
+        left_over = float(off @ off - made_up_for @ made_up_for)
+        gain = (float(errors @ errors) - left_over) / variance
         change = off - errors
         matters = float(np.linalg.norm(basis.T @ change)) > MATTERS * np.sqrt(variance)
         visible = float(np.max(np.abs(change))) > LEAST_NOISE
@@ -131,7 +147,7 @@ def _likeliest(
     best = max(candidates, key=lambda each: each.gain, default=None)
     for each in candidates:
         if each.of_rate or each is best:
-            yield each.averaged, each.window
+            yield each.window, each.averaged
 
 
 def _averaged(
@@ -139,60 +155,26 @@ def _averaged(
 ) -> Iterator[tuple[float, bool, Residuals]]:
     """Yield residuals with averages over a window (s), and whether that is the rate's.
 
-    Averages are about each sample; of a test whose instant is given also over the time before.
+    Averages are about each sample; of a test whose instant is given also over the time before. A
+    usual window holds several samples, and is short beside the records.
     """
     chosen = [residuals.experiments[number] for number in numbers]
     slowest = max(map(_spacing, chosen))
+    longest = LONGEST * min(float(np.ptp(each.simulator.times)) for each in chosen)
+    usual = [window for window in USUAL if slowest < window < longest]
     lates = (0.0,) if any(map(finds_instant, chosen)) else (0.0, 0.5)
-    for usual, late in product((None, *_usual_windows(chosen)), lates):
-        windows = [usual or _spacing(each) for each in residuals.experiments]
+    for given, late in product((None, *usual), lates):
+        windows = [given or _spacing(each) for each in residuals.experiments]
         experiments = [
             with_averages(each, windows[k], late * windows[k]) if k in numbers else each
             for k, each in enumerate(residuals.experiments)
         ]
         averaged = replace(residuals, experiments=experiments, counter=None)
-        yield usual or slowest, usual is None and not late, averaged
-
-
-def _usual_windows(chosen: Sequence[Experiment]) -> list[float]:
-    """Return the windows (s) that hold several samples, and are short beside the records."""
-    slowest = max(map(_spacing, chosen))
-    longest = LONGEST * min(float(np.ptp(each.simulator.times)) for each in chosen)
-    return [window for window in USUAL if slowest < window < longest]
+        yield given or slowest, given is None and not late, averaged
 
 
 def _spacing(experiment: Experiment) -> float:
     return float(median(np.diff(experiment.simulator.times)))
-
-
-def _compared(
-    residuals: Residuals,
-    theta: Array,
-    averaged: Residuals,
-    window: float,
-    variance: float,
-    uncertainty: UncertaintyAnalysis,
-) -> RecorderAverages:
-    """Compare the minimum theta (N,) without averages with that of a fit with them."""
-    end, errors = descent_near(averaged, theta), residuals(theta)
-    cost, values = 0.5 * float(errors @ errors), own_values(averaged, end.x)
-    of_records = {n.name for each in residuals.experiments for n in each.nuisances}
-    return RecorderAverages(
-        window=window,
-        chi_square=2.0 * (cost - end.cost) / variance,
-        given=own_values(residuals, theta),
-        values=values,
-        beyond=tuple(
-            name
-            for name, own in uncertainty.confidence.parameters.items()
-            if name not in of_records and _is_beyond(values[name], own.interval)
-        ),
-    )
-
-
-def _is_beyond(value: float, interval: Interval | None) -> bool:
-    low, high = interval or (None, None)
-    return (low is not None and value < low) or (high is not None and value > high)
 
 
 def allowing_for_averages(
@@ -200,26 +182,24 @@ def allowing_for_averages(
 ) -> UncertaintyAnalysis:
     """Return the uncertainty with intervals that hold the parameters with averages, too.
 
-    Each holds the one without them, and the same about the value with them.
+    Each holds the one without them, and the same about the value with them, within its bounds.
     """
     if averages is None:
         return uncertainty
     parameters = {**uncertainty.confidence.parameters}
+
+    def moved(free: FreeParameter, limit: float | None, shift: float) -> float | None:
+        if limit is None:
+            return None
+        bounds = free.scaled(free.low), free.scaled(free.high)
+        return free.value(float(np.clip(free.scaled(limit) + shift, *bounds)))
+
     for free in residuals.free:
         own = parameters[free.name]
         if own.interval is not None:
             given, with_them = averages.given[free.name], averages.values[free.name]
             shift = free.scaled(with_them) - free.scaled(given)
             low, high = own.interval
-            interval = _moved(free, low, min(shift, 0.0)), _moved(free, high, max(shift, 0.0))
+            interval = moved(free, low, min(shift, 0.0)), moved(free, high, max(shift, 0.0))
             parameters[free.name] = replace(own, interval=interval, method="averages")
-    confidence = replace(uncertainty.confidence, parameters=parameters)
-    return replace(uncertainty, confidence=confidence)
-
-
-def _moved(free: FreeParameter, limit: float | None, shift: float) -> float | None:
-    """Return a limit that is moved by a shift of the scaled parameter, within its bounds."""
-    if limit is None:
-        return None
-    bounds = free.scaled(free.low), free.scaled(free.high)
-    return free.value(float(np.clip(free.scaled(limit) + shift, *bounds)))
+    return replace(uncertainty, confidence=replace(uncertainty.confidence, parameters=parameters))

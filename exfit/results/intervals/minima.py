@@ -13,7 +13,7 @@ from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.results.model import Minima, Minimum
+from exfit.results.model import Minima, Minimum, multiple
 from exfit.util.text import rounded_value
 
 Values = Mapping[str, float]
@@ -122,30 +122,51 @@ def _of_others(
     std_errors: Values,
 ) -> Iterator[str]:
     """Note the end of the descent from the start, if elsewhere, and minima not refuted."""
-    here = own_values(residuals, search.best.x)
-    valleys: dict[object, list[tuple[bool, Minimum]]] = {}
+    here, cost = own_values(residuals, search.best.x), search.best.cost
+    by_valley: dict[object, list[tuple[bool, Minimum]]] = {}
     for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
         from_start = search.goes_on and search.own.success and is_same(end.result, search.own)
-        apart = any(
-            abs(value - here[name]) > WITHIN * std_errors.get(name, 0.0)
-            for name, value in minimum.values.items()
-        )
+        apart = _is_apart(minimum.values, here, std_errors)
         if k != search.place and (from_start or (apart and not minimum.refuted)):
-            own = ("alone", k) if minimum.valley is None else minimum.valley
-            valleys.setdefault(own, []).append((from_start, minimum))
-    for place, members in valleys.items():
+            valley = ("alone", k) if minimum.valley is None else minimum.valley
+            by_valley.setdefault(valley, []).append((from_start, minimum))
+    for place, members in by_valley.items():
         if place == 0:
             along = [minimum for _, minimum in members]
-            yield valley_in_words(along, search.best.cost, _above(minima), here, residuals)
+            yield valley_in_words(along, cost, _above(minima), here, residuals)
             continue
         from_start, minimum = max(members, key=lambda member: member[0])  # else the lowest
         subject = "the descent from the start of the case ended at" if from_start else "there is"
-        yield f"{subject} {minimum_in_words(minimum, search.best.cost, here)}"
+        yield f"{subject} {minimum_in_words(minimum, cost, here)}"
 
 
 def _above(minima: Sequence[Minimum]) -> float:
-    """The largest chi-square in the valley of the result."""
+    """Find the largest chi-square in the valley of the result."""
     return max(each.chi_square or 0.0 for each in minima if each.valley == 0)
+
+
+def _is_apart(there: Values, here: Values, std_errors: Values) -> bool:
+    """Test whether a minimum lies beyond the errors of the values here."""
+    return any(
+        abs(value - here[name]) > WITHIN * std_errors.get(name, 0.0)
+        for name, value in there.items()
+    )
+
+
+def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
+    """Word another minimum: its height, whether it is refuted, the values that differ most."""
+    verdict = "which the record refutes"
+    if not minimum.refuted:
+        verdict = (
+            f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
+            f"lowest, limit {REFUTED})"
+        )
+    pairs = {name: (value, here[name]) for name, value in minimum.values.items()}
+    moved = ", ".join(
+        f"{name} {minimum.values[name]:.4g} (here {here[name]:.4g})"
+        for name in most_different(pairs)
+    )
+    return f"another minimum, {times(minimum.cost, cost)} this cost, {verdict}: {moved}"
 
 
 def valley_in_words(
@@ -157,46 +178,25 @@ def valley_in_words(
     """
     values = {name: [here[name], *(each.values[name] for each in others)] for name in here}
     bounds = {free.name: (free.low, free.high) for free in residuals.free}
-    moves = ", ".join(
-        f"{name} {rounded_value(min(values[name]), None, *bounds[name])} ... "
-        f"{rounded_value(max(values[name]), None, *bounds[name])} "
-        f"(here {rounded_value(here[name], None, *bounds[name])})"
-        for name in most_different({name: (min(own), max(own)) for name, own in values.items()})
-    )
+    moves = []
+    for name in most_different({name: (min(own), max(own)) for name, own in values.items()}):
+        least, most, own = (
+            rounded_value(value, None, *bounds[name])
+            for value in (min(values[name]), max(values[name]), here[name])
+        )
+        moves.append(f"{name} {least} ... {most} (here {own})")
     count = "another minimum lies" if len(others) == 1 else f"{len(others)} other minima lie"
     height = f"{'up to ' * (len(others) > 1)}{times(max(each.cost for each in others), cost)}"
     return (
         f"{count} in one flat valley with this one, {height} this cost, and the record "
         f"refutes no point of the way (chi-square up to {above:.2g}, limit {REFUTED}): along it "
-        f"move {moves}"
+        f"move {', '.join(moves)}"
     )
-
-
-def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
-    """Word another minimum: its height, whether it is refuted, its values."""
-    verdict = "which the record refutes"
-    if not minimum.refuted:
-        verdict = (
-            f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
-            f"lowest, limit {REFUTED})"
-        )
-    height = times(minimum.cost, cost)
-    return f"another minimum, {height} this cost, {verdict}: {differences(minimum.values, here)}"
 
 
 def times(cost: float, other: float) -> str:
     """Return a cost in words, as a multiple of another one."""
-    from exfit.results.model import multiple
-
     return multiple(cost / other) if other > 0.0 else f"{cost:.3g} pu² above"
-
-
-def differences(there: Values, here: Values) -> str:
-    """Word the values of a minimum that differ most from those here."""
-    pairs = {name: (value, here[name]) for name, value in there.items()}
-    return ", ".join(
-        f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in most_different(pairs)
-    )
 
 
 def most_different(pairs: Mapping[str, tuple[float, float]]) -> list[str]:
@@ -223,17 +223,12 @@ def valleys(
     for place in order:
         if place != first and not costs[place] <= allowed:
             continue
-        ways = (
-            valley
-            for valley in found
-            for member in valley
-            if is_way(residuals, minima[member], minima[place], allowed)
-        )
-        valley = next(ways, None)
-        if valley is None:
-            found.append([place])
+        for valley in found:
+            if any(is_way(residuals, minima[k], minima[place], allowed) for k in valley):
+                valley.append(place)
+                break
         else:
-            valley.append(place)
+            found.append([place])
     number = {place: k for k, valley in enumerate(found) for place in valley}
     return [number.get(place) for place in range(len(minima))]
 
@@ -262,9 +257,8 @@ def _on_floor(residuals: Residuals, point: Array, k: int, allowed: float) -> Arr
     held = residuals.free[k]
     fixed = {**residuals.fixed, held.name: held.value(float(point[k]))}
     free = [parameter for parameter in residuals.free if parameter is not held]
-    others = replace(residuals, free=free, fixed=fixed, counter=None)
     end = short_descent(
-        others,
+        replace(residuals, free=free, fixed=fixed, counter=None),
         np.delete(point, k),
         MOST_ITERATIONS,
         matches=lambda errors: half_square(errors) <= allowed,

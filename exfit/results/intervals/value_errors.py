@@ -270,16 +270,7 @@ def influence_of_typical_values(
     by_value = shifts_by_values(residuals, theta, deviations)
     if by_value is None:
         return {}
-    of_records = {nuisance.name for each in residuals.experiments for nuisance in each.nuisances}
-    half_widths = {}
-    for name, own in uncertainty.confidence.parameters.items():
-        low, high = own.interval or (None, None)
-        if name in of_records:
-            continue
-        if low is not None and high is not None:
-            half_widths[name] = 0.5 * (high - low)
-        elif own.std_error is not None:
-            half_widths[name] = IN_STANDARD_ERRORS * own.std_error
+    half_widths = _half_widths(residuals, uncertainty)
     influence = {}
     for (name, value), column in zip(typical.items(), by_value.T, strict=True):
         moved = zip(residuals.free, column.tolist(), strict=True)
@@ -292,3 +283,18 @@ def influence_of_typical_values(
         largest_first = dict(sorted(shares.items(), key=lambda each: -each[1]))
         influence[name] = TypicalValue(value, shifts, largest_first)
     return influence
+
+
+def _half_widths(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> dict[str, float]:
+    """Return half the width of the interval of each parameter of the unit, where it is known."""
+    of_records = {nuisance.name for each in residuals.experiments for nuisance in each.nuisances}
+    half_widths = {}
+    for name, own in uncertainty.confidence.parameters.items():
+        low, high = own.interval or (None, None)
+        if name in of_records:
+            continue
+        if low is not None and high is not None:
+            half_widths[name] = 0.5 * (high - low)
+        elif own.std_error is not None:
+            half_widths[name] = IN_STANDARD_ERRORS * own.std_error
+    return half_widths
