@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from exfit.features.design.experiment_design import identify
     from exfit.features.fleet.batch import batch
     from exfit.features.fleet.folder import read_fleet
-    from exfit.features.planner.table_cases import cases_of_table
+    from exfit.features.planner.import_all import cases_of_table
     from exfit.features.programme.run import run
     from exfit.features.programme.saturation import saturation_curve
     from exfit.features.rank.ranked_cases import rank

@@ -95,23 +95,6 @@ def stabiliser_inputs(text: str, case: Path) -> tuple[str, ...]:
     return tuple(map(str, given or ()))
 
 
-def limiter_places(text: str, case: Path) -> dict[str, str]:
-    """Return the places that the text of a case gives its limiters, by their names."""
-    limiters = section_of(text, case, "limiters")
-    entries = limiters if isinstance(limiters, list) else ()
-    return {
-        str(entry.get("model")): str(entry["place"])
-        for entry in entries
-        if isinstance(entry, Mapping) and entry.get("place") is not None
-    }
-
-
-def unused_values(text: str, case: Path) -> dict[str, float]:
-    """Read, of the text of a case, the values that the planner's program does without."""
-    unused = _section(content_of(text, case), ("as_found", "unused"))
-    return {str(name): float(value) for name, value in unused.items()}
-
-
 def _content(case: Path) -> Mapping[str, Any]:
     try:
         return content_of(read_text(case), case)

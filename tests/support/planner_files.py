@@ -11,7 +11,7 @@ from programme_files import FREE
 from exfit.case.load import parse_case
 from exfit.features.planner.import_case import imported_case
 from exfit.features.planner.records import alternatives, contradictions, definition_of, definitions
-from exfit.features.planner.unit import read_unit
+from exfit.features.planner.units import read_unit
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical

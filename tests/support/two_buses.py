@@ -16,7 +16,7 @@ from math import pi
 
 from places import REFERENCE
 
-from exfit.features.planner.unit import read_unit
+from exfit.features.planner.units import read_unit
 from exfit.models import GOVERNORS
 from exfit.models.blocks import Limited
 from exfit.models.machines import Axes

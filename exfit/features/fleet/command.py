@@ -128,7 +128,7 @@ def batch(
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from exfit.features.fleet.batch import batch as fit_all
     from exfit.features.fleet.table import report_file, write_tables
-    from exfit.features.start.cells import is_table
+    from exfit.features.start.tables import is_table
 
     tables = [path for path in cases if is_table(path) and not path.is_dir()]
     others = [path for path in cases if path not in tables]
@@ -166,7 +166,7 @@ def batch(
 
 def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]":
     """Plan the cases of tables; raises ExfitError with the faults of all of them."""
-    from exfit.features.planner.table_cases import cases_of_table
+    from exfit.features.planner.import_all import cases_of_table
 
     made: dict[Path, CaseMaking] = {}
     faults = []

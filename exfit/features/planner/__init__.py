@@ -9,4 +9,4 @@ COMMANDS = {
     ),
 }
 
-PUBLIC = {"cases_of_table": "table_cases:cases_of_table"}
+PUBLIC = {"cases_of_table": "import_all:cases_of_table"}

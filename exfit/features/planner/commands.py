@@ -1,19 +1,28 @@
 """The commands import and export."""
 
+import os
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import file_option, force_option, refuse_existing, write_text
+from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
-from exfit.features.planner.files_of_many import OfRecords, export_every_unit, import_every_unit
-from exfit.features.planner.play_in import export_play_in
+from exfit.util.sources import FITTED
+from exfit.util.text import first_texts
+
+if TYPE_CHECKING:
+    from exfit.features.fleet.folder import Fleet
+    from exfit.features.planner.fitted_file import ChangedValue, FittedUnit, LeftUnit
+    from exfit.features.planner.import_all import ImportedUnits, ImportPlan, RecordOptions
 
 MOST_BUSES = 999_999
 BUSES = click.IntRange(1, MOST_BUSES)
+UNITS = "units.csv"
 
 
 @click.command("import", short_help="Make cases from a planner's dynamics file.")
@@ -62,24 +71,35 @@ def import_(
     holds several units, --bus and --id choose one, and --all makes a case of each. With --records
     a case has the tests of its records, as `exfit new` makes it.
     """
-    given = OfRecords(records, sizes, bases, clock, unit, sheet)
+    from exfit.case.suggestion import RecordSettings, bases_of, relative
+    from exfit.features.planner.fields import located
+    from exfit.features.planner.import_all import RecordOptions
+    from exfit.features.planner.import_case import import_unit, imported_case
+
+    in_table = (sizes, clock, unit, sheet)
+    given = any((bases, *in_table))
     if every:
         if bus is not None or machine_id is not None:
             raise click.UsageError("--bus and --id: not allowed with --all.")
-        import_every_unit(dyr, given, output, force)
+        if output is None:
+            raise click.UsageError("Missing option '-o': the folder of the cases.")
+        if records is None and given:
+            raise click.UsageError(
+                "--step, --base, --time, --time-unit and --sheet: only with --records."
+            )
+        if records is not None and not records.is_dir() and any(in_table):
+            raise click.UsageError(
+                "--step, --time, --time-unit and --sheet: not allowed with a table, which has "
+                "columns for them."
+            )
+        options = RecordOptions(sizes, bases_of(bases), RecordSettings(clock, unit, sheet))
+        _import_every_unit(dyr, records, options, output, force)
         return
-    given.refuse_without_all()
-    _import_one(dyr, bus, machine_id, output, force)
-
-
-def _import_one(
-    dyr: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
-) -> None:
-    """Write the case of one unit."""
-    from exfit.case.suggestion import relative
-    from exfit.features.planner.fields import located
-    from exfit.features.planner.import_case import import_unit, imported_case
-
+    if records is not None or given:
+        raise click.UsageError(
+            "--records, --step, --base, --time, --time-unit and --sheet: only with --all; "
+            "exfit new makes a case of one record."
+        )
     if output is not None:
         refuse_existing(output, force)
     imported = import_unit(dyr, bus, machine_id)
@@ -87,6 +107,60 @@ def _import_one(
     write_text(imported_case(imported, file).text, output, located(imported.warnings, str(dyr)))
     if output is not None:
         echo(f"written to {output}; next: exfit simulate {output}")
+
+
+def _import_every_unit(
+    dyr: Path, records: Path | None, options: "RecordOptions", folder: Path, force: bool
+) -> None:
+    """Write a case for every unit of a dynamics file, and a table of all units."""
+    from exfit.features.planner.import_all import import_all, plan_import, units_table
+    from exfit.util.files import write_each
+
+    plan = plan_import(dyr, records)
+    names = () if force else (*plan.names, UNITS)
+    existing = [str(folder / name) for name in names if (folder / name).exists()]
+    if existing:
+        listed = "\n".join(first_texts(existing))
+        raise ExfitError(f"{listed}\nexist already; --force writes over them")
+    imported = import_all(plan, folder, options)
+    if imported.unused:
+        raise ExfitError(f"--step {imported.unused[0]}: no test of that name in any record")
+    write_each(folder, {**imported.texts, UNITS: units_table(imported.units)})
+    warn(first_texts(imported.doubts))
+    _report_import(plan, imported, folder)
+
+
+def _report_import(plan: "ImportPlan", imported: "ImportedUnits", folder: Path) -> None:
+    """Say what was written and what was not; raises ExfitError where something was refused."""
+    from exfit.features.planner.import_all import NO_MODEL, RECORDED, REFUSED
+
+    lines: dict[str, list[str]] = {NO_MODEL: [], RECORDED: [], REFUSED: []}
+    for unit in imported.units:
+        line = f"bus {unit.bus}, machine {unit.id}: {unit.notes}"
+        lines.setdefault(unit.status, []).append(line)
+    cases = [unit.case for unit in imported.units if unit.case]
+    counts = f"cases: {len(cases)}, with records: {len(lines[RECORDED])}"
+    echo(f"written to {folder}; {counts}; all units: {UNITS}")
+    for path in first_texts([str(path) for path in plan.others]):
+        echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
+    for line in first_texts(lines[NO_MODEL]):
+        echo(f"no model: {line}", err=True)
+    if plan.units.classical:
+        count = f"{plan.units.classical} GENCLS without an exciter"
+        echo(f"not units to verify: {count}, constant voltages behind a reactance", err=True)
+    refused = [*lines[REFUSED], *plan.faults]
+    if refused:
+        raise FileError(refused)
+    if not cases:
+        raise ExfitError(f"{plan.dyr}: no unit can be imported")
+
+
+def _machine_id(_context: object, _option: object, value: str | None) -> str | None:
+    from exfit.features.planner.records import is_machine_id
+
+    if value is not None and not is_machine_id(value):
+        raise click.BadParameter(f"{value!r} is not one or two letters or digits.")
+    return value
 
 
 @click.command(short_help="Write the result of a fit as records of a planner's file.")
@@ -112,7 +186,7 @@ def _import_one(
     "--id",
     "machine_id",
     metavar="ID",
-    callback=lambda _, __, value: _machine_id(value),
+    callback=_machine_id,
     help="Machine id of the unit (default: as found, else 1).",
 )
 @click.option(
@@ -146,26 +220,26 @@ def export(
     With --all RESULT is the folder of a batch, and the planner's file is written with the values of
     the units whose fits hold; every other byte of it stays as it is.
     """
+    of_record = (bus, machine_id, model)
     if plb is not None:
-        _refuse_beside_plb(every, dyr, form, bus, machine_id, model, output)
+        from exfit.features.planner.play_in import export_play_in
+
+        others = (dyr, form, output, *of_record)
+        if every or any(other is not None for other in others):
+            raise click.UsageError("--plb: only --force is allowed with it.")
         export_play_in(result, plb, force)
-        return
-    if every:
-        if bus is not None or machine_id is not None or model is not None:
+    elif every:
+        if any(other is not None for other in of_record):
             raise click.UsageError("--bus, --id and --model: not allowed with --all.")
         if form is not None:
             raise click.UsageError("--format: not allowed with --all, which keeps the file's own.")
-        export_every_unit(result, dyr, output, force)
-        return
-    if dyr is not None:
+        if output is None:
+            raise click.UsageError("Missing option '-o': the file to write.")
+        _export_every_unit(result, dyr, output, force)
+    elif dyr is not None:
         raise click.UsageError("--dyr: only with --all.")
-    _export_one(result, form, bus, machine_id, model, output, force)
-
-
-def _refuse_beside_plb(every: bool, *others: object) -> None:
-    """Raise UsageError where options of records are given beside a play-in file."""
-    if every or any(other is not None for other in others):
-        raise click.UsageError("--plb: only --force is allowed with it.")
+    else:
+        _export_one(result, form, bus, machine_id, model, output, force)
 
 
 def _export_one(
@@ -180,7 +254,7 @@ def _export_one(
     """Write the records of one fit, at the bus that is given, or where they were found."""
     from exfit.features.planner.export import export as exported
     from exfit.features.planner.export import place_of
-    from exfit.features.planner.formats import FORMATS, format_of
+    from exfit.features.planner.units import FORMATS, format_of
     from exfit.results.io import load_result, result_file
 
     if output is not None:
@@ -201,9 +275,91 @@ def _export_one(
         echo(f"written to {output}")
 
 
-def _machine_id(value: str | None) -> str | None:
-    from exfit.features.planner.file_format import is_machine_id
+def _export_every_unit(fleet: Path, dyr: Path | None, output: Path, force: bool) -> None:
+    """Write a planner's file with the values of all verified units of a batch."""
+    from exfit.features.fleet.folder import read_fleet
+    from exfit.features.planner.fitted_file import changes_table, fitted_file
+    from exfit.features.planner.import_case import read_file
+    from exfit.features.planner.units import format_of
+    from exfit.util.files import write
 
-    if value is not None and not is_machine_id(value):
-        raise click.BadParameter(f"{value!r} is not one or two letters or digits.")
-    return value
+    table = output.with_suffix(".csv")
+    for path in (output, table):
+        refuse_existing(path, force)
+    fits, others = _fits_of(read_fleet(fleet))
+    if not fits:
+        reasons = first_texts([f"{unit.name}: {unit.reason}" for unit in others])
+        raise ExfitError("\n".join([*reasons, f"{fleet}: no case has a finished fit"]))
+    original = dyr or _original(fits)
+    if output.exists() and original.exists() and output.samefile(original):
+        raise ExfitError(f"{output}: is the planner's own file: name another one with -o")
+    suffix = format_of(original).suffix
+    if format_of(output).suffix != suffix:
+        raise ExfitError(f"{output}: {original} is a {suffix} file: name it so with -o")
+    fitted = fitted_file(read_file(original), str(original), fits)
+    left = [*fitted.left, *others]
+    if not fitted.changes:
+        reasons = first_texts([f"{unit.name}: {unit.reason}" for unit in left])
+        raise ExfitError("\n".join([*reasons, f"{original}: no unit to change"]))
+    write(output, fitted.data)
+    write(table, changes_table(fitted.changes))
+    _report_export(output, table, fitted.changes, left)
+
+
+def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
+    """Return the fits of a batch that are done, and why the other cases are not."""
+    from exfit.features.planner.fitted_file import FittedUnit, LeftUnit
+    from exfit.results.io import load_result
+
+    fits, others = list[FittedUnit](), list[LeftUnit]()
+    for case in fleet.cases:
+        folder = fleet.fit_of(case)
+        if folder is None:
+            if case.status != "no record":
+                why = f"{case.status}: {case.reason}"
+                if case.status == "done":
+                    why = "a programme without bump tests: nothing was fitted"
+                others.append(LeftUnit(case.name, why, False))
+            continue
+        try:
+            # a fit of equal content stands under one key: each case has its own path
+            result = replace(load_result(folder), case=fleet.path_of(case))
+            fits.append(FittedUnit(case.name, result))
+        except ExfitError as fault:
+            others.append(LeftUnit(case.name, str(fault), verified=True))
+    return fits, others
+
+
+def _original(fits: "list[FittedUnit]") -> Path:
+    """Return the file that all cases were made of; raises ExfitError where it is not one alone."""
+    files = {
+        os.path.normpath(result.case.parent / found.file): None
+        for _, result in fits
+        if (found := result.as_found) is not None and found.file is not None
+    }
+    if not files:
+        raise ExfitError("--dyr: required: no case names the planner's file that it was made of")
+    if len(files) > 1:
+        named = ", ".join(first_texts([*files]))
+        raise ExfitError(f"--dyr: required: the cases were made of several files: {named}")
+    return Path(next(iter(files)))
+
+
+def _report_export(
+    output: Path, table: Path, changes: "tuple[ChangedValue, ...]", left: "list[LeftUnit]"
+) -> None:
+    """Say what was changed and what was not; raises ExfitError where a verified unit was left."""
+    units = {(change.bus, change.id.upper()) for change in changes}
+    echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
+    echo(f"what was changed: {table}")
+    undetermined: dict[str, list[str]] = {}
+    for change in changes:
+        if change.source == FITTED and None in (change.low, change.high):
+            undetermined.setdefault(change.case, []).append(change.parameter)
+    texts = [f"{case}: not determined: {', '.join(own)}" for case, own in undetermined.items()]
+    warn(first_texts(texts))
+    for line in first_texts([f"{own.name}: {own.reason}" for own in left if not own.verified]):
+        echo(f"left as it was: {line}", err=True)
+    refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
+    if refused:
+        raise FileError(refused)

@@ -37,13 +37,6 @@ class Field(NamedTuple):
     end: int = 0
 
 
-class Fields(NamedTuple):
-    """One record: its fields, the first of which is on ``line``."""
-
-    line: int
-    fields: tuple[Field, ...]
-
-
 def text_of(data: bytes, file: str) -> str:
     """Return the text of a file, its ends of line as they are: UTF-8, or else Latin-1.
 
@@ -81,12 +74,6 @@ def lines_of(text: str) -> Iterator[tuple[int, str]]:
         yield start, text[start : end.start()]
         start = end.end()
     yield start, text[start:whole]
-
-
-def refuse(faults: list[DynamicsFault], file: str) -> None:
-    """Raise DynamicsError with all faults in the order of their lines, where there is any."""
-    if faults:
-        raise DynamicsError(located(faults, file))
 
 
 def located(faults: Iterable[DynamicsFault], file: str) -> list[str]:

@@ -6,27 +6,24 @@ are accepted.
 
 import csv
 import io
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isclose
 from typing import NamedTuple
 
 from exfit.case.peek import stabiliser_inputs
 from exfit.errors import ExfitError
-from exfit.features.planner.export import values_in_digits
-from exfit.features.planner.fields import Field, encoded, number, text_of
+from exfit.features.planner.export import as_quadratic, not_of_catalogue, values_in_digits
+from exfit.features.planner.fields import Field, encoded, located, number, text_of
 from exfit.features.planner.records import (
     OF_SATURATION,
     RATING,
     SHARE,
-    Definition,
+    Reading,
     idle_lags,
     read_values,
 )
-from exfit.features.planner.unit import Unit, UnitPart
-from exfit.features.planner.units import DynamicsUnits, read_units
-from exfit.models.sheet import Parameter
+from exfit.features.planner.units import DynamicsUnits, Unit, read_units
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.util.sources import TYPICAL
@@ -95,27 +92,37 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
     """
     text = text_of(data, file)
     units = read_units(text, file)
-    verified, left = list[FittedUnit](), list[LeftUnit]()
+    left = list[LeftUnit]()
+    verified: dict[tuple[int | None, str], list[FittedUnit]] = {}
     for fit in fits:
         if fit.result.holds:
-            verified.append(fit)
+            verified.setdefault(_place(fit.result), []).append(fit)
         else:
-            left.append(LeftUnit(fit.name, _why_not_verified(fit.result), verified=False))
-    counts = Counter(_place(fit.result) for fit in verified)
+            result = fit.result
+            why = f"not verified: {outcome_of(result)}: {explanation_of(result)}"
+            left.append(LeftUnit(fit.name, why, verified=False))
     edits, changes = list[_Edit](), list[ChangedValue]()
-    for fit in verified:
-        try:
-            _refuse_several(fit, verified, counts)
-            unit = _unit_of(fit.result, units, file)
-            parts = [*_parts(fit.result, unit, file)]
-            own = [[*_edits(fit.result, part, prefix, file)] for part, prefix in parts]
-        except ExfitError as fault:
-            left.append(LeftUnit(fit.name, str(fault), verified=True))
-            continue
-        for (part, prefix), of_part in zip(parts, own, strict=True):
-            edits += of_part
-            changes += _changes(fit, unit, part, prefix, of_part)
-    return FittedFile(encoded(_edited(text, edits), data), tuple(changes), tuple(left))
+    for place, of_unit in verified.items():
+        for fit in of_unit:
+            try:
+                if place[0] is not None and len(of_unit) > 1:
+                    names = ", ".join(other.name for other in of_unit)
+                    raise ExfitError(f"several fits of the unit: {names}")
+                unit = _unit_of(place, units, file)
+                parts = [*_parts(fit.result, unit, file)]
+                own = [[*_edits(fit.result, part, prefix, file)] for part, prefix in parts]
+            except ExfitError as fault:
+                left.append(LeftUnit(fit.name, str(fault), verified=True))
+                continue
+            for (part, prefix), of_part in zip(parts, own, strict=True):
+                edits += of_part
+                changes += _changes(fit, unit, part, prefix, of_part)
+    pieces, end = [], 0
+    for field, new in sorted(edits, key=lambda edit: edit.field.start):
+        pieces += [text[end : field.start], new]
+        end = field.end
+    edited = "".join([*pieces, text[end:]])
+    return FittedFile(encoded(edited, data), tuple(changes), tuple(left))
 
 
 def changes_table(changes: Iterable[ChangedValue]) -> str:
@@ -133,42 +140,27 @@ def number_text(value: float) -> str:
     return f"{mantissa}{'' if '.' in mantissa else '.0'}{exponent}{power}"
 
 
-def _why_not_verified(result: FitResult) -> str:
-    return f"not verified: {outcome_of(result)}: {explanation_of(result)}"
-
-
 def _place(result: FitResult) -> tuple[int | None, str]:
     """Return the bus and the machine id, in capitals, that a fit is of."""
     found = result.as_found
     return (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
 
 
-def _refuse_several(
-    fit: FittedUnit, verified: Sequence[FittedUnit], counts: Mapping[tuple[int | None, str], int]
-) -> None:
-    """Raise ExfitError where several fits are of one unit."""
-    place = _place(fit.result)
-    if place[0] is not None and counts[place] > 1:
-        others = [other.name for other in verified if _place(other.result) == place]
-        raise ExfitError(f"several fits of the unit: {', '.join(others)}")
-
-
-def _unit_of(result: FitResult, units: DynamicsUnits, file: str) -> Unit:
+def _unit_of(place: tuple[int | None, str], units: DynamicsUnits, file: str) -> Unit:
     """Return the unit of a fit in the file; raises ExfitError where there is none."""
-    bus, machine_id = _place(result)
+    bus, machine_id = place
     if bus is None or not machine_id:
         raise ExfitError("the case does not say bus and id of its unit (as_found)")
     for unit in units.units:
-        if (unit.bus, unit.id.upper()) == (bus, machine_id):
+        if (unit.bus, unit.id.upper()) == place:
             return unit
     for refused in units.refused:
-        if (refused.bus, refused.id.upper()) == (bus, machine_id):
-            faults = (f"{file}:{fault.line}: {fault.text}" for fault in refused.faults)
-            raise ExfitError("; ".join(faults))
+        if (refused.bus, refused.id.upper()) == place:
+            raise ExfitError("; ".join(located(refused.faults, file)))
     raise ExfitError(f"{file}: no record of bus {bus}, machine {machine_id}")
 
 
-def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart, str]]:
+def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[Reading, str]]:
     """Yield the records that a fit has the models of, with how their parameters are named.
 
     Raises ExfitError where a record is of another model, or is not as it was found.
@@ -181,152 +173,98 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart,
         (result.governor_model, unit.governor, "governor."),
     )
     if "model" in result.inputs:
-        program = unit.exciter.definition.program
-        raise ExfitError(
-            f"{result.model} is not a model of the catalogue: it has no {program} record"
-        )
-    _refuse_limiters(result)
+        raise ExfitError(not_of_catalogue(result, unit.exciter.definition.program))
+    prefixes = tuple(f"{kind}." for kind in result.limiter_models)
+    fitted = [name for name in result.parameters if name.startswith(prefixes)]
+    if fitted:
+        raise ExfitError(f"records of limiters are not changed: fitted: {', '.join(fitted)}")
     for model, part, prefix in models:
         if model is None:
             continue
         if part is None:
             raise ExfitError(f"{file}: the unit has no record of {model}")
-        name = part.definition.record.name
-        if part.definition.model.name != model:
+        definition = part.definition
+        name, place = definition.record.name, f"{file}:{part.line}: {definition.record.name}"
+        if definition.model.name != model:
             advice = f"; exfit translate finds its data for {name}" if not prefix else ""
-            raise ExfitError(f"{file}:{part.line}: {name}: the fitted model is {model}{advice}")
-        _refuse_other_values(result, part, prefix, file)
-        _refuse_other_inputs(result, part, file)
+            raise ExfitError(f"{place}: the fitted model is {model}{advice}")
+        found = {} if result.as_found is None else result.as_found.values
+        others = []
+        for symbol in definition.symbols:
+            now, then = part.values[symbol], found.get(prefix + symbol)
+            if then is None or not isclose(now, then, rel_tol=SAME):
+                was = "not stated" if then is None else show(then)
+                others.append(f"{symbol} is {show(now)}, as found {was}")
+        if others:
+            more = ", ..." if len(others) > MOST_NAMED else ""
+            raise ExfitError(f"{place}: changed since: {', '.join(others[:MOST_NAMED])}{more}")
+        usual = getattr(definition.model, "inputs", ())
+        inputs = stabiliser_inputs(result.case_text, result.case) or usual
+        if part.inputs and inputs != part.inputs:
+            theirs = ", ".join(part.inputs)
+            text = f"its inputs are {theirs}, the fit has {', '.join(inputs)}"
+            raise ExfitError(f"{place}: {text}")
         yield part, prefix
 
 
-def _refuse_limiters(result: FitResult) -> None:
-    """Raise ExfitError where values of limiters were fitted, whose records are not changed."""
-    prefixes = tuple(f"{kind}." for kind in result.limiter_models)
-    fitted = [name for name in result.parameters if name.startswith(prefixes)]
-    if fitted:
-        raise ExfitError(f"records of limiters are not changed: fitted: {', '.join(fitted)}")
-
-
-def _refuse_other_inputs(result: FitResult, part: UnitPart, file: str) -> None:
-    """Raise ExfitError where the fitted stabiliser listens to other signals than the record."""
-    if not part.inputs:
-        return
-    own = getattr(part.definition.model, "inputs", ())
-    inputs = stabiliser_inputs(result.case_text, result.case) or own
-    if inputs != part.inputs:
-        name, theirs = part.definition.record.name, ", ".join(part.inputs)
-        text = f"its inputs are {theirs}, the fit has {', '.join(inputs)}"
-        raise ExfitError(f"{file}:{part.line}: {name}: {text}")
-
-
-def _refuse_other_values(result: FitResult, part: UnitPart, prefix: str, file: str) -> None:
-    """Raise ExfitError where values of a record are others than those the case was made of."""
-    found = {} if result.as_found is None else result.as_found.values
-    others = []
-    for symbol in _symbols(part.definition):
-        now, then = part.values[symbol], found.get(prefix + symbol)
-        if then is None or not isclose(now, then, rel_tol=SAME):
-            was = "not stated" if then is None else show(then)
-            others.append(f"{symbol} is {show(now)}, as found {was}")
-    if others:
-        more = ", ..." if len(others) > MOST_NAMED else ""
-        listed = ", ".join(others[:MOST_NAMED])
-        name = part.definition.record.name
-        raise ExfitError(f"{file}:{part.line}: {name}: changed since: {listed}{more}")
-
-
-def _symbols(definition: Definition) -> list[str]:
-    """Return the parameters that a record holds, in its order."""
-    own = {row.symbol for row in definition.model.sheet}
-    return [name for name in definition.names if name in own]
-
-
-def _edits(result: FitResult, part: UnitPart, prefix: str, file: str) -> Iterator[_Edit]:
+def _edits(result: FitResult, part: Reading, prefix: str, file: str) -> Iterator[_Edit]:
     """Yield the fields of a record that change; raises ExfitError where values cannot be written.
 
     Typical values are not of the unit: their fields stay, and what no field holds is not missed.
     """
-    values = values_in_digits(result, prefix)
+    definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
-    changed = _changed(result, part, prefix, values)
-    _refuse_nonquadratic(result, part, changed)
-    whole = dict(part.definition.record.icons)
-    edits = []
-    for symbol, field in zip(part.definition.names, part.fields, strict=True):
-        if symbol in changed:
-            text = _whole_text(symbol, values) if symbol in whole else number_text(values[symbol])
-            edits.append(_Edit(field, text))
-    _refuse_faults(part, edits, file)
-    yield from (edit for edit in edits if float(edit.text) != number(edit.field))
-
-
-def _changed(
-    result: FitResult, part: UnitPart, prefix: str, values: Mapping[str, float]
-) -> set[str]:
-    """The parameters of a record that change, with the fields that then say something again."""
     changed = {
         symbol
-        for symbol in _symbols(part.definition)
+        for symbol in definition.symbols
         if result.sources.get(prefix + symbol) != TYPICAL
         and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
     }
-    return changed | {
-        row.symbol for row in _idle(part) if row.search and row.search.needs in changed
-    }
+    # the lags of 0, as long as their gains are 0, say something again
+    fields = dict(zip(definition.names, part.fields, strict=True))
+    idle = idle_lags(definition.model.sheet, {name: number(own) for name, own in fields.items()})
+    changed |= {row.symbol for row in idle if row.search and row.search.needs in changed}
+    of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}
+    if of_curve and result.saturation != "quadratic":
+        raise ExfitError(as_quadratic(result, definition.program))
+    texts: dict[Field, str] = {}
+    for symbol, field in fields.items():
+        if symbol not in changed:
+            continue
+        value = values[symbol]
+        if symbol not in dict(definition.record.icons):
+            texts[field] = number_text(value)
+        elif float(value).is_integer():
+            texts[field] = str(int(value))
+        else:
+            raise ExfitError(f"{symbol}: {show(value)} is not a whole number")
+    edited = tuple(field._replace(text=texts.get(field, field.text)) for field in part.fields)
+    faults = read_values(definition, part.line, edited).faults
+    if faults:
+        raise ExfitError("; ".join(located(faults, file)))
+    for field, text in texts.items():
+        if float(text) != number(field):
+            yield _Edit(field, text)
 
 
 def _refuse_lost(
-    result: FitResult, part: UnitPart, prefix: str, values: Mapping[str, float]
+    result: FitResult, part: Reading, prefix: str, values: Mapping[str, float]
 ) -> None:
     """Raise ExfitError where the record has no field for a value that is fitted or not its own."""
     record = part.definition.record
-    fields = {*part.definition.names}
     own = {symbol: part.values[symbol] for symbol in dict(record.held)}
     if RATING in dict(part.unused):
         del own[SHARE]  # the file has the rating, and a case its share of a base not in the file
     for symbol in (row.symbol for row in part.definition.model.sheet):
         lost = f"{record.name} cannot hold {symbol} = {show(values[symbol])}"
-        if symbol not in fields and prefix + symbol in result.parameters:
+        if symbol not in part.definition.names and prefix + symbol in result.parameters:
             raise ExfitError(f"{lost}, which was fitted")
         if values[symbol] != own.get(symbol, values[symbol]):
             raise ExfitError(f"{lost}: it stands for {show(own[symbol])}")
 
 
-def _idle(part: UnitPart) -> list[Parameter]:
-    """The lags of 0 that a record may have as long as their gains are 0."""
-    named = zip(part.definition.names, part.fields, strict=True)
-    return idle_lags(part.definition.model.sheet, {name: number(field) for name, field in named})
-
-
-def _refuse_nonquadratic(result: FitResult, part: UnitPart, changed: Iterable[str]) -> None:
-    """Raise ExfitError where a saturation changes that the fit took in another form."""
-    own = [name for name in changed if name in OF_SATURATION]
-    if own and part.definition.kind == "exciter" and result.saturation != "quadratic":
-        raise ExfitError(
-            f"fitted with saturation: {result.saturation}; {part.definition.program} takes "
-            "E1 SE1 E2 SE2 as quadratic"
-        )
-
-
-def _whole_text(symbol: str, values: Mapping[str, float]) -> str:
-    """Return an integer of a record; raises ExfitError where its value is none."""
-    if not float(values[symbol]).is_integer():
-        raise ExfitError(f"{symbol}: {show(values[symbol])} is not a whole number")
-    return str(int(values[symbol]))
-
-
-def _refuse_faults(part: UnitPart, edits: Sequence[_Edit], file: str) -> None:
-    """Raise ExfitError where a record with other fields would be outside its data sheet's range."""
-    texts = {edit.field: edit.text for edit in edits}
-    fields = tuple(field._replace(text=texts.get(field, field.text)) for field in part.fields)
-    faults = read_values(part.definition, part.line, fields).faults
-    if faults:
-        raise ExfitError("; ".join(f"{file}:{fault.line}: {fault.text}" for fault in faults))
-
-
 def _changes(
-    fit: FittedUnit, unit: Unit, part: UnitPart, prefix: str, edits: Sequence[_Edit]
+    fit: FittedUnit, unit: Unit, part: Reading, prefix: str, edits: Iterable[_Edit]
 ) -> Iterator[ChangedValue]:
     """Yield the rows of the table for the edits of a record."""
     rows = {row.symbol: row for row in part.definition.model.sheet}
@@ -348,12 +286,3 @@ def _changes(
             fit.result.source_of(prefix + symbol),
             fit.name,
         )
-
-
-def _edited(text: str, edits: Iterable[_Edit]) -> str:
-    """Return a text with others in place of some of its fields."""
-    parts, end = [], 0
-    for field, new in sorted(edits, key=lambda edit: edit.field.start):
-        parts += [text[end : field.start], new]
-        end = field.end
-    return "".join([*parts, text[end:]])

@@ -1,22 +1,32 @@
-"""Cases of all units of a dynamics file, with their records where there are any."""
+"""Cases of many units of dynamics files: of all of one file, or of a table of records."""
 
 import csv
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
 from exfit.case.suggestion import Base, RecordSettings, relative
-from exfit.errors import ExfitError
-from exfit.features.planner.fields import DynamicsFault, located, text_of
-from exfit.features.planner.import_case import imported_case, read_file, unit_data
-from exfit.features.planner.unit import Unit
-from exfit.features.planner.units import DynamicsUnits, RefusedUnit, read_units
-from exfit.features.start.made_case import MadeCase, case_of_plan, case_of_records
+from exfit.errors import DynamicsError, ExfitError
+from exfit.features.planner.fields import located
+from exfit.features.planner.import_case import import_units, imported_case, unit_data
+from exfit.features.planner.units import DynamicsUnits, Unit
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
+from exfit.features.start.starting_case import (
+    MadeCase,
+    UnitData,
+    case_of_plan,
+    case_of_records,
+    unit_with,
+)
 from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
+from exfit.util.files import write
+from exfit.util.text import dotted
 
 WRITTEN, RECORDED, REFUSED, NO_MODEL = "written", "written with records", "refused", "no model"
+CASES = "cases"  # the folder of the cases in that of a batch
 
 
 @dataclass(frozen=True)
@@ -54,8 +64,7 @@ class RecordOptions:
     settings: RecordSettings = field(default_factory=RecordSettings)
 
 
-@dataclass(frozen=True)
-class ImportedUnit:
+class ImportedUnit(NamedTuple):
     """A unit of the file and what became of it: a row of units.csv."""
 
     bus: int
@@ -89,7 +98,7 @@ def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
 
     Raises DynamicsError where the file cannot be read, ExfitError where the folder or table cannot.
     """
-    units = read_units(text_of(read_file(dyr), str(dyr)), dyr)
+    units = import_units(dyr)
     known = [key_of(unit) for unit in units.units]
     faults = located(units.faults, str(dyr))
     if records is None:
@@ -100,20 +109,17 @@ def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
         return ImportPlan(dyr, units, joined.of_unit, {}, tuple(faults), joined.others)
     rows: dict[UnitKey, CaseOfTable] = {}
     for case in read_case_table(records, dyr):
+        assert case.bus is not None
         try:
-            _add(case, known, rows)
+            unit = unit_named(case.bus, case.machine_id, known)
         except ExfitError as fault:
             faults.append(f"{case.place}: {fault}")
+            continue
+        first = rows.setdefault(unit, case)
+        if first is not case:
+            other = f"also in {first.place}, under the name {first.name}"
+            faults.append(f"{case.place}: {unit}: {other}")
     return ImportPlan(dyr, units, {}, rows, tuple(faults), ())
-
-
-def _add(case: CaseOfTable, known: Sequence[UnitKey], rows: dict[UnitKey, CaseOfTable]) -> None:
-    """Add the case of a table to that of its unit; raises ExfitError where that has one."""
-    assert case.bus is not None
-    unit = unit_named(case.bus, case.machine_id, known)
-    if unit in rows:
-        raise ExfitError(f"{unit}: also in {rows[unit].place}, under the name {rows[unit].name}")
-    rows[unit] = case
 
 
 def import_all(plan: ImportPlan, folder: Path, options: RecordOptions) -> ImportedUnits:
@@ -121,36 +127,43 @@ def import_all(plan: ImportPlan, folder: Path, options: RecordOptions) -> Import
     rows, texts, doubts, used = list[ImportedUnit](), dict[str, str](), list[str](), set[str]()
     file = relative(plan.dyr, folder)
     for unit in plan.units.units:
-        name = plan.name_of(unit)
+        key, name = key_of(unit), plan.name_of(unit)
+        planned = plan.rows.get(key)
+        files = plan.files.get(key, ()) if planned is None else tuple(planned.settings)
+        notes = [f"line {fault.line}: {fault.text}" for fault in unit.warnings]
+        status = RECORDED if files else WRITTEN
         try:
             made = _made(unit, plan, file, folder, options)
         except ExfitError as fault:
-            rows.append(_row(unit, plan, "", str(fault).splitlines()))
-            continue
-        texts[name] = made.draft.text
-        doubts += made.doubts
-        used.update(made.sizes)
-        rows.append(_row(unit, plan, name, _in_words(unit.warnings)))
-    rows += [_refused_row(unit) for unit in plan.units.refused]
+            status, name, notes = REFUSED, "", str(fault).splitlines()
+        else:
+            texts[name] = made.draft.text
+            doubts += made.doubts
+            used.update(made.sizes)
+        added = {part.definition.kind: part.definition.record.name for part in unit.added}
+        row = ImportedUnit(
+            bus=unit.bus,
+            id=unit.id,
+            line=unit.machine.line,
+            machine=unit.machine.definition.record.name,
+            exciter=unit.exciter.definition.record.name,
+            stabiliser=added.get("stabiliser", ""),
+            governor=added.get("governor", ""),
+            status=status,
+            case=name,
+            records="; ".join(str(path) for path in files),
+            notes="; ".join(notes),
+        )
+        rows.append(row)
+    for refused in plan.units.refused:
+        status = REFUSED if refused.modelled else NO_MODEL
+        text = "; ".join(f"line {fault.line}: {fault.text}" for fault in refused.faults)
+        place = (refused.bus, refused.id, refused.line)
+        rows.append(ImportedUnit(*place, "", "", "", "", status, "", "", text))
     unused = tuple(size for size in options.sizes if size not in used)
     return ImportedUnits(
         tuple(sorted(rows, key=lambda row: row.line)), texts, tuple(doubts), unused
     )
-
-
-def units_table(units: Iterable[ImportedUnit]) -> str:
-    """Return all units of a file as CSV."""
-    out = io.StringIO()
-    names = [column.name for column in fields(ImportedUnit)]
-    writer = csv.DictWriter(out, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(unit) for unit in units)
-    return out.getvalue()
-
-
-def key_of(unit: Unit) -> UnitKey:
-    """Return the bus of a unit and its id in capitals."""
-    return UnitKey(unit.bus, unit.id.upper())
 
 
 def _made(
@@ -166,32 +179,100 @@ def _made(
     return case_of_records(inspections, unit_data(unit, file), folder, options.sizes, bases)
 
 
-def _row(unit: Unit, plan: ImportPlan, case: str, notes: Iterable[str]) -> ImportedUnit:
-    key = key_of(unit)
-    planned = plan.rows.get(key)
-    files = plan.files.get(key, ()) if planned is None else tuple(planned.settings)
-    written = RECORDED if files else WRITTEN
-    added = {part.definition.kind: part.definition.record.name for part in unit.added}
-    return ImportedUnit(
-        bus=unit.bus,
-        id=unit.id,
-        line=unit.machine.line,
-        machine=unit.machine.definition.record.name,
-        exciter=unit.exciter.definition.record.name,
-        stabiliser=added.get("stabiliser", ""),
-        governor=added.get("governor", ""),
-        status=written if case else REFUSED,
-        case=case,
-        records="; ".join(str(path) for path in files),
-        notes="; ".join(notes),
-    )
+def units_table(units: Iterable[ImportedUnit]) -> str:
+    """Return all units of a file as CSV."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(ImportedUnit._fields)
+    writer.writerows(units)
+    return out.getvalue()
 
 
-def _refused_row(unit: RefusedUnit) -> ImportedUnit:
-    status = REFUSED if unit.modelled else NO_MODEL
-    notes = "; ".join(_in_words(unit.faults))
-    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", "", status, "", "", notes)
+def key_of(unit: Unit) -> UnitKey:
+    """Return the bus of a unit and its id in capitals."""
+    return UnitKey(unit.bus, unit.id.upper())
 
 
-def _in_words(faults: Iterable[DynamicsFault]) -> Iterator[str]:
-    return (f"line {fault.line}: {fault.text}" for fault in faults)
+@dataclass(frozen=True)
+class CaseMaker:
+    """Makes a case of a table: called, it writes the file and returns "", or why there is none.
+
+    ``units`` are those of each planner's file, or why it cannot be read.
+    """
+
+    case: CaseOfTable
+    file: Path
+    units: Mapping[Path, DynamicsUnits | str]
+
+    def __call__(self) -> str:
+        """Write the case, unless the file exists; return why it cannot be used, or ""."""
+        try:
+            draft = case_of_plan(self.case, self._unit(), self.file.parent, {}).draft
+            if self.file.exists() and self.file.read_bytes() != draft.text.encode():
+                return (
+                    f"{self.file} exists and is not what the table makes: remove it, or give it "
+                    "as a case in place of the row"
+                )
+            write(self.file, draft.text)
+        except ExfitError as fault:
+            return "; ".join(str(fault).splitlines())
+        missing = [f"{dotted(value.place)} (line {value.line})" for value in draft.open_values()]
+        lacking = f"{self.case.place}: the table lacks what {self.file} has as ?: "
+        return lacking + ", ".join(missing) if missing else ""
+
+    def _unit(self) -> UnitData:
+        """Return the data of the unit; raises ExfitError where its file has none."""
+        case, folder = self.case, self.file.parent
+        planner = None
+        if case.dyr is not None:
+            units = self.units[case.dyr]
+            if isinstance(units, str):
+                raise ExfitError(units)
+            unit = _unit_of(case, units, case.dyr)
+            planner = unit_data(unit, relative(case.dyr, folder))
+        return unit_with(case.model, case.machine, planner, folder)
+
+
+def cases_of_table(
+    table: str | PathLike[str], folder: str | PathLike[str] = "fleet"
+) -> dict[Path, Callable[[], str]]:
+    """Prepare the cases of a table of records, each made when called, by their files.
+
+    They lie in the folder ``cases`` of that of a batch, which calls each when its turn comes. A
+    planner's file is read once.
+
+    Raises ExfitError with all faults of the table, each with its row and column.
+
+    Example:
+        >>> made = exfit.cases_of_table("records.xlsx", "fleet")
+        >>> fleet = exfit.batch([], "fleet", made=made)
+    """
+    cases = read_case_table(Path(table))
+    units: dict[Path, DynamicsUnits | str] = {}
+    for file in dict.fromkeys(case.dyr for case in cases if case.dyr is not None):
+        try:
+            units[file] = import_units(file)
+        except DynamicsError as fault:
+            units[file] = str(fault)
+    makers = (CaseMaker(case, Path(folder, CASES, f"{case.name}.yaml"), units) for case in cases)
+    return {maker.file: maker for maker in makers}
+
+
+def _unit_of(case: CaseOfTable, units: DynamicsUnits, file: Path) -> Unit:
+    """Return the unit of a case: that of its bus and id, or the only one of the file.
+
+    Raises ExfitError where there is none or several, or its records have faults.
+    """
+    if case.bus is None:
+        if len(units.units) != 1:
+            count = len(units.units)
+            raise ExfitError(f"{case.place}: bus: missing; {file} has {count} units to import")
+        return units.units[0]
+    for refused in units.refused if case.machine_id is not None else ():
+        if (refused.bus, refused.id.upper()) == (case.bus, str(case.machine_id).upper()):
+            raise DynamicsError(located(refused.faults, str(file)))
+    by_key = {key_of(unit): unit for unit in units.units}
+    try:
+        return by_key[unit_named(case.bus, case.machine_id, [*by_key])]
+    except ExfitError as fault:
+        raise ExfitError(f"{case.place}: {file}: {fault}") from None

@@ -12,10 +12,13 @@ from exfit.cli.options import refuse_existing
 from exfit.cli.streams import echo
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.experiment import ExperimentSetup
 from exfit.simulation.inputs import SplinedInput
 
+Array = NDArray[np.float64]
+
 DIGITS = 9  # significant, of every number
+TURN = 2.0 * np.pi
+BUS, MACHINE_ID = 1, "1"  # of the generator that plays, which no case has
 
 
 def play_in_text(rows: Iterable[tuple[float, float, float]]) -> str:
@@ -33,11 +36,6 @@ def play_in_record(bus: int, machine_id: str, name: str, f0: float) -> str:
     return f"{head} 1 1 '{name}' 1.0 {f0:g} 0.0 0.0 /"
 
 
-Array = NDArray[np.float64]
-
-TURN = 2.0 * np.pi
-
-
 class PlayIn(NamedTuple):
     """What drives a unit in a grid event: voltage (M,), pu, and frequency (M,), Hz, at times, s.
 
@@ -53,29 +51,24 @@ class PlayIn(NamedTuple):
 def played_in(case: Case) -> dict[str, PlayIn]:
     """Collect the inputs of the unit in each grid event of a case, by the record's name.
 
-    Raises CaseError for a case of another plant, ExfitError for a record that cannot be used.
+    The rest before an event is at the rated frequency. Raises CaseError for a case of another
+    plant, ExfitError for a record that cannot be used.
     """
     if not case.kind.finds_rest:
         raise CaseError([f"{case.path}: plant {case.kind.name} is not driven by a grid event"])
     f0 = case.plant.given["f0"]
-    setups = (build_experiment(case, own, case.values()) for own in case.recordings)
-    return {setup.name: play_in_of(setup, f0) for setup in setups}
-
-
-def play_in_of(setup: ExperimentSetup, f0: float) -> PlayIn:
-    """Take a unit's inputs from the record of an event; the rest before it is at ``f0``, Hz."""
-    time, angle = setup.record.time, setup.experiment.simulator.inputs.recorded["angle"]
-    assert isinstance(angle, SplinedInput)
-    turning = angle.slope(time) / TURN
-    return PlayIn(time - time[0], setup.record.signals["vt"], f0 + turning, f0)
-
-
-BUS, MACHINE_ID = 1, "1"  # of the generator that plays, which no case has
+    inputs: dict[str, PlayIn] = {}
+    for recording in case.recordings:
+        setup = build_experiment(case, recording, case.values())
+        time, angle = setup.record.time, setup.experiment.simulator.inputs.recorded["angle"]
+        assert isinstance(angle, SplinedInput)
+        vt, frequency = setup.record.signals["vt"], f0 + angle.slope(time) / TURN
+        inputs[setup.name] = PlayIn(time - time[0], vt, frequency, f0)
+    return inputs
 
 
 def export_play_in(source: Path, output: Path, force: bool) -> None:
     """Write what the records of a fit of grid events played into the unit, a file for each."""
-    from exfit.features.planner.play_in import play_in_record, play_in_text, played_in
     from exfit.results.io import load_result, result_file
     from exfit.util.files import write
     from exfit.workflows import load_case

@@ -2,15 +2,25 @@
 
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from exfit.features.planner.fields import DynamicsFault, Field, Fields, lines_of
-from exfit.features.planner.file_format import WIDTH, FileFormat, Head, Heads, wrong_bus, wrong_id
-from exfit.features.planner.records import PSSE, Definition, definition_of, record_fields
+from exfit.features.planner.fields import DynamicsFault, Field, lines_of
+from exfit.features.planner.records import (
+    PSSE,
+    WIDTH,
+    Definition,
+    FileFormat,
+    Head,
+    Heads,
+    definition_of,
+    record_fields,
+    wrong_place,
+)
 from exfit.util.text import show_value
 
 COMMENTS = ("//", "@!")
+ENDLESS = "the record that begins here has no '/'"
 FIELD = re.compile(
     r"""(?P<comma>,) | (?P<end>/) | '(?P<single>[^']*)' | "(?P<double>[^"]*)"
     | (?P<open>['"]) | (?P<plain>[^\s,/'"]+)""",
@@ -20,6 +30,13 @@ FIELD = re.compile(
 HEAD = re.compile(
     r"""\s*\d+[\s,]+['"]?\s*[A-Za-z]\w*\s*['"]?[\s,]+['"]?\s*\w{1,2}\s*['"]?([\s,]|$)"""
 )
+
+
+class Fields(NamedTuple):
+    """One record: its fields, the first of which is on ``line``."""
+
+    line: int
+    fields: tuple[Field, ...]
 
 
 class FileRecords(NamedTuple):
@@ -49,7 +66,8 @@ def sound_records(text: str) -> FileRecords:
         if line.lstrip().startswith(COMMENTS):
             continue
         if open_ and HEAD.match(line):
-            faults.append(_endless(open_, f"before the next one on line {number}"))
+            fault = f"{ENDLESS} before the next one on line {number}"
+            faults.append(DynamicsFault(open_[0].line, fault))
             open_, unclosed = (), False
         read = _line(line, number, start, after_comma)
         if read.unclosed:
@@ -60,7 +78,7 @@ def sound_records(text: str) -> FileRecords:
             records += [Fields(open_[0].line, open_)] if open_ and not unclosed else []
             open_, after_comma, unclosed = (), True, False
     if open_:
-        faults.append(_endless(open_, "before the end of the file"))
+        faults.append(DynamicsFault(open_[0].line, f"{ENDLESS} before the end of the file"))
     return FileRecords(records, faults)
 
 
@@ -83,14 +101,27 @@ def _line(line: str, number: int, start: int, after_comma: bool) -> _Line:
     return _Line(tuple(fields), after_comma)
 
 
-def _endless(record: tuple[Field, ...], where: str) -> DynamicsFault:
-    return DynamicsFault(record[0].line, f"the record that begins here has no '/' {where}")
-
-
 def heads(text: str) -> Heads:
     """Return the records of a file that belong to a unit."""
     records, faults = sound_records(text)
-    return Heads([head for record in records for head in _heads_of(record, faults)], faults)
+    found: list[Head] = []
+    for line, fields in records:
+        if len(fields) < 3 or not fields[1].text[:1].isalpha():
+            if len(fields) < 3 or any(definition_of(field.text) for field in fields[:2]):
+                begin = " ".join(field.text for field in fields[:3])
+                fault = f"{show_value(begin)} is not bus, 'model' and id"
+                faults.append(DynamicsFault(line, fault))
+            continue  # of a line or a device: their records begin otherwise
+        bus, name, machine_id = (field.text for field in fields[:3])
+        wrong, definition = [*wrong_place(fields[0], machine_id)], definition_of(name)
+        if not wrong:
+            own = name.upper() == "USRMDL" and fields[3:]  # a user's model has its own name
+            label = f"{name} {fields[3].text}" if own else name
+            label = "".join(letter if letter.isprintable() else "?" for letter in label).upper()
+            found.append(Head(int(bus), label, machine_id, line, fields[3:], definition))
+        elif definition is not None:
+            faults += [DynamicsFault(line, f"{name.upper()}: {what}") for what in wrong]
+    return Heads(found, faults)
 
 
 def record_text(
@@ -105,29 +136,6 @@ def record_text(
         "/",
     ]
     return textwrap.fill("  ".join(fields), WIDTH, subsequent_indent="    ", break_on_hyphens=False)
-
-
-def _heads_of(record: Fields, faults: list[DynamicsFault]) -> Iterator[Head]:
-    """Yield the head of a record that belongs to a unit; add a fault where it has none."""
-    line, fields = record
-    if len(fields) < 3 or not fields[1].text[:1].isalpha():
-        if len(fields) < 3 or any(definition_of(field.text) for field in fields[:2]):
-            begin = " ".join(field.text for field in fields[:3])
-            faults.append(DynamicsFault(line, f"{show_value(begin)} is not bus, 'model' and id"))
-        return  # of a line or a device: their records begin otherwise
-    bus, name, machine_id = (field.text for field in fields[:3])
-    wrong = [*wrong_bus(fields[0]), *wrong_id(machine_id)]
-    if not wrong:
-        yield Head(int(bus), _label(fields), machine_id, line, fields[3:], definition_of(name))
-    elif definition_of(name) is not None:
-        faults += [DynamicsFault(line, f"{name.upper()}: {text}") for text in wrong]
-
-
-def _label(fields: Sequence[Field]) -> str:
-    """Return the name of a record's model; of a user's model with its own name."""
-    name = fields[1].text
-    label = f"{name} {fields[3].text}" if name.upper() == "USRMDL" and fields[3:] else name
-    return "".join(letter if letter.isprintable() else "?" for letter in label).upper()
 
 
 PSSE_FILES = FileFormat(PSSE, ".dyr", "// ", "bus, 'model', id, values and '/'", heads, record_text)

@@ -1,7 +1,8 @@
 """The records that exfit has models for: constants in a program's order, read and written."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from exfit.features.planner.fields import DynamicsFault, Field, number, whole
 from exfit.models import GOVERNORS, MODELS, STABILISERS, sheet
@@ -19,6 +20,12 @@ LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
 OF_SATURATION = ("E1", "SE1", "E2", "SE2")
 LEAST_DIGITS = 4  # of a fitted value: with fewer, values that depend on each other miss the record
+WIDTH = 80  # columns of a file
+LONGEST_ID = 2
+LONGEST_BUS = 10  # digits that are looked at
+MOST_BUSES = 10**6
+
+Texts = Iterable[tuple[str, str]]  # (symbol, what is wrong or must be known)
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,12 @@ class Definition:
         return (*(name for name, _ in self.record.icons if name not in cons), *cons)
 
     @property
+    def symbols(self) -> list[str]:
+        """The parameters of the model that the record lists, in its order."""
+        own = {row.symbol for row in self.model.sheet}
+        return [name for name in self.names if name in own]
+
+    @property
     def codes(self) -> tuple[str, ...]:
         """The integers that say which signals the inputs of a stabiliser are."""
         return tuple(name for name, _ in self.record.icons if name.startswith("ICS"))
@@ -51,21 +64,60 @@ class Definition:
         return tuple(row.symbol for row in self.model.sheet if row.symbol not in given)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """What the fields of a record say: values by symbol, what is wrong, what must be known.
+class Head(NamedTuple):
+    """A record by what it begins with, and the fields behind.
 
-    ``inputs`` are the signals of a stabiliser whose record has codes of them; ``times_speed`` says
-    that efd is multiplied by the speed; ``unused`` are the file's values of what is 0 in
-    ``values``, since its program does without them, or not there: the rating of a turbine.
+    ``definition`` is what exfit has a model of, None if it has none; ``base`` the MVA or MW that
+    its values are on, where the record says so; ``faults`` are those of its fields.
     """
 
-    values: Mapping[str, float]
+    bus: int
+    name: str
+    id: str
+    line: int
+    fields: tuple[Field, ...]
+    definition: Definition | None
+    program: str = PSSE
+    base: float | None = None
+    faults: tuple[DynamicsFault, ...] = ()
+
+
+class Heads(NamedTuple):
+    """The records of a file that belong to a unit, and what is wrong with others."""
+
+    heads: list[Head]
     faults: list[DynamicsFault]
-    warnings: list[DynamicsFault]
-    inputs: tuple[str, ...] = ()
-    times_speed: bool = False
-    unused: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """The files of a program.
+
+    ``heads(text)`` are the records of a file; ``record_text(definition, values, bus, id)`` is one
+    of them; ``comment`` begins a line that is none; ``begins`` says how a record begins.
+    """
+
+    program: str
+    suffix: str
+    comment: str
+    begins: str
+    heads: Callable[[str], Heads]
+    record_text: Callable[[Definition, Mapping[str, float], int, str], str]
+
+
+def wrong_place(bus: Field, machine_id: str) -> Iterator[str]:
+    """Refuse a field that is not the number of a bus, and a text that is no machine's id."""
+    whole = not bus.quoted and bus.text.isascii() and bus.text.isdigit()
+    if not whole or not 0 < int(bus.text[:LONGEST_BUS]) < MOST_BUSES:
+        advice = "; write the number in place of the name" if bus.quoted else ""
+        yield f"{show_value(bus.text)} is not the number of a bus{advice}"
+    if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
+        yield f"{show_value(machine_id)} is not a machine id of one or two characters"
+
+
+def is_machine_id(text: str) -> bool:
+    """Tell if a record that exfit writes can have this id of a machine."""
+    return 1 <= len(text) <= LONGEST_ID and text.isascii() and text.isalnum()
 
 
 def definitions(program: str = PSSE) -> list[Definition]:
@@ -90,18 +142,13 @@ def definition_of(name: str, program: str = PSSE) -> Definition | None:
     A further record of a model is meant only where the model is known by that very name: PSS/E's
     ESAC8B is another model than the AC8B that can be written as one.
     """
-    of_that_name = [
-        definition
-        for definition in definitions(program)
-        if definition.record.name.upper() == name.upper()
-    ]
-    for definition in of_that_name:
-        if program == PSLF or definition.record == definition.model.records[0]:
-            return definition
-    for definition in of_that_name:
-        model = definition.model
-        if definition.record.name in (model.name, *getattr(model, "aliases", ())):
-            return definition
+    named = [own for own in definitions(program) if own.record.name.upper() == name.upper()]
+    for own in named:
+        if program == PSLF or own.record == own.model.records[0]:
+            return own
+    for own in named:
+        if own.record.name in (own.model.name, *getattr(own.model, "aliases", ())):
+            return own
     return None
 
 
@@ -110,29 +157,56 @@ def alternatives(model: Model | Machine, program: str = PSSE) -> list[Definition
     return [definition for definition in definitions(program) if definition.model is model]
 
 
-def contradictions(
-    model: Model | Machine, values: Mapping[str, float]
-) -> Iterable[tuple[str, str]]:
+def contradictions(model: Model | Machine, values: Mapping[str, float]) -> Texts:
     """Return (symbol, fault) for values of a model that contradict each other."""
     return model.faults(values) if isinstance(model, Machine) else sheet.contradictions(values)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A record as it is read: values by symbol, what is wrong, what must be known.
+
+    It begins on ``line``; ``fields`` are those behind the id, one for each name of the definition;
+    ``inputs`` are the signals of a stabiliser whose record has codes of them; ``times_speed`` says
+    that efd is multiplied by the speed; ``unused`` are the file's values of what is 0 in
+    ``values``, since its program does without them, or not there: the rating of a turbine.
+    """
+
+    definition: Definition
+    line: int
+    fields: tuple[Field, ...]
+    values: Mapping[str, float]
+    faults: list[DynamicsFault]
+    warnings: list[DynamicsFault]
+    inputs: tuple[str, ...] = ()
+    times_speed: bool = False
+    unused: tuple[tuple[str, float], ...] = ()
 
 
 def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
     """Read the fields behind a record's id; ``line`` is where the record begins."""
     record, names = definition.record, definition.names
     if len(fields) != len(names):
-        count = DynamicsFault(line, _wrong_count(definition, len(fields)))
-        return Reading({}, [count, *_no_numbers(record.name, fields)], [])
-    lines = dict(zip(names, (field.line for field in fields), strict=True))
+        return Reading(definition, line, fields, {}, [*_count_faults(definition, line, fields)], [])
+    lines = {name: field.line for name, field in zip(names, fields, strict=True)}
 
-    def placed(texts: Iterable[tuple[str, str]]) -> list[DynamicsFault]:
+    def placed(texts: Texts) -> list[DynamicsFault]:
         return [
             DynamicsFault(lines.get(name, line), f"{record.name}: {name}: {text}")
             for name, text in texts
         ]
 
-    given, unreadable = _numbers(definition, fields)
-    rows = definition.model.sheet
+    icons, rows = dict(record.icons), definition.model.sheet
+    given, unreadable = dict[str, float](), list[tuple[str, str]]()
+    for name, field in zip(names, fields, strict=True):
+        try:
+            whole_of_psse = name in icons and definition.program == PSSE
+            value = whole(field) if whole_of_psse else number(field)
+            if name in icons and not float(value).is_integer():  # PSLF writes it as a number
+                raise ValueError(f"{show_value(field.text)} is not a whole number")
+            given[name] = int(value) if name in icons else value
+        except ValueError as error:
+            unreadable.append((name, str(error)))
     given = with_exchanged(record, given)
     of_sheet = {row.symbol: given[row.symbol] for row in rows if row.symbol in given}
     idle = idle_lags(rows, of_sheet)
@@ -142,15 +216,101 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     wrong = [*unreadable, *outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
     doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
-    unmodelled = [*_unmodelled(definition, given), *_without_effect(rows, of_sheet)]
-    unmodelled += [*_unused(definition, unused), *_rating(given)]
-    unmodelled += [(row.symbol, _says_nothing(row)) for row in idle]
-    short = [*_short(definition, line, fields)]
-    warnings = doubt + short + placed([*unmodelled, *_lacking(definition)])
+    behind = [name for name, field in zip(names, fields, strict=True) if not field.end]
+    missing = ", ".join(name for name in behind if name in dict(record.absent))
+    if missing:
+        text = f"{record.name}: not in the file, taken as without effect: {missing}"
+        doubt.append(DynamicsFault(line, text))
+    remarks = [
+        *_unmodelled(definition, given),
+        *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
+        *((row.symbol, _says_nothing(row)) for row in idle),
+        *_lacking(definition),
+    ]
+    codes = [(given.get(name, icons[name]), icons[name]) for name in definition.codes]
+    inputs = tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
+    if given.get(RATING, 0.0) != 0.0:
+        unused[RATING] = given[RATING]
     times_speed = record.times_speed or given.get(SPEED_FLAG, 0.0) != 0.0
-    inputs = _inputs(definition, given)
-    kept = tuple((unused | {name: given[name] for name, _ in _rating(given)}).items())
-    return Reading(values, placed(wrong), warnings, inputs, times_speed, kept)
+    return Reading(
+        definition,
+        line,
+        fields,
+        values,
+        placed(wrong),
+        doubt + placed(remarks),
+        inputs,
+        times_speed,
+        tuple(unused.items()),
+    )
+
+
+def _count_faults(
+    definition: Definition, line: int, fields: tuple[Field, ...]
+) -> Iterator[DynamicsFault]:
+    """Yield the wrong count of values, and those that are no numbers: one may spoil the count."""
+    name, count = definition.record.name, len(fields)
+    icons = len(definition.record.icons)
+    cons = len(definition.names) - icons
+    parts = f"{icons} integers and {cons} constants" if icons else f"{cons} constants"
+    plural = "value" if count == 1 else "values"
+    yield DynamicsFault(
+        line,
+        f"{name}: {count} {plural} after the id, but the record has {icons + cons} ({parts}): "
+        + " ".join(definition.names),
+    )
+    for field in fields:
+        try:
+            number(field)
+        except ValueError as error:
+            yield DynamicsFault(field.line, f"{name}: {error}")
+
+
+def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Texts:
+    """Yield (symbol, warning) for what the model has in one way only."""
+    record = definition.record
+    explained = {*record.ignored, *(row.symbol for row in definition.model.sheet)}
+    for name, modelled in (*record.icons, *record.absent):
+        value = given.get(name, modelled)
+        known = name in definition.codes and value in SIGNALS
+        known = known or (name in FLAGS and value in dict(record.places))
+        known = known or (name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH)
+        if not known and value != modelled and name not in explained:
+            yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
+
+
+def _without_effect(
+    definition: Definition,
+    given: Mapping[str, float],
+    unused: Mapping[str, float],
+    rating: float,
+) -> Texts:
+    """Yield (symbol, warning) for what does nothing: without its lag, or in the program."""
+    for row in definition.model.sheet:  # without its lag a PID is a PI
+        lag = "" if row.search is None or not row.symbol.startswith("K") else row.search.needs
+        value = given.get(row.symbol, 0.0)
+        if value != 0.0 and given.get(lag) == 0.0:
+            yield row.symbol, f"{show(value)} has no effect, since {lag} is 0"
+    for name, value in unused.items():
+        other = dict(definition.record.unused)[name]
+        why = f", since {other} is 0" if other else ""
+        yield name, f"{show(value)} does not act in {definition.program}{why}; 0 is taken"
+    if rating != 0.0:
+        text = f"{show(rating)} MW, but the machine's base is not in the file: {SHARE} is 1 in the "
+        yield RATING, f"{text}case, where it must be {show(rating)} over that base"
+
+
+def _says_nothing(row: Parameter) -> str:
+    gain = "" if row.search is None else row.search.needs
+    return f"0 says nothing, since {gain} is 0; the typical value {show(row.typical)} is taken"
+
+
+def _lacking(definition: Definition) -> Texts:
+    """Yield (symbol, warning) for what the model has and the record has not."""
+    for row in definition.model.sheet:
+        if row.symbol in definition.absent:
+            text = f"not in the record; the typical value {show(row.typical)} is taken"
+            yield row.symbol, text
 
 
 def with_exchanged(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:
@@ -196,131 +356,16 @@ def idle_lags(rows: Sheet, given: Mapping[str, float]) -> list[Parameter]:
     ]
 
 
-def _says_nothing(row: Parameter) -> str:
-    gain = "" if row.search is None else row.search.needs
-    return f"0 says nothing, since {gain} is 0; the typical value {show(row.typical)} is taken"
-
-
 def in_digits_borne(value: float, error: float | None) -> float:
     """A fitted value in the digits that its standard error bears, at least four."""
     candidates = float(rounded(value, error)), float(f"{value:.{LEAST_DIGITS}g}")
     return min(candidates, key=lambda candidate: abs(candidate - value))
 
 
-def _numbers(
-    definition: Definition, fields: tuple[Field, ...]
-) -> tuple[dict[str, float], list[tuple[str, str]]]:
-    """Return the numbers of a record by symbol, and (symbol, fault) for what is none."""
-    integers = dict(definition.record.icons)
-    values: dict[str, float] = {}
-    faults = []
-    for name, field in zip(definition.names, fields, strict=True):
-        try:
-            values[name] = _whole(definition, field) if name in integers else number(field)
-        except ValueError as error:
-            faults.append((name, str(error)))
-    return values, faults
-
-
-def _whole(definition: Definition, field: Field) -> int:
-    """Return an integer of a record, which PSLF writes as a number; raises ValueError."""
-    if definition.program == PSSE:
-        return whole(field)
-    value = number(field)
-    if not value.is_integer():
-        raise ValueError(f"{show_value(field.text)} is not a whole number")
-    return int(value)
-
-
-def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[DynamicsFault]:
-    """Name fields that are no numbers, such as a repeat count: one may spoil the count."""
-    for field in fields:
-        try:
-            number(field)
-        except ValueError as error:
-            yield DynamicsFault(field.line, f"{name}: {error}")
-
-
-def _inputs(definition: Definition, given: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the input signals of a stabiliser; its model's for codes that nothing stands for."""
-    modelled = dict(definition.record.icons)
-    codes = [(given.get(name, modelled[name]), modelled[name]) for name in definition.codes]
-    return tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
-
-
-def _short(definition: Definition, line: int, fields: tuple[Field, ...]) -> Iterable[DynamicsFault]:
-    """Name the values with an effect that a file of PSLF does not have."""
-    record = definition.record
-    named = zip(definition.names, fields, strict=True)
-    missing = [name for name, field in named if not field.end and name in dict(record.absent)]
-    if missing:
-        text = f"{record.name}: not in the file, taken as without effect: {', '.join(missing)}"
-        yield DynamicsFault(line, text)
-
-
-def _lacking(definition: Definition) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for what the model has and the record has not."""
-    for row in definition.model.sheet:
-        if row.symbol in definition.absent:
-            text = f"not in the record; the typical value {show(row.typical)} is taken"
-            yield row.symbol, text
-
-
-def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for what the model has in one way only."""
-    explained = {*definition.record.ignored, *(row.symbol for row in definition.model.sheet)}
-    places = dict(definition.record.places)
-    for name, modelled in (*definition.record.icons, *definition.record.absent):
-        value = given.get(name, modelled)
-        if (name in definition.codes and value in SIGNALS) or (name in FLAGS and value in places):
-            continue
-        if name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH:
-            continue
-        if value != modelled and name not in explained:
-            yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
-
-
-def _unused(definition: Definition, unused: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for what the program of a record does without."""
-    for name, value in unused.items():
-        other = dict(definition.record.unused)[name]
-        why = f", since {other} is 0" if other else ""
-        yield name, f"{show(value)} does not act in {definition.program}{why}; 0 is taken"
-
-
-def _rating(given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for the rating of a turbine, where it has one of its own."""
-    rating = given.get(RATING, 0.0)
-    if rating != 0.0:
-        text = f"{show(rating)} MW, but the machine's base is not in the file: {SHARE} is 1 in the "
-        yield RATING, f"{text}case, where it must be {show(rating)} over that base"
-
-
-def _without_effect(rows: Sheet, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for a gain that does nothing without its lag: a PID is then a PI."""
-    for row in rows:
-        lag = "" if row.search is None or not row.symbol.startswith("K") else row.search.needs
-        value = given.get(row.symbol, 0.0)
-        if value != 0.0 and given.get(lag) == 0.0:
-            yield row.symbol, f"{show(value)} has no effect, since {lag} is 0"
-
-
-def outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+def outside(rows: Sheet, values: Mapping[str, float]) -> Texts:
     """Yield (symbol, fault) for each value that its data sheet excludes."""
     for row in rows:
         value = values.get(row.symbol, row.low)
         if not row.low <= value <= row.high:
             limits = f"{show(row.low)} ... {show(row.high)} {row.unit}"
             yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range"
-
-
-def _wrong_count(definition: Definition, count: int) -> str:
-    icons = len(definition.record.icons)
-    cons = len(definition.names) - icons
-    parts = f"{icons} integers and {cons} constants" if icons else f"{cons} constants"
-    order = " ".join(definition.names)
-    plural = "value" if count == 1 else "values"
-    return (
-        f"{definition.record.name}: {count} {plural} after the id, "
-        f"but the record has {icons + cons} ({parts}): {order}"
-    )

@@ -26,8 +26,8 @@ from exfit.util.text import dotted, printable
 if TYPE_CHECKING:
     from exfit.case.case_draft import CaseDraft, OpenValue
     from exfit.case.suggestion import Base, RecordSettings
+    from exfit.features.start.starting_case import UnitData
     from exfit.features.start.starting_tests import StartingTest
-    from exfit.features.start.starting_unit import UnitData
 
 
 RATING = click.FloatRange(min=0.0, min_open=True)
@@ -192,7 +192,7 @@ def _unit(given: UnitSources, folder: Path) -> "UnitData":
     """Return the data of the unit: typical, a planner's, with the machine of another case."""
     from dataclasses import replace
 
-    from exfit.features.start.starting_unit import machine_of_case, unit_with
+    from exfit.features.start.starting_case import machine_of_case, unit_with
 
     _refuse_unused(given)
     planner = None

@@ -1,19 +1,24 @@
 """A case to start from: a model, records, and what is typical for all that is not known."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from exfit.case.case_draft import (
     CaseDraft,
     Noted,
+    OpenValue,
     Remark,
     Section,
     in_braces,
     parameter,
     with_sources,
 )
+from exfit.case.load import load_case
 from exfit.case.other_model import ALONE, bounds_of, free_of
 from exfit.case.suggestion import (
+    Base,
     channels_section,
     record_of,
     relative,
@@ -23,14 +28,24 @@ from exfit.case.suggestion import (
     weights_section,
 )
 from exfit.case.yaml import QUESTION
-from exfit.features.start.starting_tests import StartingTest
-from exfit.features.start.starting_unit import PartData, UnitData
-from exfit.models.machines import Machine
-from exfit.models.sheet import Model
+from exfit.errors import CaseError, ExfitError
+from exfit.features.start.starting_tests import (
+    StartingTest,
+    doubtful_bases,
+    refuse_other_size,
+    sizes_in_use,
+    starting_tests,
+)
+from exfit.features.start.tables import CaseOfTable, TableRow, tests_of_table
+from exfit.models import find
+from exfit.models.machines import Machine, find_machine
+from exfit.models.sheet import Model, typical
+from exfit.plants import MACHINE
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.records.contradictions import shows_power
 from exfit.records.inspection import Inspection
+from exfit.records.recorded_tests import tests_of
 from exfit.util.sources import TYPICAL
 from exfit.util.text import first_texts
 
@@ -40,6 +55,84 @@ validate:               # a record that the fit does not see, as the step down
     test: {vref: [{at: 1.0, step: -0.05}]}
     record: {file: down.csv, time: t, channels: {vt: vt}}""")
 FACTS_TO_COME = Remark("about: {Plant: ..., Unit: ..., Rated: ..., Tested by: ...}  # for reports")
+
+
+@dataclass(frozen=True)
+class PartData:
+    """A model with a value for each parameter, and the sources of these in the words of a case.
+
+    A value without a source is not stated; ``origin`` says in a comment where the data are from;
+    ``inputs`` are the signals of a stabiliser, () for those of its model; ``times_speed`` says that
+    the speed multiplies the efd of an exciter.
+    """
+
+    model: Model | Machine
+    values: Mapping[str, float]
+    sources: Mapping[str, str]
+    origin: str = ""
+    inputs: tuple[str, ...] = ()
+    times_speed: bool = False
+
+    @classmethod
+    def typical(cls, model: Model | Machine) -> "PartData":
+        """Return a model with its typical data."""
+        return cls(model, typical(model.sheet), {row.symbol: TYPICAL for row in model.sheet})
+
+
+@dataclass(frozen=True)
+class UnitData:
+    """The exciter, behind the ``name`` that the case gives it, its machine, and what is ``added``.
+
+    That are the stabiliser and the governor, each under the key of its section; ``as_found``
+    is the section of what was in the planner's base.
+    """
+
+    name: str
+    exciter: PartData
+    machine: PartData
+    added: Mapping[str, PartData] = field(default_factory=dict)
+    as_found: Section = field(default_factory=dict)
+
+
+def unit_with(
+    model: str | None, machine: str | None, planner: UnitData | None, folder: Path
+) -> UnitData:
+    """Return a unit with typical data, or a planner's, with another exciter where one is given.
+
+    A ``model`` that is a file is named as a case in a folder does. Raises ExfitError for a model or
+    a machine that is not in the catalogue, and where neither a model nor a planner's unit is given.
+    """
+    if model is None:
+        if planner is None:
+            raise ExfitError("model: missing; the exciter is not known")
+        return planner
+    exciter = find(model, Path())
+    if planner is not None and exciter is planner.exciter.model:
+        return planner
+    name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
+    data = PartData.typical(exciter)
+    if planner is not None:
+        return replace(planner, name=name, exciter=data)
+    return UnitData(name, data, PartData.typical(find_machine(machine or "GENROU")))
+
+
+def machine_of_case(path: Path) -> PartData:
+    """Return the machine of another case with its values, those that are fitted at their start.
+
+    Raises CaseError with all faults of that case, and where it has no machine.
+    """
+    case = load_case(path)
+    machine = case.parts.machine
+    if machine is None:
+        raise CaseError([f"{path}: plant {case.plant.type} has no machine"])
+    values, sources = case.values(), case.sources()
+    names = {row.symbol: MACHINE + row.symbol for row in machine.sheet}
+    return PartData(
+        machine,
+        {symbol: values[name] for symbol, name in names.items()},
+        {symbol: sources[name] for symbol, name in names.items()},
+        f"those of {path.name}",
+    )
 
 
 def starting_case(
@@ -232,3 +325,88 @@ def _parameters(exciter: PartData) -> Section:
         section["free"] = Noted(starts, "found between bounds about where it starts")
     sources = {name: word for name, word in exciter.sources.items() if name in fixed}
     return with_sources(section, sources)
+
+
+class MadeCase(NamedTuple):
+    """A new case, what is doubtful in it, and the sizes of steps that it uses."""
+
+    draft: CaseDraft
+    doubts: tuple[str, ...]
+    sizes: tuple[str, ...] = ()
+
+
+def case_of_records(
+    inspections: Sequence[Inspection],
+    unit: UnitData,
+    folder: Path,
+    sizes: Sequence[str],
+    bases: Mapping[str, Base],
+) -> MadeCase:
+    """Return the case of a unit with all tests of its records, to be written into a folder.
+
+    Of ``sizes``, texts as 0.05 or up=0.05, those are used that are of one of its tests. Raises
+    ExfitError where a record contradicts them.
+    """
+    own = sizes_in_use(sizes, inspections)
+    tests = starting_tests(inspections, own, bases)
+    return MadeCase(starting_case(unit, tests, folder), tuple(doubtful_bases(tests)), tuple(own))
+
+
+def case_of_plan(
+    case: CaseOfTable, unit: UnitData, folder: Path, bases: Mapping[str, Base]
+) -> MadeCase:
+    """Return the case that a table describes, to be written into a folder.
+
+    ``bases`` are by signal; those of the table count more. What neither the records nor the table
+    says is to be filled in. Raises ExfitError where a record cannot be read or contradicts its row.
+    """
+    inspections = {file: settings.inspect(file) for file, settings in case.settings.items()}
+    tests = _tests(case.tests, inspections, bases)
+    draft = starting_case(unit, tests, folder, case.about)
+    given = dict(_given_values(case, draft.open_values()))
+    return MadeCase(draft.filled(given), tuple(doubtful_bases(tests)))
+
+
+def _tests(
+    rows: Sequence[TableRow], inspections: Mapping[Path, Inspection], bases: Mapping[str, Base]
+) -> tuple[StartingTest, ...]:
+    """Return the tests of rows; one without an instant is of all the tests of its record."""
+    only = inspections[rows[0].file] if len(rows) == 1 and rows[0].file is not None else None
+    if only is not None and not tests_of(only) and rows[0].at is None and rows[0].step is None:
+        base = rows[0].base
+        return starting_tests([only], (), bases if base is None else {**bases, "vt": base})
+    return tests_of_table([*_of_each_test(rows, inspections)], inspections, bases)
+
+
+def _of_each_test(
+    rows: Sequence[TableRow], inspections: Mapping[Path, Inspection]
+) -> Iterator[TableRow]:
+    """Yield a row for each test; one without an instant is of all tests of a record of its own."""
+    files = [row.file for row in rows]
+    for row in rows:
+        assert row.file is not None
+        inspection = inspections[row.file]
+        tests = tests_of(inspection)
+        if row.at is not None or len(tests) < 2 or files.count(row.file) > 1:
+            yield row
+            continue
+        for test in tests:
+            if row.step is not None:
+                try:
+                    refuse_other_size(inspection, test, row.step)
+                except ExfitError as fault:
+                    raise ExfitError(f"{row.place}: step: {fault}") from None
+            yield row._replace(at=test.at)
+
+
+def _given_values(
+    case: CaseOfTable, values: Sequence[OpenValue]
+) -> Iterator[tuple[OpenValue, str | float]]:
+    """Yield the open values of a case that its table gives, as a case has them."""
+    voltages = {settings.voltage for settings in case.settings.values() if settings.voltage}
+    for value in values:
+        *_, section, key = ("", *value.place)
+        if section == "network" and key in case.network:
+            yield value, case.network[str(key)]
+        elif value.place[-3:] == ("channels", "vt", "column") and len(voltages) == 1:
+            yield value, next(iter(voltages))

@@ -9,9 +9,8 @@ from exfit.case.case_draft import CaseDraft
 from exfit.case.load import record_section
 from exfit.case.suggestion import RecordSettings, rated_bases
 from exfit.features.events.suggestion import event_sections
-from exfit.features.start.starting_case import starting_case
+from exfit.features.start.starting_case import starting_case, unit_with
 from exfit.features.start.starting_tests import starting_tests
-from exfit.features.start.starting_unit import unit_with
 from exfit.fitting.recordings import read_section
 from exfit.util.text import dotted
 

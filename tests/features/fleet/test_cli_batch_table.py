@@ -11,7 +11,7 @@ from exfit.case.load import load_case
 from exfit.features.fleet import batch as batches
 from exfit.features.fleet.batch import batch
 from exfit.features.fleet.folder import read_fleet
-from exfit.features.planner.table_cases import cases_of_table
+from exfit.features.planner.import_all import cases_of_table
 
 TABLE = """\
 file,dyr,bus,id,step,about.Plant

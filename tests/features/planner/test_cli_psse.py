@@ -21,7 +21,7 @@ from tiers import few_of
 from exfit import cli
 from exfit.case.load import load_case
 from exfit.features.planner.records import definition_of
-from exfit.features.planner.unit import read_unit
+from exfit.features.planner.units import read_unit
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.sheet import record, typical
 from exfit.plants import MACHINE

@@ -12,8 +12,7 @@ from exfit.errors import DynamicsError
 from exfit.features.planner.import_case import import_unit, imported_case
 from exfit.features.planner.pslf import PSLF_FILES, heads, record_text
 from exfit.features.planner.records import PSLF, definition_of, definitions, read_values
-from exfit.features.planner.unit import read_unit
-from exfit.features.planner.units import read_units
+from exfit.features.planner.units import read_unit, read_units
 from exfit.models.sheet import typical
 
 DEFINITIONS = {definition.record.name: definition for definition in definitions(PSLF)}

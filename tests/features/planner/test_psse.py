@@ -25,7 +25,7 @@ from exfit.features.planner.records import (
     definitions,
     read_values,
 )
-from exfit.features.planner.unit import read_unit
+from exfit.features.planner.units import read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record, typical
 

@@ -8,8 +8,7 @@ from tiers import few_of
 from exfit.errors import DynamicsError
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.psse import sound_records
-from exfit.features.planner.unit import read_unit
-from exfit.features.planner.units import read_units
+from exfit.features.planner.units import read_unit, read_units
 
 BUSES = range(101, 109)
 

@@ -13,9 +13,8 @@ from tiers import few_of
 from exfit.case.load import load_case
 from exfit.case.other_model import bounds_of, free_of
 from exfit.errors import CaseError
-from exfit.features.start.starting_case import starting_case
+from exfit.features.start.starting_case import PartData, UnitData, starting_case
 from exfit.features.start.starting_tests import starting_tests
-from exfit.features.start.starting_unit import PartData, UnitData
 from exfit.fitting.build import build_experiments
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST

@@ -8,7 +8,7 @@ from places import ROOT
 
 from exfit import workflows
 from exfit.case.load import load_case
-from exfit.features.planner.unit import read_unit
+from exfit.features.planner.units import read_unit
 from exfit.show.run_folder import write_fit
 
 WIDTH = 80
