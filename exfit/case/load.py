@@ -160,9 +160,9 @@ def _with_record_sections(
     """
     sections = {} if "records" in content else {SINGLE: content}
     for key in ("records", "validate"):
-        if isinstance(content.get(key), list):
-            named = [entry for entry in content[key] if isinstance(entry, dict) and "name" in entry]
-            sections |= {str(entry["name"]): entry for entry in named}
+        for entry in ContentNode((), content).at(key).entries:
+            if "name" in entry:
+                sections[str(entry.value["name"])] = entry.value
     for name, record in records.items():
         if name not in sections:
             text = f"{name} is given, but is not a record of the case; {near(name, sections)}"
@@ -171,20 +171,11 @@ def _with_record_sections(
         section = sections[name].get("record", {})
         if isinstance(section, dict):  # what is none is a fault of its own
             channels = section.get("channels", {signal: {} for signal in record.signals})
-            if isinstance(channels, dict):
-                channels = {
-                    signal: {"column": signal, **entry}
-                    if isinstance(entry, dict) and not {"column", "phases"} & entry.keys()
-                    else entry
-                    for signal, entry in channels.items()
-                }
-            file = record.source.as_posix()
-            sections[name]["record"] = {
-                "file": file,
-                "time": "time",
-                **section,
-                "channels": channels,
-            }
+            for signal, entry in channels.items() if isinstance(channels, dict) else ():
+                if isinstance(entry, dict) and not {"column", "phases"} & entry.keys():
+                    entry["column"] = signal
+            read = {"file": record.source.as_posix(), "time": "time"}
+            sections[name]["record"] = {**read, **section, "channels": channels}
     return content
 
 

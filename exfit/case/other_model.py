@@ -59,6 +59,24 @@ def bounds_of(row: Parameter, start: float | None = None) -> tuple[float, float]
     return max(low, row.low), min(high, row.high)
 
 
+def _free_section(row: Parameter) -> FreeSection:
+    low, high = bounds_of(row)
+    return FreeSection(start=row.typical, min=low, max=high)
+
+
+def _refuse_followers(case: Case, own: set[str]) -> None:
+    """Raise CaseError for each tie of another part that uses one of the exciter's parameters."""
+    faults = [
+        f"{case.path}: {tied} {tie.text}: {used} belongs to {case.subject}; a case for other "
+        "models needs a number here"
+        for tied, tie in case.ties.by_name.items()
+        for used in tie.names
+        if used in own and tied not in own
+    ]
+    if faults:
+        raise CaseError(faults)
+
+
 def with_exciter(case: Case, name: str, model: Model) -> Case:
     """Return a case with another exciter, by the ``name`` that a case gives it.
 
@@ -70,20 +88,7 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
         raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to replace"])
     symbols = (row.symbol for row in case.parts.exciter.sheet)
     own = {*symbols, *case.parameters.free, *case.parameters.fixed}  # with helpers of its ties
-    ties = {tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}
-    faults = [
-        f"{case.path}: {tied} {tie.text}: {used} belongs to {case.subject}; a case for other "
-        "models needs a number here"
-        for tied, tie in ties.items()
-        for used in tie.names
-        if used in own
-    ]
-    if faults:
-        raise CaseError(faults)
-    free = {}
-    for row in free_of(model):
-        low, high = bounds_of(row)
-        free[row.symbol] = FreeSection(start=row.typical, min=low, max=high)
+    _refuse_followers(case, own)
     others = (part for part in case.parts.all if part.kind != "exciter")
     multiplied = times_speed(model) if case.efd_times_speed else model
     exciter = exciter_part(multiplied, exponential=False)
@@ -94,8 +99,8 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
         model=name,
         saturation="quadratic",
         parts=replace(case.parts, exciter=multiplied, all=(exciter, *others)),
-        ties=Ties(ties),
-        parameters=Parameters(free=free),
+        ties=Ties({tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}),
+        parameters=Parameters(free={row.symbol: _free_section(row) for row in free_of(model)}),
         given_values={key: given for key, given in case.given_values.items() if key not in own},
         given_sources={key: word for key, word in case.given_sources.items() if key not in own},
     )

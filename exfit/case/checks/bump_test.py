@@ -15,32 +15,37 @@ RECORDED = "recorded"  # in place of steps: the channel of the record
 
 def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of a test; ``network`` is that of its plant."""
-    duration, steady = test.at("duration").number, test.at("steady_until")
+    duration = test.at("duration").number
     for name in EVENTS:
         yield from _step_faults(test, name)
         yield from _table_faults(test.at(name), duration)
         for place, at in _moves(test.at(name)):
             yield from _place_faults(place, at, duration)
-        if name in test and name not in kind.events:
+        if name not in kind.events and name in test:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
+    if not kind.finds_rest and test.at("frequency_offset").value is not None:
+        yield test.at("frequency_offset").fault(no_event(kind))
     for switch in test.at("network").entries:
         if switch.at("E").number is not None and "E" not in network:
             text = "only where plant.network gives E; test.E changes it by steps"
             yield switch.at("E").fault(text)
-    instants = [at for _, at in instants_of(test)]
-    if kind.plays_back:
-        if "begin" in test:
-            text = f"not allowed with plant {kind.name}: the record drives the simulation"
-            yield test.at("begin").fault(text)
-        if steady.number is None and not kind.finds_rest and not instants:
-            yield steady.fault("is missing: until when is the record at rest?")
-    elif test.content and not {*EVENTS} & test.content.keys():
+    if not kind.plays_back and test.content and not {*EVENTS} & test.content.keys():
         yield test.fault(f"no step: give one of {', '.join(kind.events)}")
-    if steady.number is not None and instants and steady.number > min(instants):
+    yield from _rest_faults(test, kind)
+
+
+def _rest_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield what contradicts itself in the state of rest before a test."""
+    steady, instants = test.at("steady_until"), [at for _, at in instants_of(test)]
+    if kind.plays_back and "begin" in test:
+        text = f"not allowed with plant {kind.name}: the record drives the simulation"
+        yield test.at("begin").fault(text)
+    if steady.number is None:
+        if kind.plays_back and not kind.finds_rest and not instants:
+            yield steady.fault("is missing: until when is the record at rest?")
+    elif instants and steady.number > min(instants):
         text = f"{show(steady.number)} s is after the first step, at {show(min(instants))} s"
         yield steady.fault(text)
-    if not kind.finds_rest and test.at("frequency_offset").value is not None:
-        yield test.at("frequency_offset").fault(no_event(kind))
     if kind.per_unit:
         vt0 = test.at("vt0")
         for node, voltage in ((vt0, vt0.start), (vt0.at("min"), vt0.at("min").number)):
@@ -138,9 +143,9 @@ def _place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[
 def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of a breaker that opens, beside the rest of its test and its record."""
     breaker, channels = test.at(BREAKER), record.at("channels")
+    if test.value == {} and kind.events == (BREAKER,):
+        yield breaker.fault(f"is missing: nothing else acts with plant {kind.name}")
     if not breaker.is_section:
-        if test.value == {} and kind.events == (BREAKER,):
-            yield breaker.fault(f"is missing: nothing else acts with plant {kind.name}")
         return
     driving, opens = driving_signals(test, record, kind), breaker.at("opens")
     if breaker.at("speed").text == "recorded" and SPEED not in channels:
@@ -148,28 +153,38 @@ def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> I
     for signal in driving:
         idle = ("weight", "noise", "filter", "outliers", "sine") if signal == SPEED else ()
         yield from driving_faults(channels.at(signal), idle)
-    if driving and record.at("delay").value not in (None, 0, 0.0):
+    if driving and (record.at("delay").value or 0) != 0:
         text = f"not allowed where the record's {' and '.join(driving)} drives the simulation"
         yield record.at("delay").fault(text)
-    if opens.is_section:  # it shifts the whole response
-        others = [name for name in (*EVENTS, "begin") if name != BREAKER and name in test]
-        if others:
-            text = f"must be a number where the test has {' and '.join(others)} as well"
-            yield opens.fault(text)
-        if driving:
-            text = f"must be a number: the record's {' and '.join(driving)} drives the simulation"
-            yield opens.fault(text)
-    if opens.start is None:
-        return
-    yield from _place_faults(opens, opens.start, test.at("duration").number)
+    if opens.is_section:
+        yield from _free_instant_faults(test, driving)
+    if opens.start is not None:
+        yield from _instant_faults(test, opens, opens.start)
+
+
+def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterator[Fault]:
+    """Refuse an instant of the opening that cannot be found: it shifts the whole response."""
+    opens = test.at(BREAKER, "opens")
+    others = [name for name in (*EVENTS, "begin") if name != BREAKER and name in test]
+    if others:
+        text = f"must be a number where the test has {' and '.join(others)} as well"
+        yield opens.fault(text)
+    if driving:
+        text = f"must be a number: the record's {' and '.join(driving)} drives the simulation"
+        yield opens.fault(text)
+
+
+def _instant_faults(test: ContentNode, opens: ContentNode, start: float) -> Iterator[Fault]:
+    """Refuse an opening outside the test, and switchings of which the machine is parted."""
+    yield from _place_faults(opens, start, test.at("duration").number)
     events = [
         (event.at("at"), event.at("at").number)
         for name in ("E", "angle", "network")
         for event in test.at(name).entries
     ]
     for place, at in (*events, *_moves(test.at("angle"))):
-        if at is not None and at >= opens.start:
-            parted = f"the breaker is open from {show(opens.start)} s on"
+        if at is not None and at >= start:
+            parted = f"the breaker is open from {show(start)} s on"
             yield place.fault(f"{show(at)} s: no effect, as {parted}")
 
 
@@ -207,19 +222,7 @@ def reference_faults(
         given, channel = test.at(signal), record.at("channels", signal)
         recorded, elsewhere = channel.value is not None, given.value is not None
         if given.text == RECORDED:
-            if kind.plays_back:
-                drives = f"record.channels.{signal} drives it without"
-                yield given.fault(f"not allowed with plant {kind.name}: {drives}")
-            elif not has_record:
-                yield given.fault(f"{RECORDED} needs a record")
-            elif not recorded:
-                yield channel.fault(f"is missing: test.{signal} is {RECORDED}")
-            if "begin" in test and not kind.plays_back:
-                shown = "the record shows it from its start only"
-                yield test.at("begin").fault(f"not allowed with {signal}: {RECORDED}: {shown}")
-            if "resample" in record:
-                text = f"not allowed with test.{signal}: {RECORDED}: its filter smears the jumps"
-                yield record.at("resample").fault(text)
+            yield from _recorded_faults(test, record, signal, kind, has_record)
         elif recorded and signal in kind.recorded_inputs:
             text = f"drives nothing: give test.{signal}: {RECORDED}"
             if elsewhere:
@@ -236,23 +239,31 @@ def reference_faults(
             yield given.fault(text)
 
 
+def _recorded_faults(
+    test: ContentNode, record: ContentNode, signal: str, kind: PlantKind, has_record: bool
+) -> Iterator[Fault]:
+    """Yield what hinders a test from taking a reference from its record."""
+    given, channel = test.at(signal), record.at("channels", signal)
+    if kind.plays_back:
+        drives = f"record.channels.{signal} drives it without"
+        yield given.fault(f"not allowed with plant {kind.name}: {drives}")
+    elif not has_record:
+        yield given.fault(f"{RECORDED} needs a record")
+    elif channel.value is None:
+        yield channel.fault(f"is missing: test.{signal} is {RECORDED}")
+    if "begin" in test and not kind.plays_back:
+        shown = "the record shows it from its start only"
+        yield test.at("begin").fault(f"not allowed with {signal}: {RECORDED}: {shown}")
+    if "resample" in record:
+        text = f"not allowed with test.{signal}: {RECORDED}: its filter smears the jumps"
+        yield record.at("resample").fault(text)
+
+
 def findable_faults(
     test: ContentNode, record: ContentNode, kind: PlantKind, has_record: bool
 ) -> Iterator[Fault]:
     """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
-    channels, delay = record.at("channels"), record.at("delay")
-    steps = [step for name in REFERENCES for step in test.at(name).entries]
-    findable = [
-        test.at("vt0"),
-        *(step.at(key) for step in steps for key in AUTOMATIC),
-        test.at(BREAKER, "opens"),
-        test.at("frequency_offset"),
-        delay,
-        *(channel.at(key) for _, channel in channels.sections for key in ("scale", "offset")),
-    ]
-    for value in findable:
-        if not value.is_section:
-            continue
+    for value in _findable(test, record):
         *_, above, key = value.place
         yield from _value_faults(value)
         scale = kind.scaled and key == "scale" and above != "vt"
@@ -262,8 +273,31 @@ def findable_faults(
         elif value.at("start").text == "auto":
             if not has_record:
                 yield value.at("start").fault("auto needs a record")
-            elif "vt" not in channels:
+            elif "vt" not in record.at("channels"):
                 yield value.at("start").fault("auto needs vt in the record")
+    yield from _shown_faults(test, record.at("channels"))
+    delay = record.at("delay")
+    if kind.plays_back and not kind.finds_rest and (delay.number or 0.0) != 0.0:
+        yield delay.fault(f"not allowed with plant {kind.name}")
+
+
+def _findable(test: ContentNode, record: ContentNode) -> list[ContentNode]:
+    """Return the values that the fit shall find, given as {start, min, max}."""
+    steps = [step for name in REFERENCES for step in test.at(name).entries]
+    channels = [channel for _, channel in record.at("channels").sections]
+    places = [
+        test.at("vt0"),
+        *(step.at(key) for step in steps for key in AUTOMATIC),
+        test.at(BREAKER, "opens"),
+        test.at("frequency_offset"),
+        record.at("delay"),
+        *(channel.at(key) for channel in channels for key in ("scale", "offset")),
+    ]
+    return [place for place in places if place.is_section]
+
+
+def _shown_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
+    """Yield what a record cannot show: a ramp, a level of an unknown scale; a wrong sine."""
     for step in test.at("vref").entries:
         if "ramp" in step and "auto" in (step.at(key, "start").text for key in AUTOMATIC):
             text = "auto finds a step: of a ramp give start, min and max of at and step"
@@ -274,14 +308,16 @@ def findable_faults(
         text = f"is missing: the record does not show it where {unknown[0]} of vt is to be found"
         yield test.at("vt0").fault(text)
     for _, channel in channels.sections:
-        frequency = channel.at("sine", "frequency")
-        if frequency.is_section:
-            yield from _needed_bounds(frequency)
-        for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
-            if node.number is not None and node.number <= 0.0:
-                yield node.fault(f"{show(node.number)} Hz must be above 0")
-    if kind.plays_back and not kind.finds_rest and (delay.number or 0.0) != 0.0:
-        yield delay.fault(f"not allowed with plant {kind.name}")
+        yield from _frequency_faults(channel.at("sine", "frequency"))
+
+
+def _frequency_faults(frequency: ContentNode) -> Iterator[Fault]:
+    """Yield the faults of the frequency of a periodic disturbance."""
+    if frequency.is_section:
+        yield from _needed_bounds(frequency)
+    for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
+        if node.number is not None and node.number <= 0.0:
+            yield node.fault(f"{show(node.number)} Hz must be above 0")
 
 
 def _value_faults(value: ContentNode) -> Iterator[Fault]:

@@ -60,34 +60,42 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
 
         yield from equipment_faults(content, parts, kind)
     yield from source_faults(content, parts, kind)
-    if not KINDS.get(str(content.at("plant", "type").value), ANY_PLANT).has_equations:
-        node = content.at("plant", "type")
-        faults = registry.parts("FAULTS").get(str(node.value))
-        if faults is None:
-            text = f"{node.value}: nothing here can run it: that feature is not installed"
-            yield node.fault(text)
-        else:
-            yield from faults.load()(content, parts)
-    alone = "record" not in content and bool(content.at("validate").entries)  # nothing is fitted
-    own_test = [] if "records" in content or alone else [content]
-    for recording in (*own_test, *several):
-        if "test" not in recording and recording.is_section and not kind.finds_rest:
-            yield recording.at("test").fault("is missing")
-    for key in ("test", "record") if "records" in content else ():
-        if key in content:
-            yield content.at(key).fault("not allowed with records: each of them has its own")
-    if "records" not in content:
-        yield from _recording_faults(content, content, kind)
-        if own_test and "record" not in content and not kind.plays_back:
-            yield from missing_without_record(content.at("test"))
-    for recording in several:
-        yield from _recording_faults(recording, content, kind)
+    yield from _tests_faults(content, several, kind)
     driven = [(recording, _driving(recording, kind)) for recording in (content, *several)]
     balanced = content.at("estimate").content.get("weights") == "balanced"
     yield from weight_faults(driven, balanced)
     yield from name_faults(several)
     yield from _estimate_faults(content, parts)
     yield from as_found_faults(content, parts)
+    node = content.at("plant", "type")
+    if not KINDS.get(str(node.value), ANY_PLANT).has_equations:
+        faults = registry.parts("FAULTS").get(str(node.value))
+        if faults is None:
+            text = f"{node.value}: nothing here can run it: that feature is not installed"
+            yield node.fault(text)
+        else:
+            yield from faults.load()(content, parts)
+
+
+def _tests_faults(
+    content: ContentNode, several: list[ContentNode], kind: PlantKind
+) -> Iterator[Fault]:
+    """Yield tests that are missing, one beside several records, and what is wrong with each."""
+    alone = "record" not in content and bool(content.at("validate").entries)  # nothing is fitted
+    own_test = [] if "records" in content or alone else [content]
+    for recording in (*own_test, *several):
+        if "test" not in recording and recording.is_section and not kind.finds_rest:
+            yield recording.at("test").fault("is missing")
+    if "records" in content:
+        for node in (content.at("test"), content.at("record")):
+            if node.value is not None:
+                yield node.fault("not allowed with records: each of them has its own")
+    else:
+        yield from _recording_faults(content, content, kind)
+        if own_test and "record" not in content and not kind.plays_back:
+            yield from missing_without_record(content.at("test"))
+    for recording in several:
+        yield from _recording_faults(recording, content, kind)
 
 
 def _plant_faults(

@@ -28,14 +28,7 @@ def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Ite
     if stabiliser.content and parts.stabiliser is not None:
         yield from _stabiliser_faults(stabiliser, parts.stabiliser, on_load)
     if governor.content and parts.governor is not None:
-        records = (*content.at("records").entries, *content.at("validate").entries)
-        values = _start_values(governor, parts.governor)
-        nodes = (content.at("plant"), *(record.at("plant") for record in records))
-        for power in dict.fromkeys(plant.at("network", "P").number for plant in nodes):
-            if power is None or values is None or rests_at(parts.governor, values, power):
-                continue
-            rest = f"{parts.governor.name} does not rest at P = {show(power)} pu"
-            yield governor.at("parameters").fault(f"{rest}: one of its limits is in the way")
+        yield from _governor_faults(governor, parts.governor, content)
     if kind.has_exciter:
         yield from _limiter_faults(content, parts, off_line)
 
@@ -53,6 +46,17 @@ def _stabiliser_faults(section: ContentNode, model: Model, on_load: bool) -> Ite
     if rests_with_output(Stabilised(model, heard), values):
         rest = f"{model.name} does not rest at 0 with inputs {', '.join(heard)}"
         yield section.at("parameters").fault(f"{rest}: its washout is left out")
+
+
+def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -> Iterator[Fault]:
+    """Yield a governor that does not hold the power at the start."""
+    records = (*content.at("records").entries, *content.at("validate").entries)
+    values = _start_values(section, model)
+    nodes = (content.at("plant"), *(record.at("plant") for record in records))
+    for power in dict.fromkeys(plant.at("network", "P").number for plant in nodes):
+        if power is not None and values is not None and not rests_at(model, values, power):
+            text = f"{model.name} does not rest at P = {show(power)} pu: one of its limits is in"
+            yield section.at("parameters").fault(f"{text} the way")
 
 
 def _limiter_faults(content: ContentNode, parts: Parts, off_line: bool) -> Iterator[Fault]:

@@ -1,7 +1,7 @@
 """What contradicts itself in the parameters of a model: values, bounds, what was found before."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from math import inf, isfinite
 from pathlib import Path
@@ -27,10 +27,10 @@ from exfit.case.schema.values import PERCENT
 from exfit.case.ties import TieError, Ties, is_tie, parse
 from exfit.case.yaml import Fault
 from exfit.errors import ModelError
-from exfit.models import GOVERNORS, find
+from exfit.models import find
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
-from exfit.plants import PlantKind
+from exfit.plants import GOVERNOR, PlantKind
 from exfit.util.sources import TYPICAL
 from exfit.util.text import Place, near, show, show_value
 
@@ -108,7 +108,7 @@ def part_faults(
     """Yield the faults of what the file gives for one part, and of its free parameters."""
     section, free = _sections_of(content, part)
     rows = {row.symbol: row for row in part.sheet}
-    tied = {symbol: tied[part.prefix + symbol] for symbol in rows if part.prefix + symbol in tied}
+    tied = _of_part(part, tied)
     fixed = {
         symbol: tied.get(symbol, value) if is_tie(value) else value
         for symbol, value in section.content.items()
@@ -117,17 +117,15 @@ def part_faults(
     if part.kind == "exciter":
         allowed += [*helpers, *(MEANINGS if has_saturation(part.sheet) else ())]
     values = ContentNode(part.fixed, fixed)
-    for given in (values, free):
-        for symbol, parameter in given.sections:
-            if symbol not in allowed:
-                text = f"not a parameter of {part.name}; {near(symbol, allowed)}"
-                yield parameter.fault(text)
-    for symbol, value in values.numbers.items():
-        row = rows.get(symbol)
-        if row is not None and not row.is_physical(value):
+    for symbol, parameter in (*values.sections, *free.sections):
+        if symbol not in allowed:
+            yield parameter.fault(f"not a parameter of {part.name}; {near(symbol, allowed)}")
+    for row in part.sheet:
+        value = values.at(row.symbol).number
+        if value is not None and not row.is_physical(value):
             limits = f"{show(row.low)} ... {show(row.high)} {row.unit}"
             text = f"{show(value)} lies outside {limits}, its data sheet's range"
-            yield values.at(symbol).fault(text)
+            yield values.at(row.symbol).fault(text)
     for symbol, parameter in free.sections:
         if symbol in fixed:
             yield parameter.fault("both fixed and free")
@@ -135,11 +133,23 @@ def part_faults(
     # what follows without standing in the file is checked where it comes from
     curve = [*saturation_places(content.content), ("parameters",)][0]
     places: dict[str, Place] = dict.fromkeys(tied, curve)
-    places |= {symbol: (*part.fixed, symbol) for symbol in fixed}
-    places |= {symbol: parameter.at("start").place for symbol, parameter in free.sections}
+    places |= {symbol: node.place for symbol, node in values.sections}
+    places |= {symbol: node.at("start").place for symbol, node in free.sections}
+    yield from _placed(part, places, part.check(_readable(part, tied, fixed, _starts(free))))
+
+
+def _of_part(part: Part, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of a part by symbol."""
+    symbols = {part.prefix + symbol: symbol for symbol in part.symbols}
+    return {symbols[name]: value for name, value in values.items() if name in symbols}
+
+
+def _placed(
+    part: Part, places: Mapping[str, Place], texts: Iterable[tuple[str, str]]
+) -> Iterator[Fault]:
+    """Yield each contradiction where the file gives its parameter, else the other one it names."""
     whole = part.section if part.kind == "exciter" else part.fixed
-    for symbol, text in part.check(_readable(part, tied, fixed, _starts(free))):
-        # where the file gives its parameter, else the other one that it names
+    for symbol, text in texts:
         if symbol in places:
             yield Fault(places[symbol], text)
         elif text.startswith("is missing"):
@@ -169,10 +179,14 @@ def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]
     if is_held(section.at("start").number, row):
         return
     yield from _scale_faults(section, row)
+    if row is not None and row.is_time:
+        yield from _bypass_faults(section)
+
+
+def _bypass_faults(section: ContentNode) -> Iterator[Fault]:
+    """Yield a time constant whose bounds lie on both sides of the shortest one."""
     start, low, high = (section.at(key).number for key in ("start", "min", "max"))
     limit = f"{show(SHORTEST)} s, below which the block is bypassed"
-    if row is None or not row.is_time:
-        return
     if low is not None and low < SHORTEST <= (inf if high is None else high):
         text = f"{show(low)} is below {limit}; a free time must not cross it"
         yield section.at("min").fault(text)
@@ -274,28 +288,25 @@ def _stated_faults(
 def as_found_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     """Yield a model that is not in the catalogue, and parameters that no part has."""
     section = content.at("as_found")
-    rows = {part.prefix + row.symbol: row for part in parts.all for row in part.sheet}
-    name = section.at("model")
+    name, sheets = section.at("model"), {part.prefix: part.sheet for part in parts.all}
     if name.text:
         try:
-            sheet = find(name.text.removesuffix(".py"), Path()).sheet
+            sheets[""] = find(name.text.removesuffix(".py"), Path()).sheet
         except ModelError as error:
             yield name.fault(str(error))
             return
         if not kind_of(content.at("plant").content).has_exciter:
             yield name.fault("not allowed with this plant: it has no exciter")
-        rows = {symbol: row for symbol, row in rows.items() if "." in symbol}
-        rows |= {row.symbol: row for row in sheet}
-    ignored = {  # what only a governor's record has, as GGOV1's Trate
-        part.prefix + name
-        for part in parts.all
-        if part.name in GOVERNORS
-        for record in GOVERNORS[part.name].records
-        for name in record.ignored
-    }
-    unused = [(key, node) for key, node in section.at("unused").sections if key not in ignored]
-    for symbol, value in (*section.at("parameters").sections, *unused):
+    rows = {prefix + row.symbol: row for prefix, sheet in sheets.items() for row in sheet}
+    for symbol, value in (*section.at("parameters").sections, *_unused(section, parts)):
         if symbol not in rows:
             yield value.fault(f"not a parameter of the model as found; {near(symbol, rows)}")
         elif value.number is not None and (text := rows[symbol].range_fault(value.number)):
             yield value.fault(text)
+
+
+def _unused(section: ContentNode, parts: Parts) -> list[tuple[str, ContentNode]]:
+    """List the unused values but for those that only a governor's record has, as GGOV1's Trate."""
+    records = () if parts.governor is None else parts.governor.records
+    ignored = {GOVERNOR + name for record in records for name in record.ignored}
+    return [(name, node) for name, node in section.at("unused").sections if name not in ignored]

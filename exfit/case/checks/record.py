@@ -37,9 +37,13 @@ def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
             text = "is missing, and the record has no vt to take it from"
             yield test.at("vt0").fault(text)
     window = record.at("window").pair
-    if window is None or window[0] >= window[1]:
-        return
-    start, end = window
+    if window is not None and window[0] < window[1]:
+        yield from _window_faults(test, *window)
+
+
+def _window_faults(test: ContentNode, start: float, end: float) -> Iterator[Fault]:
+    """Refuse instants outside the window of a record."""
+    begin = test.at("begin")
     if begin.number is not None and begin.number > start:
         text = f"{show(begin.number)} s is after {show(start)} s, where the record's window starts"
         yield begin.fault(text)
@@ -72,8 +76,14 @@ def channels_faults(
             idle = ("weight", "noise", "filter", "outliers", "sine")
             yield from driving_faults(channel, idle, fitted=True)
         yield from channel_faults(signal, channel, kind.per_unit)
-    if not channels.content:
-        return
+    if channels.content:
+        yield from _missing_faults(channels, network, kind, compares)
+
+
+def _missing_faults(
+    channels: ContentNode, network: ContentNode, kind: PlantKind, compares: bool
+) -> Iterator[Fault]:
+    """Yield the signals that are not recorded and that nothing else gives."""
     for signal in kind.required:
         if signal not in channels:
             yield channels.at(signal).fault(f"is missing: plant {kind.name} needs it")
@@ -94,6 +104,18 @@ def channels_faults(
 
 def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
     """Check a channel, whose signal may have to be ``per_unit``: its unit, its phases."""
+    yield from _unit_faults(signal, channel, per_unit)
+    kind = channel.at("kind").text if "phases" in channel else None
+    if "phases" in channel and signal != "vt":
+        yield channel.at("phases").fault("only allowed for vt")
+    if kind == "rms" and "cycles" in channel:
+        yield channel.at("cycles").fault("only with kind: waveform")
+    if kind == "waveform" and "averaged" in channel:
+        yield channel.at("averaged").fault("waveforms have a window of their own: cycles")
+
+
+def _unit_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
+    """Yield a base of no unit, and a unit that nothing makes per unit, or converts."""
     unit, base = channel.at("unit").text, channel.at("base")
     if signal in OF_EVENT:
         own = SIGNALS[signal].unit
@@ -106,14 +128,6 @@ def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterato
             yield channel.at("unit").fault("is missing: in which unit is base?")
     elif unit and "scale" not in channel and per_unit and needs_base(unit):
         yield base.fault(f"is missing: what is 1 pu in {unit}?")
-    if "phases" in channel:
-        kind = channel.at("kind").text
-        if signal != "vt":
-            yield channel.at("phases").fault("only allowed for vt")
-        if kind == "rms" and "cycles" in channel:
-            yield channel.at("cycles").fault("only with kind: waveform")
-        if kind == "waveform" and "averaged" in channel:
-            yield channel.at("averaged").fault("waveforms have a window of their own: cycles")
 
 
 def weight_faults(
@@ -129,19 +143,24 @@ def weight_faults(
         for recording, driving in recordings
         for signal, channel in recording.at("record", "channels").sections
     ]
-    compared = [channel for drives, channel in channels if not drives]
+    yield from _noise_faults([channel for drives, channel in channels if not drives])
+    weights = [channel.at(key) for _, channel in channels for key in ("weight", "noise")]
+    for node in weights if balanced else ():
+        if node.value is not None and node.place[0] != "validate":
+            yield node.fault("not allowed with estimate.weights: balanced")
+
+
+def _noise_faults(compared: Sequence[ContentNode]) -> Iterator[Fault]:
+    """Yield channels without noise where another has it, and channels with weight and noise."""
     for channel in compared:
         if "noise" in channel and "weight" in channel:
             text = "not allowed with noise: the weight is one over the noise"
             yield channel.at("weight").fault(text)
     fitted = [channel for channel in compared if channel.place[0] != "validate"]
-    for channel in fitted if any("noise" in channel for channel in fitted) else ():
-        if "noise" not in channel:
+    without = [channel for channel in fitted if "noise" not in channel]
+    if len(without) < len(fitted):
+        for channel in without:
             yield channel.at("noise").fault("is missing: other channels have it")
-    for _, channel in channels if balanced else ():
-        for key in ("weight", "noise"):
-            if key in channel and channel.place[0] != "validate":
-                yield channel.at(key).fault("not allowed with estimate.weights: balanced")
 
 
 def name_faults(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
@@ -163,39 +182,49 @@ def _phasors_faults(record: ContentNode) -> Iterator[Fault]:
         unit = phasor.at("unit").text
         in_unit = None if unit is None or alike(unit, PER_UNIT) else unit
         scaled += [quantity] if in_unit else []
-        counts = [_count(phasor.at(key)) for key in ("magnitude", "angle")]
-        if None in counts:
-            continue
-        if counts[0] != counts[1]:
-            text = f"has {counts[1]} columns, magnitude has {counts[0]}"
-            yield phasor.at("angle").fault(text)
-        elif counts[0] not in COLUMNS_OF_A_PHASOR:
-            yield phasor.at("magnitude").fault("must be one column, or those of the three phases")
-        if in_unit is not None and quantity_of(in_unit) != quantity:
-            yield phasor.at("unit").fault(f"{unit!r} is not a unit of {quantity}")
-        elif in_unit is not None and quantity == "voltage" and "connection" not in phasor:
-            text = (
-                "is missing: phase-to-ground or phase-to-phase, which differ by sqrt(3); PMUs "
-                "mostly send phase-to-ground"
-            )
-            yield phasor.at("connection").fault(text)
+        yield from _phasor_faults(phasor, quantity, in_unit)
     if scaled and "kV" not in phasors:
         yield phasors.at("kV").fault("is missing: the rated voltage of the unit, line to line")
     if "current" in scaled and "MVA" not in phasors:
         yield phasors.at("MVA").fault("is missing: the rated power of the unit")
     for _, channel in record.at("channels").sections:
-        place = channel if channel.text is not None else channel.at("column")
-        name = place.text
-        if name is None or not name.startswith(PHASOR_COLUMNS):
-            continue
-        signal = name.removeprefix(PHASOR_COLUMNS)
-        if "phasors" not in record:
-            yield place.fault(f"{name}: record.phasors is missing, of which it is computed")
-        elif signal not in OF_PHASORS:
-            names = ", ".join(PHASOR_COLUMNS + signal for signal in OF_PHASORS)
-            yield place.fault(f"{name} is not computed of phasors, only {names}")
-        elif signal in OF_CURRENT_PHASOR and "current" not in phasors:
-            yield place.fault(f"{name} needs record.phasors.current, which is missing")
+        yield from _computed_faults(channel, record)
+
+
+def _phasor_faults(phasor: ContentNode, quantity: str, in_unit: str | None) -> Iterator[Fault]:
+    """Check a voltage or a current, which is in a unit or per unit."""
+    counts = [_count(phasor.at(key)) for key in ("magnitude", "angle")]
+    if None in counts:
+        return
+    if counts[0] != counts[1]:
+        text = f"has {counts[1]} columns, magnitude has {counts[0]}"
+        yield phasor.at("angle").fault(text)
+    elif counts[0] not in COLUMNS_OF_A_PHASOR:
+        yield phasor.at("magnitude").fault("must be one column, or those of the three phases")
+    if in_unit is not None and quantity_of(in_unit) != quantity:
+        yield phasor.at("unit").fault(f"{in_unit!r} is not a unit of {quantity}")
+    elif in_unit is not None and quantity == "voltage" and "connection" not in phasor:
+        text = (
+            "is missing: phase-to-ground or phase-to-phase, which differ by sqrt(3); PMUs mostly "
+            "send phase-to-ground"
+        )
+        yield phasor.at("connection").fault(text)
+
+
+def _computed_faults(channel: ContentNode, record: ContentNode) -> Iterator[Fault]:
+    """Yield a channel of a computed column that the phasors do not give."""
+    place = channel if channel.text is not None else channel.at("column")
+    name = place.text
+    if name is None or not name.startswith(PHASOR_COLUMNS):
+        return
+    signal = name.removeprefix(PHASOR_COLUMNS)
+    if "phasors" not in record:
+        yield place.fault(f"{name}: record.phasors is missing, of which it is computed")
+    elif signal not in OF_PHASORS:
+        names = ", ".join(PHASOR_COLUMNS + signal for signal in OF_PHASORS)
+        yield place.fault(f"{name} is not computed of phasors, only {names}")
+    elif signal in OF_CURRENT_PHASOR and "current" not in record.at("phasors"):
+        yield place.fault(f"{name} needs record.phasors.current, which is missing")
 
 
 def _count(columns: ContentNode) -> int | None:

@@ -33,6 +33,7 @@ from exfit.features.planner.records import (
 from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
+from exfit.models.sheet import DynamicsRecord
 from exfit.results.influences import by_weight, first_of
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
@@ -79,14 +80,8 @@ def export(
     ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
     model has no record, or a value is missing or lies outside the range of its data sheet.
     """
-    error = f", rmse {result.rmse:.3g} pu" if isfinite(result.rmse) else ""
-    comments = [
-        f"exfit {__version__}: {result.model} fitted to {result.comparison.record}{error}.",
-        f"Case: {result.case}.",
-    ]
+    comments = [*_origin(result, translation)]
     if translation is not None:
-        verdict = f"{translation.source} as {translation.target}: {translation.verdict}"
-        comments += [f"{text}." for text in (verdict, *translation.notes)]
         result = _translated(result, translation)
     of_fit = [*_of_fit(result, files.program)]
     content, warnings = content_of(result.case_text, result.case), list[str]()
@@ -106,20 +101,30 @@ def export(
         raise ExfitError(f"{result.model} has no {files.program} record")
     comments += [f"{text}." for text in of_fit]
     for own in written:
-        of_record = [*_warnings(own)]
-        warnings += of_record
-        comments += [
-            f"{own.definition.record.name}: {source}: {' '.join(symbols)}."
-            for source, symbols in own.by_source.items()
-            if source != TYPICAL
-        ]
-        comments += [f"{warning}." for warning in of_record]
+        warnings += _warnings(own)
+        comments += _comments(own)
     lines = [line for text in comments for line in comment_lines(text, files)]
     lines += [
         files.record_text(own.definition, {**own.values, **own.unused}, bus, machine_id)
         for own in written
     ]
     return Exported("\n".join(lines) + "\n", (*of_fit, *warnings))
+
+
+def _origin(result: FitResult, translation: Translation | None) -> Iterator[str]:
+    error = f", rmse {result.rmse:.3g} pu" if isfinite(result.rmse) else ""
+    yield f"exfit {__version__}: {result.model} fitted to {result.comparison.record}{error}."
+    yield f"Case: {result.case}."
+    if translation is not None:
+        yield f"{translation.source} as {translation.target}: {translation.verdict}."
+        yield from (f"{note}." for note in translation.notes)
+
+
+def _comments(entry: Written) -> Iterator[str]:
+    for source, symbols in entry.by_source.items():
+        if source != TYPICAL:
+            yield f"{entry.definition.record.name}: {source}: {' '.join(symbols)}."
+    yield from (f"{warning}." for warning in _warnings(entry))
 
 
 def place_of(result: FitResult) -> tuple[int, str]:
@@ -281,13 +286,8 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
     missing = [prefix + row.symbol for row in sheet if row.symbol not in values]
     if missing:
         raise ExfitError(f"{record.name}: no value of {', '.join(missing)} in the result")
-    not_whole = [
-        (symbol, f"{show(values[symbol])} is not a whole number")
-        for symbol, _ in record.icons
-        if not float(values.get(symbol, 0.0)).is_integer()
-    ]
     faults = [*outside(sheet, values)] or [*contradictions(definition.model, values)]
-    faults = faults or not_whole
+    faults = faults or [*_not_whole(record, values)]
     if faults:
         raise FileError(f"{record.name}: {prefix}{symbol}: {text}" for symbol, text in faults)
     sources = {
@@ -305,6 +305,13 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
         if prefix + symbol in of_file and values.get(symbol, 0.0) == 0.0
     }
     return Written(definition, values, by_source(definition.symbols, sources), unused)
+
+
+def _not_whole(record: DynamicsRecord, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Yield (symbol, fault) for each integer of a record whose value is none."""
+    for symbol, _ in record.icons:
+        if not float(values.get(symbol, 0.0)).is_integer():
+            yield symbol, f"{show(values[symbol])} is not a whole number"
 
 
 def not_of_catalogue(result: FitResult, program: str) -> str:

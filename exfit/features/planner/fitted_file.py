@@ -183,28 +183,32 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[Reading, 
             continue
         if part is None:
             raise ExfitError(f"{file}: the unit has no record of {model}")
-        definition = part.definition
-        name, place = definition.record.name, f"{file}:{part.line}: {definition.record.name}"
-        if definition.model.name != model:
+        name = part.definition.record.name
+        if part.definition.model.name != model:
             advice = f"; exfit translate finds its data for {name}" if not prefix else ""
-            raise ExfitError(f"{place}: the fitted model is {model}{advice}")
-        found = {} if result.as_found is None else result.as_found.values
-        others = []
-        for symbol in definition.symbols:
-            now, then = part.values[symbol], found.get(prefix + symbol)
-            if then is None or not isclose(now, then, rel_tol=SAME):
-                was = "not stated" if then is None else show(then)
-                others.append(f"{symbol} is {show(now)}, as found {was}")
-        if others:
-            more = ", ..." if len(others) > MOST_NAMED else ""
-            raise ExfitError(f"{place}: changed since: {', '.join(others[:MOST_NAMED])}{more}")
-        usual = getattr(definition.model, "inputs", ())
-        inputs = stabiliser_inputs(result.case_text, result.case) or usual
-        if part.inputs and inputs != part.inputs:
-            theirs = ", ".join(part.inputs)
-            text = f"its inputs are {theirs}, the fit has {', '.join(inputs)}"
-            raise ExfitError(f"{place}: {text}")
+            raise ExfitError(f"{file}:{part.line}: {name}: the fitted model is {model}{advice}")
+        _refuse_other_record(result, part, prefix, f"{file}:{part.line}: {name}")
         yield part, prefix
+
+
+def _refuse_other_record(result: FitResult, part: Reading, prefix: str, place: str) -> None:
+    """Raise ExfitError where a record is not as it was when the case was made of it."""
+    found = {} if result.as_found is None else result.as_found.values
+    others = []
+    for symbol in part.definition.symbols:
+        now, then = part.values[symbol], found.get(prefix + symbol)
+        if then is None or not isclose(now, then, rel_tol=SAME):
+            was = "not stated" if then is None else show(then)
+            others.append(f"{symbol} is {show(now)}, as found {was}")
+    if others:
+        more = ", ..." if len(others) > MOST_NAMED else ""
+        raise ExfitError(f"{place}: changed since: {', '.join(others[:MOST_NAMED])}{more}")
+    usual = getattr(part.definition.model, "inputs", ())
+    inputs = stabiliser_inputs(result.case_text, result.case) or usual
+    if part.inputs and inputs != part.inputs:
+        theirs = ", ".join(part.inputs)
+        text = f"its inputs are {theirs}, the fit has {', '.join(inputs)}"
+        raise ExfitError(f"{place}: {text}")
 
 
 def _edits(result: FitResult, part: Reading, prefix: str, file: str) -> Iterator[_Edit]:
@@ -214,37 +218,40 @@ def _edits(result: FitResult, part: Reading, prefix: str, file: str) -> Iterator
     """
     definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
+    changed = _changed(result, part, prefix, values)
+    fields = dict(zip(definition.names, part.fields, strict=True))
+    of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}
+    if of_curve and result.saturation != "quadratic":
+        raise ExfitError(as_quadratic(result, definition.program))
+    texts: dict[Field, str] = {}
+    for symbol in sorted(changed, key=definition.names.index):
+        value, whole = values[symbol], symbol in dict(definition.record.icons)
+        if whole and not float(value).is_integer():
+            raise ExfitError(f"{symbol}: {show(value)} is not a whole number")
+        texts[fields[symbol]] = str(int(value)) if whole else number_text(value)
+    edited = tuple(field._replace(text=texts.get(field, field.text)) for field in part.fields)
+    faults = read_values(definition, part.line, edited).faults
+    if faults:
+        raise ExfitError("; ".join(located(faults, file)))
+    edits = (_Edit(field, text) for field, text in texts.items())
+    yield from (edit for edit in edits if float(edit.text) != number(edit.field))
+
+
+def _changed(
+    result: FitResult, part: Reading, prefix: str, values: Mapping[str, float]
+) -> set[str]:
+    """The parameters of a record that change, with the fields that then say something again."""
+    definition = part.definition
     changed = {
         symbol
         for symbol in definition.symbols
         if result.sources.get(prefix + symbol) != TYPICAL
         and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
     }
-    # the lags of 0, as long as their gains are 0, say something again
-    fields = dict(zip(definition.names, part.fields, strict=True))
-    idle = idle_lags(definition.model.sheet, {name: number(own) for name, own in fields.items()})
-    changed |= {row.symbol for row in idle if row.search and row.search.needs in changed}
-    of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}
-    if of_curve and result.saturation != "quadratic":
-        raise ExfitError(as_quadratic(result, definition.program))
-    texts: dict[Field, str] = {}
-    for symbol, field in fields.items():
-        if symbol not in changed:
-            continue
-        value = values[symbol]
-        if symbol not in dict(definition.record.icons):
-            texts[field] = number_text(value)
-        elif float(value).is_integer():
-            texts[field] = str(int(value))
-        else:
-            raise ExfitError(f"{symbol}: {show(value)} is not a whole number")
-    edited = tuple(field._replace(text=texts.get(field, field.text)) for field in part.fields)
-    faults = read_values(definition, part.line, edited).faults
-    if faults:
-        raise ExfitError("; ".join(located(faults, file)))
-    for field, text in texts.items():
-        if float(text) != number(field):
-            yield _Edit(field, text)
+    # lags that a record may have as 0 as long as their gains are 0
+    named = zip(definition.names, part.fields, strict=True)
+    idle = idle_lags(definition.model.sheet, {name: number(field) for name, field in named})
+    return changed | {row.symbol for row in idle if row.search and row.search.needs in changed}
 
 
 def _refuse_lost(

@@ -179,7 +179,14 @@ def _arranged(definition: Definition, line: int, fields: tuple[Field, ...]) -> A
         if all(name in idle for name in behind):
             fields += tuple(idle[name] for name in behind)
         return fields, []
-    spelled = dict(record.spelled)
+    return _named(definition, line, fields, idle)
+
+
+def _named(
+    definition: Definition, line: int, fields: tuple[Field, ...], idle: Mapping[str, Field]
+) -> Arranged:
+    """Return the values of fields "name" value "name" value in the order of the record."""
+    record, spelled = definition.record, dict(definition.record.spelled)
     symbols = {spelled.get(symbol, symbol).lower(): symbol for symbol in definition.names}
     given: dict[str, Field] = {}
     faults: list[DynamicsFault] = []

@@ -5,6 +5,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from exfit.case.case_draft import in_comment
 from exfit.features.planner.fields import DynamicsFault, Field, lines_of
 from exfit.features.planner.records import (
     PSSE,
@@ -109,15 +110,14 @@ def heads(text: str) -> Heads:
         if len(fields) < 3 or not fields[1].text[:1].isalpha():
             if len(fields) < 3 or any(definition_of(field.text) for field in fields[:2]):
                 begin = " ".join(field.text for field in fields[:3])
-                fault = f"{show_value(begin)} is not bus, 'model' and id"
-                faults.append(DynamicsFault(line, fault))
+                what = f"{show_value(begin)} is not bus, 'model' and id"
+                faults.append(DynamicsFault(line, what))
             continue  # of a line or a device: their records begin otherwise
         bus, name, machine_id = (field.text for field in fields[:3])
         wrong, definition = [*wrong_place(fields[0], machine_id)], definition_of(name)
         if not wrong:
             own = name.upper() == "USRMDL" and fields[3:]  # a user's model has its own name
-            label = f"{name} {fields[3].text}" if own else name
-            label = "".join(letter if letter.isprintable() else "?" for letter in label).upper()
+            label = in_comment(f"{name} {fields[3].text}" if own else name).upper()
             found.append(Head(int(bus), label, machine_id, line, fields[3:], definition))
         elif definition is not None:
             faults += [DynamicsFault(line, f"{name.upper()}: {what}") for what in wrong]

@@ -197,16 +197,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         ]
 
     icons, rows = dict(record.icons), definition.model.sheet
-    given, unreadable = dict[str, float](), list[tuple[str, str]]()
-    for name, field in zip(names, fields, strict=True):
-        try:
-            whole_of_psse = name in icons and definition.program == PSSE
-            value = whole(field) if whole_of_psse else number(field)
-            if name in icons and not float(value).is_integer():  # PSLF writes it as a number
-                raise ValueError(f"{show_value(field.text)} is not a whole number")
-            given[name] = int(value) if name in icons else value
-        except ValueError as error:
-            unreadable.append((name, str(error)))
+    given, unreadable = _numbers(definition, fields)
     given = with_exchanged(record, given)
     of_sheet = {row.symbol: given[row.symbol] for row in rows if row.symbol in given}
     idle = idle_lags(rows, of_sheet)
@@ -215,12 +206,6 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     values = {**typical(rows), **dict(record.held), **of_sheet, **dict.fromkeys(unused, 0.0)}
     wrong = [*unreadable, *outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
-    doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
-    behind = [name for name, field in zip(names, fields, strict=True) if not field.end]
-    missing = ", ".join(name for name in behind if name in dict(record.absent))
-    if missing:
-        text = f"{record.name}: not in the file, taken as without effect: {missing}"
-        doubt.append(DynamicsFault(line, text))
     remarks = [
         *_unmodelled(definition, given),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
@@ -238,11 +223,33 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         fields,
         values,
         placed(wrong),
-        doubt + placed(remarks),
+        [*_doubts(definition, line, fields), *placed(remarks)],
         inputs,
         times_speed,
         tuple(unused.items()),
     )
+
+
+def _numbers(
+    definition: Definition, fields: tuple[Field, ...]
+) -> tuple[dict[str, float], list[tuple[str, str]]]:
+    """Return the numbers of a record by symbol, and (symbol, fault) for what is none."""
+    integers = dict(definition.record.icons)
+    values: dict[str, float] = {}
+    faults = []
+    for name, field in zip(definition.names, fields, strict=True):
+        try:
+            if name not in integers:
+                values[name] = number(field)
+            elif definition.program == PSSE:
+                values[name] = whole(field)
+            elif number(field).is_integer():
+                values[name] = int(number(field))
+            else:
+                faults.append((name, f"{show_value(field.text)} is not a whole number"))
+        except ValueError as error:
+            faults.append((name, str(error)))
+    return values, faults
 
 
 def _count_faults(
@@ -264,6 +271,19 @@ def _count_faults(
             number(field)
         except ValueError as error:
             yield DynamicsFault(field.line, f"{name}: {error}")
+
+
+def _doubts(
+    definition: Definition, line: int, fields: tuple[Field, ...]
+) -> Iterator[DynamicsFault]:
+    """Yield what is doubtful in a record, and the values that an older file does not have."""
+    record, named = definition.record, zip(definition.names, fields, strict=True)
+    if record.doubt:
+        yield DynamicsFault(line, f"{record.name}: {record.doubt}")
+    missing = [name for name, field in named if not field.end and name in dict(record.absent)]
+    if missing:
+        text = f"{record.name}: not in the file, taken as without effect: {', '.join(missing)}"
+        yield DynamicsFault(line, text)
 
 
 def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Texts:

@@ -159,27 +159,30 @@ def _chosen(
     units: Mapping[tuple[int, str], list[Head]], file: str, bus: int | None, machine_id: str | None
 ) -> list[Head]:
     """Return the records of one unit; raises DynamicsError where it is not exactly one."""
+    wanted_id = None if machine_id is None else machine_id.strip().upper()
     meant = {
         key: records
         for key, records in units.items()
-        if bus in (None, key[0]) and (machine_id is None or machine_id.strip().upper() == key[1])
+        if bus in (None, key[0]) and wanted_id in (None, key[1])
     }
     if len(meant) > 1:
-        meant = {key: records for key, records in meant.items() if not _all_classical(records)}
+        meant = {key: own for key, own in meant.items() if not _all_classical(own)}
     if len(meant) == 1:
         return next(iter(meant.values()))
     if meant:
         text = f"{file}: {len(meant)} units; choose by --bus and --id"
-    else:
-        given = {"bus": bus, "id": machine_id}
-        wanted = (f"{label} {value!r}" for label, value in given.items() if value is not None)
-        text = f"{file}: no record of {', '.join(wanted)}; the file has"
-    listed = [
-        f"  bus {own_bus}, id {own_id}: {', '.join(head.name for head in heads)}"
-        for (own_bus, own_id), heads in (meant or units).items()
-    ]
-    more = [f"  and {len(listed) - MOST_LISTED} more"] if len(listed) > MOST_LISTED else []
-    raise DynamicsError([text, *listed[:MOST_LISTED], *more])
+        raise DynamicsError([text, *_listed(meant)])
+    given = {"bus": bus, "id": machine_id}
+    wanted = (f"{label} {value!r}" for label, value in given.items() if value is not None)
+    text = f"{file}: no record of {', '.join(wanted)}; the file has"
+    raise DynamicsError([text, *_listed(units)])
+
+
+def _listed(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
+    for (bus, machine_id), heads in list(units.items())[:MOST_LISTED]:
+        yield f"  bus {bus}, id {machine_id}: {', '.join(head.name for head in heads)}"
+    if len(units) > MOST_LISTED:
+        yield f"  and {len(units) - MOST_LISTED} more"
 
 
 def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
