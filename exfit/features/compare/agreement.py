@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
 from string import ascii_uppercase
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,7 +141,7 @@ def compare(
     curves = shifted(as_read, shifts or {})
     shared = _shared_signals(curves)
     judged = judged_of(shared)
-    clocks = compared_clocks(curves, judged)
+    clocks = compared_clocks(curves, judged, align)
     if align:
         for curve in curves:
             if clocks.steps.get(curve.name) is None:
@@ -151,14 +151,16 @@ def compare(
                 )
         curves = shifted(curves, clocks.apart)
     results, unread = _results(paths)
-    at = clocks.step_at if step_at is None else step_at
+    detected = (clocks.steps.get(RECORD), *clocks.steps.values())
+    first_at = next((step.at for step in detected if step is not None), None)
+    at = first_at if step_at is None else step_at
     of_curves = {} if at is None else dict(_features_of(curves, judged, at))
     notes = [
         f"{curve.path}: {curve.repeated} instants repeat: the last row of each is used"
         for curve in curves
         if curve.repeated
     ]
-    notes += clocks.notes(curves, judged, align)
+    notes += clocks.notes
     notes += [
         f"{name}: its features are read without {of_curve.removed}"
         for name, of_curve in of_curves.items()
@@ -239,51 +241,20 @@ def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tu
                 yield curve.name, of_curve
 
 
-@dataclass(frozen=True)
-class ComparedClocks:
-    """The steps that the curves show, by their names, and what would put them together.
+class ComparedClocks(NamedTuple):
+    """The steps that curves show, by their names, and what puts clocks that differ together.
 
-    ``reference`` is the curve with which the others are aligned. ``apart`` (s) is what puts those
-    together with it whose steps are farther apart than the shape of a rise may move them: from the
-    detected steps, and as the responses match best within ``within`` (s) of these.
+    ``apart`` (s) is that of the curves whose steps are farther from that of the record, or of the
+    first curve, than the shape of a rise may move them; ``notes`` name these.
     """
 
     steps: Mapping[str, DetectedStep | None]
-    reference: str
     apart: Mapping[str, float]
-    within: Mapping[str, float]
-
-    @property
-    def step_at(self) -> float | None:
-        """When the step is: in the record, else in the first curve that shows it."""
-        detected = (self.steps.get(RECORD), *self.steps.values())
-        return next((step.at for step in detected if step is not None), None)
-
-    def notes(self, curves: Sequence[Curve], signal: str, aligned: bool) -> Iterator[str]:
-        """Yield whose clock was moved, or differs and what f would be if it were moved."""
-        whose = "the record" if self.reference == RECORD else self.reference
-        at = self.steps.get(self.reference)
-        for curve in curves:
-            name, step = curve.name, self.steps.get(curve.name)
-            if name not in self.apart or step is None or at is None:
-                continue
-            times = f"the step of {name} is at {step.at:.3f} s, that of {whose} at {at.at:.3f} s"
-            if aligned:
-                yield (
-                    f"{times}: {name} is shifted by {self.apart[name]:.4f} s, as it matches best "
-                    f"within {self.within[name]:.1g} s of that"
-                )
-            else:
-                (reference,) = (each for each in curves if each.name == self.reference)
-                f = _from_reference(reference, curve.shifted(self.apart[name]), signal).f
-                yield (
-                    f"{times}: --align puts the steps together (f = {f:.2e}), "
-                    f"--shift {name}={curve.shift + self.apart[name]:.4f} this one"
-                )
+    notes: Sequence[str]
 
 
-def compared_clocks(curves: Sequence[Curve], signal: str) -> ComparedClocks:
-    """Return the clocks of curves as the steps of a signal show them."""
+def compared_clocks(curves: Sequence[Curve], signal: str, aligned: bool) -> ComparedClocks:
+    """Compare clocks by the steps of a signal, and by where the responses then match best."""
     steps = {
         curve.name: first_step(curve.time, curve.signals[signal])
         for curve in curves
@@ -291,17 +262,30 @@ def compared_clocks(curves: Sequence[Curve], signal: str) -> ComparedClocks:
     }
     name = RECORD if steps.get(RECORD) is not None else curves[0].name
     reference = next(curve for curve in curves if curve.name == name)
+    whose = "the record" if reference.measured else name
     at = steps.get(name)
-    apart, within = {}, {}
+    apart, notes = {}, []
     for curve in curves:
         step = steps.get(curve.name)
         if step is None or at is None:
             continue
-        uncertainty = step.error + at.error
-        if abs(at.at - step.at) > max(STEPS_APART, uncertainty):
-            apart[curve.name] = _matched(reference, curve, signal, at.at - step.at, uncertainty)
-            within[curve.name] = uncertainty
-    return ComparedClocks(steps, name, apart, within)
+        within = step.error + at.error
+        if abs(at.at - step.at) <= max(STEPS_APART, within):
+            continue
+        by = apart[curve.name] = _matched(reference, curve, signal, at.at - step.at, within)
+        times = f"the step of {curve.name} is at {step.at:.3f} s, that of {whose} at {at.at:.3f} s"
+        if aligned:
+            notes.append(
+                f"{times}: {curve.name} is shifted by {by:.4f} s, as it matches best within "
+                f"{within:.1g} s of that"
+            )
+        else:
+            f = _from_reference(reference, curve.shifted(by), signal).f
+            notes.append(
+                f"{times}: --align puts the steps together (f = {f:.2e}), "
+                f"--shift {curve.name}={curve.shift + by:.4f} this one"
+            )
+    return ComparedClocks(steps, apart, notes)
 
 
 def shifted(curves: Sequence[Curve], shifts: Mapping[str, float]) -> list[Curve]:

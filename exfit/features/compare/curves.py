@@ -256,14 +256,12 @@ def differences(curves: Sequence[Curve], signals: Sequence[str]) -> list[Differe
 
 
 def _covered(time: Array, curves: Sequence[Curve]) -> Array:
-    """Return those of the instants (M,) that all curves cover."""
     begin = max(float(curve.time[0]) for curve in curves) - SAME_INSTANT
     end = min(float(curve.time[-1]) for curve in curves) + SAME_INSTANT
     return np.asarray(time[(time >= begin) & (time <= end)])
 
 
 def _refuse_apart(time: Array, curves: Sequence[Curve]) -> None:
-    """Raise RecordError where curves have no time in common, or hardly any."""
     if len(time) < FEWEST_IN_COMMON:
         spans = (f"{curve.path}: {curve.time[0]:g} ... {curve.time[-1]:g} s" for curve in curves)
         raise RecordError(

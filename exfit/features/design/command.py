@@ -134,7 +134,6 @@ def identify(
 
 
 def _names(text: str | None) -> list[str]:
-    """Return the names of a list with commas."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 

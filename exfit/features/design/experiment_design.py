@@ -274,7 +274,6 @@ def _longer(experiment: Experiment) -> Experiment:
 
 
 def _with_signals(experiment: Experiment, signals: Sequence[str]) -> Experiment:
-    """Return a test at which further signals are recorded."""
     zeros = np.zeros(len(experiment.simulator.times))
     further = tuple(Channel(signal, zeros) for signal in signals)
     return replace(experiment, channels=(*experiment.channels, *further))

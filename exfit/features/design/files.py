@@ -82,7 +82,6 @@ def sheet_lines(design: DesignedTest) -> Iterator[str]:
 
 
 def _extreme(design: DesignedTest, signal: str, low: float, high: float) -> str:
-    """Write the range of a signal, and its limits."""
     limits = design.limits
     if signal == "vt":
         ends = (design.vt0 - limits.vt, design.vt0 + limits.vt)

@@ -213,7 +213,6 @@ def picture(letters: Letters) -> Picture:
 
 
 def _parts(letters: Letters) -> Parts:
-    """Return the part that each element is."""
     parts = {element: _part(element, letters.lines) for element in letters.elements}
     owners = {element: _owner(part, parts) for element, part in parts.items()}
     return {
@@ -352,7 +351,6 @@ class Obstacle:
 
 
 def _rows(grid: DiagramGrid) -> list[float]:
-    """Return the middle of each row."""
     needed = list(_distances(grid))
     middles = [0.0]
     for row in range(1, grid.letters.rows):

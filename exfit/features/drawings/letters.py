@@ -156,7 +156,6 @@ def _minus(rows: Sequence[str]) -> Iterator[tuple[Place, int]]:
 
 
 def _without(rows: Sequence[str], elements: Iterable[Element]) -> list[str]:
-    """Return the rows with spaces in place of some elements."""
     letters = [list(row) for row in rows]
     for element in elements:
         for k, row in enumerate(element.rows, element.top):

@@ -368,7 +368,6 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
 
 
 def _levels(simulator: Simulator) -> list[str]:
-    """Word the noise of each recorded input."""
     words = []
     for signal, deviation in noise_of_inputs(simulator).items():
         recorded = simulator.inputs.recorded[signal]

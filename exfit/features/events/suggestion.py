@@ -62,7 +62,6 @@ def _phasors(pmu: PmuContent, bases: Mapping[str, Base]) -> Section:
 
 
 def _about(phasor: InspectedPhasor, what: str) -> str:
-    """List facts to check of a phasor."""
     facts = [what]
     if phasor.rivals:
         facts.append(f"or is it {', '.join(phasor.rivals)}?")

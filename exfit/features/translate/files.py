@@ -92,7 +92,6 @@ def responses_table(translation: Translation) -> str:
 
 
 def _plant(result: FitResult) -> Section:
-    """Return the section of a case for the plant of a fit."""
     network = network_of(result)
     sources = {
         symbol: word

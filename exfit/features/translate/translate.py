@@ -163,7 +163,6 @@ def _best(task: TranslationTask, copied: Candidate, watch: Watch) -> Candidate:
 
 
 def _from(candidate: Candidate, free: Sequence[FreeParameter]) -> list[FreeParameter]:
-    """Return free parameters that start where a candidate has them."""
     return [replace(entry, start=candidate.values[entry.name].value) for entry in free]
 
 
