@@ -34,27 +34,34 @@ GROUPS = ("start", "fit", "examine", "hand over", "reference")
 COMMAND_WIDTH = 9  # characters: the groups align
 
 
-def _command(group: str, text: str, place: str) -> LazyCommand:
-    return LazyCommand(group, text, LazyPart(f"exfit.cli.{place}"))
-
-
 OF_CORE = {
-    "inspect": _command("start", "Show the content of a recorder's file.", "records:inspect_"),
-    "fit": _command("fit", "Fit the free parameters of each CASE to its records.", "fitting:fit"),
-    "simulate": _command("examine", "Simulate CASE at its start values.", "responses:simulate"),
-    "validate": _command(
-        "examine", "Compare fitted values with records that were not fitted.", "responses:validate"
-    ),
-    "check": _command("examine", "Check a case before its fit.", "examining:check"),
-    "show": _command("examine", "Print a stored result again.", "examining:show"),
-    "profile": _command(
-        "examine",
-        "Find the intervals of parameters by their profile likelihood.",
-        "examining:profile",
-    ),
-    "models": _command("reference", "List the models, or describe one.", "catalogue:models"),
-    "schema": _command("reference", "Print the JSON Schema of a case file.", "catalogue:schema"),
+    name: LazyCommand(group, text, LazyPart(f"exfit.cli.{place}"))
+    for name, group, text, place in (
+        ("inspect", "start", "Show the content of a recorder's file.", "records:inspect_"),
+        ("fit", "fit", "Fit the free parameters of each CASE to its records.", "fitting:fit"),
+        ("simulate", "examine", "Simulate CASE at its start values.", "responses:simulate"),
+        (
+            "validate",
+            "examine",
+            "Compare fitted values with records that were not fitted.",
+            "responses:validate",
+        ),
+        ("check", "examine", "Check a case before its fit.", "examining:check"),
+        ("show", "examine", "Print a stored result again.", "examining:show"),
+        (
+            "profile",
+            "examine",
+            "Find the intervals of parameters by their profile likelihood.",
+            "examining:profile",
+        ),
+        ("models", "reference", "List the models, or describe one.", "catalogue:models"),
+        ("schema", "reference", "Print the JSON Schema of a case file.", "catalogue:schema"),
+    )
 }
+
+
+def _commands() -> dict[str, LazyCommand]:
+    return {**OF_CORE, **of_features()}
 
 
 class Commands(click.Group):
@@ -62,12 +69,12 @@ class Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the names of all commands, in the order of their groups."""
-        known = {**OF_CORE, **of_features()}
+        known = _commands()
         return sorted(known, key=lambda name: GROUPS.index(known[name].group))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command; None where there is none of that name."""
-        known = OF_CORE.get(cmd_name) or of_features().get(cmd_name)
+        known = _commands().get(cmd_name)
         command: click.Command | None = None if known is None else known.part.load()
         return command
 
@@ -75,19 +82,21 @@ class Commands(click.Group):
         """Complete the name of a command, without importing any, or an option."""
         from click.shell_completion import CompletionItem
 
-        known = {**OF_CORE, **of_features()}
-        names = (name for name in self.list_commands(ctx) if name.startswith(incomplete))
-        items = [CompletionItem(name, help=known[name].help) for name in names]
+        known, names = _commands(), self.list_commands(ctx)
+        items = [
+            CompletionItem(name, help=known[name].help)
+            for name in names
+            if name.startswith(incomplete)
+        ]
         return [*items, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands by their groups, from what is known without importing them."""
-        known = {**OF_CORE, **of_features()}
         for group in GROUPS:
-            rows = [(name, each.help) for name, each in known.items() if each.group == group]
-            if rows:
+            known = ((name, each) for name, each in _commands().items() if each.group == group)
+            if rows := [(name.ljust(COMMAND_WIDTH), each.help) for name, each in known]:
                 with formatter.section(group.capitalize()):
-                    formatter.write_dl([(name.ljust(COMMAND_WIDTH), text) for name, text in rows])
+                    formatter.write_dl(rows)
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
         """Run as a program: no output that fails keeps a command from its files."""
@@ -105,21 +114,14 @@ class Commands(click.Group):
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault
         except OSError as fault:
-            raise Refusal(_of_system(fault)) from fault
+            # a name that is too long, a folder that may not be read
+            if fault.filename is not None:
+                raise Refusal(f"{fault.filename}: {fault.strerror}") from fault
+            if isinstance(fault, FileNotFoundError):
+                raise Refusal("the working folder has been removed") from fault
+            raise  # it has nothing to do with a file that somebody named
         except KeyboardInterrupt as interruption:
             raise Interruption(str(interruption)) from None
-
-
-def _of_system(fault: OSError) -> str:
-    """Describe a refusal of the system: a name that is too long, a folder that may not be read.
-
-    Raises the fault again where it has nothing to do with a file that somebody named.
-    """
-    if fault.filename is not None:
-        return f"{fault.filename}: {fault.strerror}"
-    if isinstance(fault, FileNotFoundError):
-        return "the working folder has been removed"
-    raise fault
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

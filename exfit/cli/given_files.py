@@ -68,7 +68,10 @@ class GivenFile(click.Path):
             return path
         advice = COMMANDS[kind].format(path=path)
         if kind is Kind.CASE and ctx is not None and Kind.RESULT in self.kinds:
-            advice = _fit_first(path, f"exfit {ctx.info_name}")
+            command, folder = f"exfit {ctx.info_name}", Path("runs") / f"{path.stem}-fit"
+            advice = f"fit it first: exfit fit {path}, then {command} {folder}"
+            if (folder / RESULT).is_file():
+                advice = f"{command} {folder} takes that of its fit"
             if ctx.info_name == "report":
                 advice += f"; or, without a fit, exfit validate {path}"
         raise ExfitError(f"{path}: {kind}, not {self.kinds[0]}; {advice}")
@@ -91,14 +94,6 @@ class ParameterFile(GivenFile):
         return folder / PARAMETERS
 
 
-def _fit_first(case: Path, command: str) -> str:
-    """Describe the way to a result of a case, for a command that takes one."""
-    folder = Path("runs") / f"{case.stem}-fit"
-    if (folder / RESULT).is_file():
-        return f"{command} {folder} takes that of its fit"
-    return f"fit it first: exfit fit {case}, then {command} {folder}"
-
-
 def _meant(path: Path) -> Path | None:
     """Return the file beside one that does not exist whose name is nearly its name, or None."""
     from difflib import get_close_matches
@@ -114,6 +109,8 @@ def _meant(path: Path) -> Path | None:
 
 def _kind_of(path: Path) -> Kind | None:
     """Recognise a file; None where that is not certain."""
+    from exfit.case.peek import keys_of
+
     suffix = path.suffix.lower()
     if path.is_dir():
         return Kind.RESULT if (path / RESULT).is_file() else None
@@ -123,13 +120,7 @@ def _kind_of(path: Path) -> Kind | None:
         return Kind.DYNAMICS
     if path.name == RESULT:
         return Kind.RESULT
-    return _kind_of_yaml(path) if suffix in CASES else None
-
-
-def _kind_of_yaml(path: Path) -> Kind | None:
-    from exfit.case.peek import keys_of
-
-    keys = keys_of(path)
+    keys = keys_of(path) if suffix in CASES else frozenset()
     if {"plant", "test", "tests", "record"} & keys:
         return Kind.CASE
     return Kind.PARAMETERS if "parameters" in keys else None

@@ -59,8 +59,20 @@ def unfailing_output() -> Iterator[Callable[[Any], Any]]:
     """
     former = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (_unfailing(stream) for stream in former)
+
+    def exit_code(code: Any) -> Any:
+        sys.stdout.flush()
+        fault = _fault_of(sys.stdout)
+        if fault is None:
+            return code
+        closed = fault.errno in CLOSED
+        kind = "Warning" if closed else "Error"
+        text = f"{kind}: standard output: {fault.strerror}: not all of it was written"
+        echo(text, err=True)
+        return code if closed else code or FAILED
+
     try:
-        yield _reported
+        yield exit_code
     finally:
         own = sys.stdout, sys.stderr
         sys.stdout, sys.stderr = former
@@ -72,19 +84,6 @@ def unfailing_output() -> Iterator[Callable[[Any], Any]]:
 def output_is_lost() -> bool:
     """Tell whether standard output has no reader any more."""
     return _fault_of(sys.stdout) is not None
-
-
-def _reported(code: Any) -> Any:
-    """Report what of standard output was lost, and return the exit code."""
-    sys.stdout.flush()
-    fault = _fault_of(sys.stdout)
-    if fault is None:
-        return code
-    closed = fault.errno in CLOSED
-    kind = "Warning" if closed else "Error"
-    text = f"{kind}: standard output: {fault.strerror}: not all of it was written"
-    echo(text, err=True)
-    return code if closed else code or FAILED
 
 
 def _unfailing(stream: TextIO | None) -> TextIO:

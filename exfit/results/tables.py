@@ -50,7 +50,7 @@ def whole_table(header: Sequence[str], columns: Sequence[Array]) -> str:
     The time has as many digits as its instants need to stay apart.
     """
     out = io.StringIO()
-    out.write(_csv([header]))
+    out.write(csv_text([header]))
     clock = f"%.{clock_digits(columns[0], DIGITS)}g"
     line = ",".join([clock, *[f"%.{DIGITS}g"] * (len(columns) - 1)]) + "\n"
     for first in range(0, len(columns[0]), ROWS_AT_ONCE):
@@ -104,7 +104,7 @@ def history_table(result: "FitResult") -> str:
         ]
         for line in result.history
     ]
-    return _csv([[*HISTORY, *result.parameters], *rows])
+    return csv_text([[*HISTORY, *result.parameters], *rows])
 
 
 def yes_or_no(value: bool | None) -> str:
@@ -120,10 +120,11 @@ def effects_table(effects: "Sequence[ParameterEffect]") -> str:
         [each.parameter, *map(_digits, (*each.rms.values(), each.of_noise)), each.percent_of]
         for each in effects
     ]
-    return _csv([["parameter", *columns, "of_noise", "percent_of"], *rows])
+    return csv_text([["parameter", *columns, "of_noise", "percent_of"], *rows])
 
 
-def _csv(rows: Iterable[Iterable[object]]) -> str:
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Write rows of cells as CSV."""
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerows(rows)
     return out.getvalue()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from itertools import groupby, zip_longest
 from threading import Event, Thread
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -275,55 +276,68 @@ class ProgressBar:
             yield show
 
 
-class SeriesProgress:
-    """Shows fits as they end, a line for each; a terminal has the one that runs below them."""
+class RunLines:
+    """Shows runs as they end, a line for each; a terminal has the one that runs below them.
 
-    def __init__(self, console: Console, plan: Sequence[PlannedFit]) -> None:
-        self.console, self.count = console, len(plan)
-        self._alone = any(fit.search == "local" for fit in plan)
-        self._width = min(max(len(fit.name) for fit in plan), MOST_OF_NAME)
-        self._done, self._shown = 0, ""
+    ``forms`` are those of the cells behind the name, which has ``width`` characters at most.
+    """
+
+    def __init__(
+        self, console: Console, heads: Sequence[str], forms: Sequence[str], width: int, count: int
+    ) -> None:
+        self.console, self.heads, self.forms = console, heads, forms
+        self.width, self.count = width, count
+        self.done, self._shown = 0, ""
         self._live: Live | None = None
 
     @contextmanager
-    def running(self) -> Iterator["SeriesProgress"]:
-        """Show the lines for as long as the fits run."""
-        if self._alone:
-            paragraph(self.console, DESCENTS_ALONE)
-        self.console.print(self._line(HEADS), style="bold", soft_wrap=True, markup=False)
+    def running(self) -> Iterator[Self]:
+        """Show the lines for as long as the runs last."""
+        self.line(self.heads, "bold")
         if not self.console.is_terminal:
             yield self
             return
         with Live(console=self.console, transient=True) as self._live:
             yield self
 
+    def show(self, name: str, state: str) -> None:
+        """Show below the lines what a run is at; at once where it is another one than before."""
+        if self._live is not None:
+            text = f"{self.done + 1} of {self.count}: {name}, {state}"
+            self._live.update(Text(text, "dim"), refresh=name != self._shown)
+            self._shown = name
+
+    def line(self, cells: Sequence[str], style: str = "") -> None:
+        """Print a line."""
+        name = cells[0]
+        if len(name) > self.width:
+            name = f"…{name[1 - self.width :]}"
+        others = (form.format(cell) for form, cell in zip(self.forms, cells[1:], strict=True))
+        text = " ".join([f"{name:<{self.width}}", *others]).rstrip()
+        self.console.print(Text(text, style), soft_wrap=True)
+
+
+class SeriesProgress(RunLines):
+    """The fits of a series, each as it ends."""
+
+    def __init__(self, console: Console, plan: Sequence[PlannedFit]) -> None:
+        width = min(max(len(fit.name) for fit in plan), MOST_OF_NAME)
+        super().__init__(console, HEADS, FORMS, width, len(plan))
+        if any(fit.search == "local" for fit in plan):
+            paragraph(console, DESCENTS_ALONE)
+
     def __call__(self, fit: PlannedFit, progress: ProgressOfFit) -> None:
         """Show how far the fit that runs is."""
-        self._show(fit.name, progress_words(progress))
+        self.show(fit.name, progress_words(progress))
 
     def finished(self, run: FitRun) -> None:
         """Show a fit that has ended."""
         result, outcome = run.result, outcome_of(run.result)
         numbers = (f"{result.cost:.4e}", f"{result.rmse:.4e}", f"{result.seconds:.2f}")
-        style = "" if result.holds else "yellow"
-        line = self._line((run.name, f"{result.nit}", *numbers, BRIEF.get(outcome, outcome)))
-        self.console.print(Text(line, style), soft_wrap=True)
-        self._show(run.name, "writing numbers")
-        self._done += 1
-
-    def _show(self, name: str, state: str) -> None:
-        """Show below the lines what a fit is at; at once where it is another fit than before."""
-        if self._live is not None:
-            text = f"{self._done + 1} of {self.count}: {name}, {state}"
-            self._live.update(Text(text, "dim"), refresh=name != self._shown)
-            self._shown = name
-
-    def _line(self, cells: Sequence[str]) -> str:
-        name = cells[0]
-        if len(name) > self._width:
-            name = f"…{name[1 - self._width :]}"
-        others = (form.format(cell) for form, cell in zip(FORMS, cells[1:], strict=True))
-        return " ".join([f"{name:<{self._width}}", *others]).rstrip()
+        cells = (run.name, f"{result.nit}", *numbers, BRIEF.get(outcome, outcome))
+        self.line(cells, "" if result.holds else "yellow")
+        self.show(run.name, "writing numbers")
+        self.done += 1
 
 
 def progress_words(progress: ProgressOfFit) -> str:

@@ -205,14 +205,13 @@ class BatchRun:
             make = self.made.get(name)
             why_not_made = "" if make is None else make()  # a case of a table is made first
             case = planned_case(file, self.folder, self.settings, why_not_made)
-            write_entry(self.folder, case.entry)
-            key = case.entry.key
-            kept = is_done(self.folder, key) or (
-                not self.settings.retry_failed and failure_of(self.folder, key) is not None
-            )
-            if case.task is None:
-                self.observer.finished(row_of(case.entry))
-            elif key in keys or kept:
+            entry = case if isinstance(case, IndexEntry) else case.entry
+            write_entry(self.folder, entry)
+            key, retry = entry.key, self.settings.retry_failed
+            failed_before = not retry and failure_of(self.folder, key) is not None
+            if isinstance(case, IndexEntry):
+                self.observer.finished(row_of(case))
+            elif key in keys or failed_before or is_done(self.folder, key):
                 self.observer.kept(name)
             else:
                 keys.add(key)

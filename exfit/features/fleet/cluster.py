@@ -49,7 +49,11 @@ def connected(address: str) -> Iterator["Client"]:
         text = 'needs the package distributed: pip install "exfit[cluster]"'
         raise ClusterError(f"--scheduler: {text}") from None
     with _silent(), dask.config.set(SETTINGS):
-        _refuse_other_than_schedulers(address)
+        with ThreadPoolExecutor(1) as apart:  # a notebook has a loop of its own in this thread
+            kind = apart.submit(lambda: asyncio.run(_kind_at(address))).result()
+        if kind != "Scheduler":
+            text = f"a {kind} of Dask, not a scheduler" if kind else "not a scheduler of Dask"
+            raise ClusterError(f"{address}: {text}")
         try:
             client = Client(address, timeout=CONNECTED_WITHIN, set_as_default=False)
         except (OSError, ValueError, RuntimeError, TypeError) as fault:
@@ -75,15 +79,6 @@ def _silent() -> Iterator[None]:
     finally:
         for logger, level in levels.items():
             logger.setLevel(level)
-
-
-def _refuse_other_than_schedulers(address: str) -> None:
-    """Raise ClusterError where no scheduler answers at an address."""
-    with ThreadPoolExecutor(1) as apart:  # a notebook has a loop of its own in this thread
-        kind = apart.submit(lambda: asyncio.run(_kind_at(address))).result()
-    if kind != "Scheduler":
-        text = f"a {kind} of Dask, not a scheduler" if kind else "not a scheduler of Dask"
-        raise ClusterError(f"{address}: {text}")
 
 
 async def _kind_at(address: str) -> str:
@@ -168,7 +163,11 @@ def answered(worker: str, answer: "Future[Mapping[str, Any]]") -> str | None:
         if missing is not None:
             return f"exfit is missing there, or is an earlier version: {missing[0]}"
         return f"{type(there).__name__}: {_reason(there)}"
-    return _differences(there, remote.versions())
+    return ", ".join(
+        f"{name} {there.get(name, 'missing')}, here {version}"
+        for name, version in remote.versions().items()
+        if there.get(name) != version
+    )
 
 
 def stop(client: "Client", workers: list[str], batch: str) -> None:
@@ -179,11 +178,3 @@ def stop(client: "Client", workers: list[str], batch: str) -> None:
             call, remote.stop_batch, batch, workers=workers, on_error="ignore",
             callback_timeout=CLOSED_WITHIN,
         )  # fmt: skip
-
-
-def _differences(there: Mapping[str, str], here: Mapping[str, str]) -> str:
-    return ", ".join(
-        f"{name} {there.get(name, 'missing')}, here {version}"
-        for name, version in here.items()
-        if there.get(name) != version
-    )

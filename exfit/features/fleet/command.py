@@ -1,5 +1,6 @@
 """The command batch."""
 
+import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -22,12 +23,13 @@ WITHOUT_FIT = ("failed", "timed out", "crashed", "refused", "not run")
 
 def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     """Return the number of a part and how many there are, of a text such as 3/40."""
-    number, _slash, parts = value.partition("/")
-    if not (number.isdecimal() and parts.isdecimal()):
+    match = re.fullmatch(r"([0-9]+)/([0-9]+)", value)
+    if match is None:
         raise click.BadParameter(f"{value}: not of the form 3/40")
-    if not 1 <= int(number) <= int(parts):
+    number, parts = int(match[1]), int(match[2])
+    if not 1 <= number <= parts:
         raise click.BadParameter(f"{value}: must be 1/{parts} ... {parts}/{parts}")
-    return int(number), int(parts)
+    return number, parts
 
 
 @click.command(short_help="Fit many cases, and make a table of all.")
@@ -127,11 +129,10 @@ def batch(
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from exfit.features.fleet.batch import batch as fit_all
-    from exfit.features.fleet.table import report_file, write_tables
+    from exfit.features.fleet.table import report_file, write_missing_reports, write_tables
     from exfit.features.start.tables import is_table
 
     tables = [path for path in cases if is_table(path) and not path.is_dir()]
-    others = [path for path in cases if path not in tables]
     shown: AbstractContextManager[BatchProgress | None] = nullcontext()
     if not (quiet or as_json):
         from exfit.features.fleet import terminal
@@ -140,7 +141,7 @@ def batch(
         shown = terminal.BatchProgress(console()).running()
     with shown as observer:
         fleet = fit_all(
-            others,
+            [path for path in cases if path not in tables],
             output,
             workers=workers,
             scheduler=scheduler,
@@ -155,7 +156,7 @@ def batch(
             write_tables=write_tables,
             made=_cases_of(tables, output),
         )
-    if reports and _write_missing_reports(fleet):
+    if reports and write_missing_reports(fleet):
         write_tables(fleet)
     if as_json:
         print_json(fleet.to_dict())
@@ -164,7 +165,7 @@ def batch(
     _exit(fleet)
 
 
-def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]":
+def _cases_of(tables: Sequence[Path], folder: Path) -> "dict[Path, CaseMaking]":
     """Plan the cases of tables; raises ExfitError with the faults of all of them."""
     from exfit.features.planner.import_all import cases_of_table
 
@@ -183,27 +184,13 @@ def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]
     return made
 
 
-def _write_missing_reports(fleet: "Fleet") -> bool:
-    """Write the reports of fits that an earlier run has made without; return whether any was."""
-    from exfit.features.fleet.page import REPORT
-
-    folders = [fleet.folder_of(case) for case in fleet.of_run]
-    missing = [folder for folder in folders if folder and not (folder / REPORT).is_file()]
-    for folder in dict.fromkeys(missing):
-        from exfit.features.report.writing import write_report
-
-        write_report(folder)
-    return bool(missing)
-
-
 def _exit(fleet: "Fleet") -> None:
     """Raise SystemExit or Interruption where not all cases of the run are done and well."""
     rows = fleet.of_run
-    if fleet.interrupted:
-        if not any(row.status == "done" for row in rows):
-            raise Interruption("no case is done")
-        raise SystemExit(NOT_CONVERGED)
-    if any(row.status in WITHOUT_FIT for row in rows):
+    done = [row for row in rows if row.status == "done"]
+    if fleet.interrupted and not done:
+        raise Interruption("no case is done")
+    if not fleet.interrupted and any(row.status in WITHOUT_FIT for row in rows):
         raise SystemExit(FAILED)
-    if not all(row.holds for row in rows if row.status == "done"):
+    if fleet.interrupted or not all(row.holds for row in done):
         raise SystemExit(NOT_CONVERGED)

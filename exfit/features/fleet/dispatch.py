@@ -27,7 +27,7 @@ from exfit.features.fleet.cluster import (
     threads_of,
 )
 from exfit.features.fleet.folder import CaseOutcome, Failure
-from exfit.features.fleet.local import Begin, Compute, End, Waiting, group_of
+from exfit.features.fleet.local import Begin, Compute, End, Waiting
 from exfit.features.fleet.plan import PlannedCase
 from exfit.features.fleet.remote import BundledTask, RemoteCase, Reply, unpacked
 from exfit.features.fleet.summary import FailureKind
@@ -199,9 +199,9 @@ class Dispatch:
         for places in range(1, AHEAD + 1):
             for worker, threads in self.threads.items():
                 while self.waiting and self._has_room(worker, places * threads):
-                    at_work = Counter(group_of(sent.case) for sent in self.sent.values())
+                    at_work = Counter(sent.case.task.group for sent in self.sent.values())
                     case = self.waiting.next_for(self.groups.get(worker, ""), at_work)
-                    self.groups[worker] = group_of(case)
+                    self.groups[worker] = case.task.group
                     if case.entry.case in self.begun or self.begin(case):
                         self.begun.add(case.entry.case)
                         self._submit(case, worker)
@@ -222,8 +222,6 @@ class Dispatch:
         return cases < places and (under_way < MOST_BYTES or not self.sent)
 
     def _submit(self, case: PlannedCase, worker: str) -> None:
-        if case.task is None:
-            return
         try:
             bundled = case._replace(task=BundledTask.of(case.task))
         except ExfitError as fault:

@@ -14,9 +14,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryFile
 from threading import Thread
@@ -92,9 +93,9 @@ class WorkerProcess:
                 content = None
             answers.put(Answer(self, content))
 
-    def give(self, case: PlannedCase, group: str) -> None:
+    def give(self, case: PlannedCase) -> None:
         """Give a case to a worker that has none."""
-        self.case, self.group, self.began = case, group, None
+        self.case, self.group, self.began = case, case.task.group, None
         self._errors_before = os.fstat(self._errors.fileno()).st_size
         with suppress(OSError):  # it has died, as its pipe will say
             pickle.dump(case.task, self._tasks, protocol=pickle.HIGHEST_PROTOCOL)
@@ -115,15 +116,11 @@ class WorkerProcess:
             self._process.kill()
             code = self._process.wait()
         self._listener.join(TO_END)
-        reason = ": ".join(
-            filter(
-                None, (ending(code, "the worker"), last_lines(self._errors, self._errors_before))
-            )
-        )
+        words = [ending(code, "the worker"), last_lines(self._errors, self._errors_before)]
         for file in (self._tasks, self._answers, self._errors):
             with suppress(OSError):  # what could not be sent
                 file.close()
-        return reason
+        return ": ".join(filter(None, words))
 
 
 @contextmanager
@@ -147,21 +144,8 @@ def signals_held_back() -> Iterator[None]:
 def in_this_process(cases: Iterator[PlannedCase], begin: Begin, end: End) -> None:
     """Fit cases here, one after the other; no time limit ends them."""
     for case in cases:
-        if case.task is not None and begin(case):
+        if begin(case):
             end(case, case.task.run())
-
-
-def local_workers(workers: int, time_limit: float) -> Compute:
-    """Make the `Compute` of so many processes, each case in no more than ``time_limit`` s."""
-
-    def compute(cases: Iterator[PlannedCase], begin: Begin, end: End) -> None:
-        pool = Pool(cases, begin, end, workers, time_limit)
-        try:
-            pool.run()
-        finally:
-            pool.stop()
-
-    return compute
 
 
 class Waiting:
@@ -172,7 +156,7 @@ class Waiting:
 
     def __init__(self, cases: Iterator[PlannedCase]) -> None:
         self._cases, self.exhausted = cases, False
-        self._groups: dict[str, deque[PlannedCase]] = {}
+        self._groups: defaultdict[str, deque[PlannedCase]] = defaultdict(deque)
 
     def __len__(self) -> int:
         return sum(map(len, self._groups.values()))
@@ -187,7 +171,7 @@ class Waiting:
 
     def add(self, case: PlannedCase) -> None:
         """Add a case behind the others of its group."""
-        self._groups.setdefault(group_of(case), deque()).append(case)
+        self._groups[case.task.group].append(case)
 
     def next_for(self, group: str, at_work: Counter[str]) -> PlannedCase:
         """Return the next case for a worker that has had one of a group: of the same if possible.
@@ -204,28 +188,32 @@ class Waiting:
         return case
 
 
-def group_of(case: PlannedCase) -> str:
-    """Return the group of a case."""
-    return "" if case.task is None else case.task.group
+def local_workers(workers: int, time_limit: float) -> Compute:
+    """Make the `Compute` of so many processes, each case in no more than ``time_limit`` s."""
+
+    def compute(cases: Iterator[PlannedCase], begin: Begin, end: End) -> None:
+        pool = Pool(Waiting(cases), begin, end, workers, time_limit)
+        try:
+            pool.run()
+        finally:
+            pool.stop()
+
+    return compute
 
 
+@dataclass(eq=False)
 class Pool:
     """Workers at the cases of a batch; all of it happens in one thread, by their answers."""
 
-    def __init__(
-        self,
-        cases: Iterator[PlannedCase],
-        begin: Begin,
-        end: End,
-        most_workers: int,
-        time_limit: float,
-    ) -> None:
-        self.waiting, self.begin, self.end = Waiting(cases), begin, end
-        self.most_workers, self.time_limit = most_workers, time_limit
-        self.workers: list[WorkerProcess] = []
-        self.answers: SimpleQueue[Answer] = SimpleQueue()
-        self.failed_starts = 0
-        self.lost: Counter[str] = Counter()
+    waiting: Waiting
+    begin: Begin
+    end: End
+    most_workers: int
+    time_limit: float
+    workers: list[WorkerProcess] = field(default_factory=list)
+    answers: "SimpleQueue[Answer]" = field(default_factory=SimpleQueue)
+    failed_starts: int = 0
+    lost: Counter[str] = field(default_factory=Counter)
 
     def run(self) -> None:
         """Fit all cases: while no worker has an answer, the next case is planned."""
@@ -235,7 +223,12 @@ class Pool:
                 waiting.plan_one()
             else:
                 self._listen()
-            self._end_overdue()
+            now = time.monotonic()
+            for worker in [*self.workers]:
+                if worker.began is not None and now - worker.began > self.time_limit:
+                    reason = f"no end after {self.time_limit:g} s"
+                    self._dismiss(worker)
+                    self._fail(worker, Failure("timed out", reason, self.time_limit))
             self._employ()
 
     def stop(self) -> None:
@@ -249,10 +242,10 @@ class Pool:
         """Give cases to the workers that have none, and start those that are missing."""
         for worker in self.workers:
             while worker.ready and not worker.case and self.waiting:
-                at_work = Counter(group_of(other.case) for other in self.workers if other.case)
+                at_work = Counter(other.case.task.group for other in self.workers if other.case)
                 case = self.waiting.next_for(worker.group, at_work)
                 if self.begin(case):
-                    worker.give(case, group_of(case))
+                    worker.give(case)
         idle = sum(not worker.case for worker in self.workers)
         missing = min(self.most_workers - len(self.workers), len(self.waiting) - idle)
         self.workers += [WorkerProcess(self.answers) for _ in range(missing)]
@@ -272,49 +265,35 @@ class Pool:
         elif content == BEGUN:
             worker.began = time.monotonic()
         else:
-            self._finish(worker, content)
-
-    def _finish(self, worker: WorkerProcess, outcome: CaseOutcome) -> None:
-        """Take the outcome of a worker's case; it begins the next one before this is written."""
-        case = worker.case
-        worker.case = worker.began = None
-        if outcome.failure is not None and outcome.failure.kind == "crashed":
-            self._dismiss(worker)  # whatever happened may have spoilt it
-        self._employ()
-        if case is not None:
-            self.end(case, outcome)
+            case, worker.case, worker.began = worker.case, None, None
+            if content.failure is not None and content.failure.kind == "crashed":
+                self._dismiss(worker)  # whatever happened may have spoilt it
+            self._employ()  # it begins the next case before the outcome is written
+            if case is not None:
+                self.end(case, content)
 
     def _dismiss(self, worker: WorkerProcess) -> None:
         self.workers.remove(worker)
         worker.dismiss()
         worker.gone()
 
-    def _end_overdue(self) -> None:
-        now = time.monotonic()
-        for worker in [*self.workers]:
-            if worker.began is not None and now - worker.began > self.time_limit:
-                case = worker.case
-                self._dismiss(worker)
-                reason = f"no end after {self.time_limit:g} s"
-                if case is not None:
-                    failure = Failure("timed out", reason, self.time_limit)
-                    self.end(case, CaseOutcome(failure=failure))
+    def _fail(self, worker: WorkerProcess, failure: Failure) -> None:
+        if worker.case is not None:
+            self.end(worker.case, CaseOutcome(failure=failure))
 
     def _bury(self, worker: WorkerProcess) -> None:
         """Replace a worker that has died; its case has crashed if it had begun."""
         self.workers.remove(worker)
-        reason = worker.gone()
+        reason, case, seconds = worker.gone(), worker.case, 0.0
         if not worker.ready:
             self.failed_starts += 1
             if self.failed_starts >= MOST_FAILED_STARTS:
                 raise ExfitError(f"no worker can be started: {reason}")
-        case = worker.case
-        if case is None:
-            return
-        if worker.began is None:
+        if worker.began is not None:
+            seconds = time.monotonic() - worker.began
+        elif case is not None:
             self.lost[case.entry.case] += 1
             if self.lost[case.entry.case] < MOST_LOST:
                 self.waiting.add(case)
                 return
-        seconds = 0.0 if worker.began is None else time.monotonic() - worker.began
-        self.end(case, CaseOutcome(failure=Failure("crashed", reason, round(seconds, 3))))
+        self._fail(worker, Failure("crashed", reason, round(seconds, 3)))

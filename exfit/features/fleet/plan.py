@@ -47,10 +47,10 @@ class BatchSettings:
 
 
 class PlannedCase(NamedTuple):
-    """A case with its entry of the index, and its task where it has a key."""
+    """A case that has a key, with its entry of the index and its task."""
 
     entry: IndexEntry
-    task: CaseTask | None = None
+    task: CaseTask
 
 
 def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
@@ -114,7 +114,7 @@ def share_of(cases: Sequence[Path], part: Share, folder: Path) -> tuple[Path, ..
 
 def planned_case(
     case: Path, folder: Path, settings: BatchSettings, why_not_made: str = ""
-) -> PlannedCase:
+) -> PlannedCase | IndexEntry:
     """Return a case with its key, and the task that its fit is; or why it has none."""
     entry = IndexEntry(case_name(folder, case))
     try:
@@ -122,7 +122,7 @@ def planned_case(
     except OSError as fault:
         why_not_made = f"{case}: cannot be read: {fault.strerror}"
     if why_not_made:
-        return PlannedCase(replace(entry, status="refused", reason=why_not_made))
+        return replace(entry, status="refused", reason=why_not_made)
     try:
         content = content_of(decoded(data, case), case)
     except CaseError:  # which its fit will report
@@ -131,9 +131,9 @@ def planned_case(
     files = (case, *(file for file in files_in(content, case.parent) if file != case))
     reason = _why_refused(content, files, settings.trust)
     if reason:
-        return PlannedCase(replace(entry, status="refused", reason=reason))
+        return replace(entry, status="refused", reason=reason)
     if content and not WITH_RECORD & content.keys():
-        return PlannedCase(replace(entry, status="no record", reason=NO_RECORD))
+        return replace(entry, status="no record", reason=NO_RECORD)
     key = key_of(files, settings.fit, data)
     task = CaseTask(files, key, folder / key, settings.fit, _group(content), settings.further)
     return PlannedCase(replace(entry, key=key), task)

@@ -222,14 +222,12 @@ class Seat:
             raise NoProcess(seat.gone())
         return seat
 
-    def reply(
-        self, case: PlannedCase, group: str, limit: float, is_wanted: Callable[[], bool]
-    ) -> Reply:
+    def reply(self, case: PlannedCase, limit: float, is_wanted: Callable[[], bool]) -> Reply:
         """Have a case fitted; the process has ended where that takes longer or crashes.
 
         It is ended, too, once the case is not wanted any more.
         """
-        self.process.give(case, group)
+        self.process.give(case)
         until = time.monotonic() + limit
         while time.monotonic() < until:
             try:
@@ -271,11 +269,10 @@ class Seats:
     def reply(self, remote: RemoteCase, is_wanted: Callable[[], bool]) -> Reply:
         """Have a case fitted; raises NoProcess where no process can be started for it."""
         case = remote.case
-        if not isinstance(case.task, BundledTask):
-            raise TypeError("a case without its files")
-        task = replace(case.task, temporary=self.folder)
+        if isinstance(case.task, BundledTask):
+            case = case._replace(task=replace(case.task, temporary=self.folder))
         with self._seat() as seat:
-            return seat.reply(case._replace(task=task), task.group, remote.limit, is_wanted)
+            return seat.reply(case, remote.limit, is_wanted)
 
     @contextmanager
     def _seat(self) -> Iterator[Seat]:

@@ -3,55 +3,52 @@
 The texts come from the files of others: a spreadsheet must not take one for a formula.
 """
 
-import csv
-import io
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from exfit.features.fleet.folder import Fleet
 from exfit.features.fleet.page import REPORT, fleet_page
-from exfit.features.fleet.sisters import (
-    SisterGroup,
-    SisterParameter,
-    SisterValue,
-    missing_interval,
-    sisters,
-)
+from exfit.features.fleet.sisters import SisterGroup, missing_interval, sisters
 from exfit.features.fleet.summary import CaseSummary, SummaryParameter
 from exfit.results.model import FitResult
-from exfit.results.tables import DIGITS
+from exfit.results.tables import DIGITS, csv_text
 from exfit.signals import SIGNALS
 from exfit.util.files import write_together
 from exfit.util.text import printable
 
+if TYPE_CHECKING:
+    from exfit.features.programme.result import ProgrammeResult
+
+TABLE, PARAMETERS, PAGE = "fleet.csv", "parameters.csv", "fleet.html"
 BYTE_ORDER_MARK = "\ufeff"  # Excel reads the letters of all languages behind it
 FORMULA = r"[=+\-@＝＋－＠]"
 STARTS_FORMULA = re.compile(FORMULA)
 STARTS_FORMULA_WITHIN = re.compile(rf";(?={FORMULA})")  # where semicolons part the cells
 
-CASE_COLUMNS: Mapping[str, Callable[[CaseSummary], str]] = {
-    "name": lambda case: text_cell(case.name),
-    "unit": lambda case: text_cell(case.unit),
-    "bus": lambda case: "" if case.bus is None else str(case.bus),
-    "id": lambda case: text_cell(case.machine_id or ""),
-    "model": lambda case: text_cell(case.model),
-    "machine": lambda case: text_cell(case.machine_model),
-    "status": lambda case: case.status,
-    "verdict": lambda case: text_cell(case.verdict),
-    "reason": lambda case: text_cell(case.reason),
-    "validation": lambda case: case.validation.outcome,
-    "validation rmse": lambda case: _number(case.validation.rmse),
-    "unresolved": lambda case: text_cell(" ".join(case.unresolved)),
-    "seconds": lambda case: f"{case.seconds:.3f}",
-    "case": lambda case: text_cell(case.case),
-    "key": lambda case: text_cell(case.key),
+# what they have of a case, the first ones also beside each of its parameters
+CASE_COLUMNS: Mapping[str, str] = {
+    "name": "name",
+    "unit": "unit",
+    "bus": "bus",
+    "id": "machine_id",
+    "model": "model",
+    "machine": "machine_model",
+    "status": "status",
+    "verdict": "verdict",
+    "reason": "reason",
+    "validation": "validation.outcome",
+    "validation rmse": "validation.rmse",
+    "unresolved": "unresolved",
+    "seconds": "seconds",
+    "case": "case",
+    "key": "key",
 }
-PARAMETER_COLUMNS = (
-    "name", "unit", "bus", "id", "model", "machine", "parameter", "value", "low", "high",
-    "unit of value", "sisters", "centre", "spread", "deviation", "probability", "remark",
-)  # fmt: skip
+OF_UNIT = 6  # columns
+PARAMETER_COLUMNS = ("parameter", "value", "low", "high", "unit of value")
+SISTER_COLUMNS = ("sisters", "centre", "spread", "deviation", "probability", "remark")
 
 
 def fleet_table(cases: Sequence[CaseSummary]) -> str:
@@ -60,27 +57,17 @@ def fleet_table(cases: Sequence[CaseSummary]) -> str:
     Behind the columns that every table has stands the rmse of each signal, and the value and the
     ends of the interval of each parameter that any case fitted. What a case does not have is blank.
     """
-    ordered = _by_name(cases)
-    signals = [name for name in SIGNALS if any(name in case.rmse for case in ordered)]
-    parameters = sorted({name for case in ordered for name in case.fitted})
+    signals = [name for name in SIGNALS if any(name in case.rmse for case in cases)]
+    parameters = sorted({name for case in cases for name in case.fitted})
     header = [*CASE_COLUMNS, *(f"rmse {signal}" for signal in signals)]
     header += [text_cell(name) + end for name in parameters for end in ("", " low", " high")]
-    return _csv(header, (_case_cells(case, signals, parameters) for case in ordered))
-
-
-def _by_name(cases: Sequence[CaseSummary]) -> list[CaseSummary]:
-    return sorted(cases, key=lambda case: (case.name.casefold(), case.name))
-
-
-def _case_cells(
-    case: CaseSummary, signals: Sequence[str], parameters: Sequence[str]
-) -> Iterator[str]:
-    for text in CASE_COLUMNS.values():
-        yield text(case)
-    for signal in signals:
-        yield _number(case.rmse.get(signal))
-    for name in parameters:
-        yield from _interval(case.fitted.get(name))
+    rows = [header]
+    for case in _by_name(cases):
+        cells = [*_case_cells(case), *(_cell(case.rmse.get(signal)) for signal in signals)]
+        for name in parameters:
+            cells += _interval(case.fitted.get(name))
+        rows.append(cells)
+    return BYTE_ORDER_MARK + csv_text(rows)
 
 
 def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup]) -> str:
@@ -91,57 +78,46 @@ def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup])
         for parameter in group.parameters
         for value in parameter.values
     }
-    rows = (
-        [
-            *(CASE_COLUMNS[column](case) for column in PARAMETER_COLUMNS[:6]),
-            text_cell(name),
-            *_interval(value),
-            text_cell(value.unit),
-            *_beside_sisters(compared.get((case.name, name)), missing_interval(case, name)),
-        ]
-        for case in _by_name(cases)
-        for name, value in case.fitted.items()
-    )
-    return _csv(PARAMETER_COLUMNS, rows)
+    rows = [[*[*CASE_COLUMNS][:OF_UNIT], *PARAMETER_COLUMNS, *SISTER_COLUMNS]]
+    for case in _by_name(cases):
+        for name, own in case.fitted.items():
+            of_unit = _case_cells(case)[:OF_UNIT]
+            cells = [*of_unit, text_cell(name), *_interval(own), text_cell(own.unit)]
+            if (case.name, name) in compared:
+                all_of_them, value = compared[case.name, name]
+                numbers = (all_of_them.centre, all_of_them.spread, *value[-2:])
+                cells += [str(len(all_of_them.values)), *map(_cell, numbers), _cell(value.remark)]
+            else:
+                cells += [""] * len(SISTER_COLUMNS[1:]) + [missing_interval(case, name)]
+            rows.append(cells)
+    return BYTE_ORDER_MARK + csv_text(rows)
+
+
+def _by_name(cases: Sequence[CaseSummary]) -> list[CaseSummary]:
+    return sorted(cases, key=lambda case: (case.name.casefold(), case.name))
+
+
+def _case_cells(case: CaseSummary) -> list[str]:
+    values = {column: attrgetter(path)(case) for column, path in CASE_COLUMNS.items()}
+    values |= {"unresolved": " ".join(case.unresolved), "seconds": f"{case.seconds:.3f}"}
+    return [*map(_cell, values.values())]
+
+
+def _interval(parameter: SummaryParameter | None) -> list[str]:
+    return [*map(_cell, (None, None, None) if parameter is None else parameter[:3])]
+
+
+def _cell(value: Any) -> str:
+    """Write a text or a number; what is not known is blank."""
+    if isinstance(value, str):
+        return text_cell(value)
+    return "" if value is None or value != value else f"{value:.{DIGITS}g}"
 
 
 def text_cell(text: str) -> str:
     """Return a text in one line that no spreadsheet takes for a formula."""
     line = STARTS_FORMULA_WITHIN.sub("; ", printable(" ".join(text.split())))
     return f"'{line}" if STARTS_FORMULA.match(line) else line
-
-
-def _beside_sisters(place: tuple[SisterParameter, SisterValue] | None, remark: str) -> list[str]:
-    """Write the comparison of a parameter, for one without sisters a remark alone."""
-    if place is None:
-        return [""] * len(PARAMETER_COLUMNS[11:-1]) + [remark]
-    parameter, value = place
-    numbers = (parameter.centre, parameter.spread, value.deviation, value.probability)
-    return [str(len(parameter.values)), *map(_number, numbers), text_cell(value.remark)]
-
-
-def _interval(parameter: SummaryParameter | None) -> list[str]:
-    if parameter is None:
-        return ["", "", ""]
-    return [_number(number) for number in (parameter.value, parameter.low, parameter.high)]
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None or value != value else f"{value:.{DIGITS}g}"
-
-
-def _csv(header: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return BYTE_ORDER_MARK + out.getvalue()
-
-
-if TYPE_CHECKING:
-    from exfit.features.programme.result import ProgrammeResult
-
-TABLE, PARAMETERS, PAGE = "fleet.csv", "parameters.csv", "fleet.html"
 
 
 def write_tables(fleet: Fleet) -> None:
@@ -166,3 +142,14 @@ def report_file(result: "FitResult | ProgrammeResult", folder: Path) -> Iterator
     else:
         page = fit_page(result, folder)
     yield REPORT, page_html(page)
+
+
+def write_missing_reports(fleet: Fleet) -> bool:
+    """Write the reports of fits that an earlier run has made without; return whether any was."""
+    folders = dict.fromkeys(fleet.folder_of(case) for case in fleet.of_run)
+    missing = [folder for folder in folders if folder and not (folder / REPORT).is_file()]
+    for folder in missing:
+        from exfit.features.report.writing import write_report
+
+        write_report(folder)
+    return bool(missing)

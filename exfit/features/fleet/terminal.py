@@ -108,20 +108,27 @@ class BatchProgress(BatchObserver):
         return max((waiting * mean + sum(rest)) / at_a_time, *rest, 0.0)
 
     def picture(self) -> Grid:
-        """Return the lines that a terminal shows."""
-        width = self.console.width - 1
+        """Return the lines that a terminal shows: how far it is, what is done, what runs."""
+        width, now = self.console.width - 1, self._clock()
         head, pace = f"{self.done} of {self._cases} cases", self._pace()
         room = width - len(head) - len(pace) - 2 * BETWEEN
-        lines = Grid.grid(padding=(0, BETWEEN, 0, 0))
+        line = Grid.grid(padding=(0, BETWEEN, 0, 0))
         if room >= SHORTEST_BAR:
-            lines.add_row(head, Bar(max(self._cases, 1), self.done, width=room), pace)
+            line.add_row(head, Bar(max(self._cases, 1), self.done, width=room), pace)
         else:
-            lines.add_row(", ".join(filter(None, (head, pace))))
-        running = self._now(self._clock())
+            line.add_row(", ".join(filter(None, (head, pace))))
+        longest = sorted(self._running.items(), key=lambda item: item[1])
+        text = ", ".join(
+            f"{case.rsplit('/', 1)[-1].removesuffix('.yaml')} ({_duration(now - began)})"
+            for case, began in longest[:MOST_RUNNING]
+        )
+        more = len(longest) - MOST_RUNNING
+        text += f" and {more} more" if more > 0 else ""
+        running = Text(f"now {text}" if text else "", "dim")
         running.truncate(max(width, 1), overflow="ellipsis")
         grid = Grid.grid()
-        for line in (lines, self._counts(), running):
-            grid.add_row(line)
+        for each in (line, self._counts(), running):
+            grid.add_row(each)
         return grid
 
     def _line(self) -> None:
@@ -129,16 +136,12 @@ class BatchProgress(BatchObserver):
         if self._live is not None or self._clock() < self._next_line:
             return
         self._next_line = self._clock() + BETWEEN_LINES
-        counts = self._counts().plain
-        text = ", ".join(
-            filter(None, (f"{self.done} of {self._cases} cases", self._pace(), counts))
-        )
-        self.console.print(text, soft_wrap=True, markup=False)
+        parts = (f"{self.done} of {self._cases} cases", self._pace(), self._counts().plain)
+        self.console.print(", ".join(filter(None, parts)), soft_wrap=True, markup=False)
 
     def _pace(self) -> str:
         """Return the rate and the time left in words, as far as they are known."""
-        elapsed = self._clock() - self._began
-        left = self.seconds_left
+        elapsed, left = self._clock() - self._began, self.seconds_left
         if left is None or elapsed <= 0.0:
             return ""
         rate = len(self._durations) / elapsed * MINUTE
@@ -149,16 +152,6 @@ class BatchProgress(BatchObserver):
         parts = [*kept.items(), *self._outcomes.most_common()]
         words = (Text(f"{word} {count}", STYLES[MARKS.get(word, "")]) for word, count in parts)
         return Text(", ").join(words)
-
-    def _now(self, now: float) -> Text:
-        """Name the cases that run, the longest first."""
-        longest = sorted(self._running.items(), key=lambda item: item[1])
-        names = [
-            f"{_name(case)} ({_duration(now - began)})" for case, began in longest[:MOST_RUNNING]
-        ]
-        more = len(longest) - MOST_RUNNING
-        text = ", ".join(names) + (f" and {more} more" if more > 0 else "")
-        return Text(f"now {text}" if text else "", "dim")
 
 
 def batch(console: Console, fleet: Fleet) -> None:
@@ -197,7 +190,3 @@ def _duration(seconds: float) -> str:
 
 def _plural(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
-
-
-def _name(case: str) -> str:
-    return case.rsplit("/", 1)[-1].removesuffix(".yaml")

@@ -24,29 +24,29 @@ def main() -> None:
     # Ctrl-C and the end of a terminal reach all its processes; the batch ends its workers
     for number in (signal.SIGINT, *ENDING):
         signal.signal(number, signal.SIG_IGN)
-    tasks_from, answers_to = _channels()
-    tasks: SimpleQueue[Any] = SimpleQueue()
-    Thread(target=_receive, args=(tasks_from, tasks), daemon=True).start()
-
-    from exfit.features.fleet.task import crash
-
-    _import_all()
-    _answer(answers_to, READY)
-    while True:
-        task = tasks.get()
-        _answer(answers_to, BEGUN)
-        _answer(answers_to, crash(task) if isinstance(task, Exception) else task.run())
-
-
-def _channels() -> tuple[BinaryIO, BinaryIO]:
-    """Return the standard input and output, which nothing else uses from now on."""
+    # the standard input and output, which nothing else uses from now on
     tasks_from = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
     answers_to = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, sys.stdin.fileno())
     os.close(nothing)
-    return tasks_from, answers_to
+    tasks: SimpleQueue[Any] = SimpleQueue()
+    Thread(target=_receive, args=(tasks_from, tasks), daemon=True).start()
+
+    # what every fit needs; the collector of garbage need not look through it
+    import exfit.results.io
+    import exfit.workflows  # noqa: F401
+    from exfit.features.fleet.task import crash
+
+    gc.set_threshold(100_000)
+    gc.collect()
+    gc.freeze()
+    _answer(answers_to, READY)
+    while True:
+        task = tasks.get()
+        _answer(answers_to, BEGUN)
+        _answer(answers_to, crash(task) if isinstance(task, Exception) else task.run())
 
 
 def _receive(tasks_from: BinaryIO, tasks: "SimpleQueue[Any]") -> None:
@@ -68,13 +68,3 @@ def _answer(answers_to: BinaryIO, answer: Any) -> None:
         answers_to.flush()
     except OSError:  # the batch has ended
         os._exit(0)
-
-
-def _import_all() -> None:
-    """Import what every fit needs, and keep the collector of garbage from looking through it."""
-    import exfit.results.io
-    import exfit.workflows  # noqa: F401
-
-    gc.set_threshold(100_000)
-    gc.collect()
-    gc.freeze()

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.fitting.uncertainty import shared_reason
-from exfit.inference.confidence import Confidence, Uncertainty, confidence, rises
+from exfit.inference.confidence import Confidence, confidence, rises
 from exfit.inference.identifiability import Identifiability, identifiability
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
 from exfit.inference.wording import listed
+from exfit.results.intervals.determination import of_profiles
 from exfit.results.intervals.value_errors import first_order_shifts, widened_by
 
 Array = NDArray[np.float64]
@@ -25,11 +26,6 @@ DIFFERENCE_ERROR = 1e-9  # of the Jacobian, as a share of its largest singular v
 POINTS_OF_PROFILE = 3  # of a side: only its end is asked for
 STRATEGY = "lm-then-dgn"
 MOST_DESCENTS = 4  # each to a lower minimum than the one before
-ENDS = {
-    estimate.ProfileEnd.FAILED: "beyond, its data contradict each other or the machine has no rest",
-    estimate.ProfileEnd.FLAT: "the residuals hardly change",
-    estimate.ProfileEnd.INTERRUPTED: "interrupted",
-}
 STEP = 0.01  # of a standard error, to either side: small beside what curves the residuals
 
 
@@ -177,8 +173,10 @@ def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:
             break
         lowest = min(lower, key=lambda each: each.profile.cost)
         theta = search.theta(lowest.problem.values(lowest.profile.x))
-    known = {name: by_profile(intervals.parameters[name], each) for name, each in profiles.items()}
-    intervals = replace(intervals, parameters={**intervals.parameters, **known})
+    known = dict(intervals.parameters)
+    for name, (form, profile) in profiles.items():
+        known[name] = of_profiles(known[name], form.free[profile.index], [profile])
+    intervals = replace(intervals, parameters=known)
     return FittedPoints(values, result, intervals, identifiability(linear, intervals))
 
 
@@ -232,24 +230,6 @@ def profiled(
         )
         profiles |= {form.free[each.index].name: PointProfile(form, each) for each in made}
     return profiles
-
-
-def by_profile(known: Uncertainty, made: PointProfile) -> Uncertainty:
-    """Read the interval of a parameter from its profile, and the reason for each open side."""
-    profile = made.profile
-    parameter = made.problem.free[profile.index]
-    low, high = (
-        None if end is None else parameter.value(end) for end in (profile.low, profile.high)
-    )
-    bounds = (f"its min {parameter.low:.4g}", f"its max {parameter.high:.4g}")
-    sides = zip(("lower", "upper"), (low, high), profile.ends, bounds, strict=True)
-    why = " and ".join(
-        f"has no {side} limit: {ENDS.get(end, f'the points do not exclude {bound}')}"
-        for side, limit, end, bound in sides
-        if limit is None
-    )
-    interval = None if low is None and high is None else (low, high)
-    return replace(known, interval=interval, why=why or None, method="profile")
 
 
 def allowing_for_errors(

@@ -1,15 +1,13 @@
 """A ranking as the terminal shows it, as tables in files, and as the figure of its best models."""
 
-import csv
-import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from exfit.features.rank.ranked_cases import Ranking
 from exfit.features.rank.ranking import RankedModel
-from exfit.results.tables import DIGITS
+from exfit.results.tables import DIGITS, csv_text
 from exfit.show.blocks import Block, Table, columns, notes, number, paragraph, remarks, row
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.files import write_together
@@ -19,19 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TABLE, WHOLE = FILES = ("rank.csv", "rank.json")
-COLUMNS: Mapping[str, Callable[[RankedModel], str]] = {
-    "name": lambda model: model.name,
-    "outcome": lambda model: model.outcome,
-    "validation_rmse": lambda model: _number(model.validation_rmse),
-    "rmse": lambda model: _number(model.rmse),
-    "bic": lambda model: _number(model.bic),
-    "determined": lambda model: f"{model.determined}",
-    "free": lambda model: f"{model.free}",
-    "refuted_by": lambda model: " ".join(model.refuted_by or ()),
-    "judged": lambda model: "no" if model.refuted_by is None else "yes",
-    "at_bound": lambda model: " ".join(model.at_bound),
-    "typical": lambda model: " ".join(model.typical),
-}
+COLUMNS = (
+    "name", "outcome", "validation_rmse", "rmse", "bic", "determined", "free", "refuted_by",
+    "judged", "at_bound", "typical",
+)  # fmt: skip
 MOST_MODELS = 4  # in one figure
 FARTHEST = 10.0  # times the error of the best: beside a larger one no other is seen
 RECORD_HEIGHT = 3.8  # inches
@@ -90,15 +79,17 @@ def write_ranking(ranking: Ranking, folder: Path) -> FigureFiles:
 
 def ranking_table(models: Iterable[RankedModel]) -> str:
     """Return ranked models, a line for each; what one does not have is blank."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([text(model) for text in COLUMNS.values()] for model in models)
-    return out.getvalue()
+    rows = []
+    for model in models:
+        values = {**vars(model), "judged": "no" if model.refuted_by is None else "yes"}
+        rows.append([_cell(values[column]) for column in COLUMNS])
+    return csv_text([COLUMNS, *rows])
 
 
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.{DIGITS}g}"
+def _cell(value: str | float | Iterable[str] | None) -> str:
+    if isinstance(value, float | int):
+        return f"{value:.{DIGITS}g}"
+    return value if isinstance(value, str) else " ".join(value or ())
 
 
 def _figures(ranking: Ranking) -> PlannedFigures:

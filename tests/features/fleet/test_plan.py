@@ -7,6 +7,7 @@ from batches import case_file, record_file
 from tiers import few_of
 
 from exfit.errors import ExfitError
+from exfit.features.fleet.folder import IndexEntry
 from exfit.features.fleet.plan import BatchSettings, Share, case_files, planned_case, share_of
 from exfit.runs.runner import FitSettings
 
@@ -82,9 +83,9 @@ def test_a_case_without_a_task_has_a_reason(tmp_path, content, status, reason):
     case = tmp_path / "a.yaml"
     case.write_text(content)
     planned = planned_case(case, tmp_path, SETTINGS)
-    assert planned.task is None
-    assert planned.entry.status == status
-    assert reason in planned.entry.reason
+    assert isinstance(planned, IndexEntry)
+    assert planned.status == status
+    assert reason in planned.reason
 
 
 @pytest.mark.parametrize("content", ["", "{", "- 1", "tests: [{name: a}]", "model: 3\nrecord: 4"])
@@ -111,9 +112,9 @@ def test_a_command_is_run_where_it_is_trusted_and_its_script_is_part_of_the_key(
     plant = {"type": "external", "twin": "open-circuit", "command": ["python", "simulator.py"]}
     case = case_file(tmp_path / "a.yaml", record, plant=plant)
     refused = planned_case(case, tmp_path, SETTINGS)
-    assert refused.task is None
-    assert "command python" in refused.entry.reason
-    assert "--trust" in refused.entry.reason
+    assert isinstance(refused, IndexEntry)
+    assert "command python" in refused.reason
+    assert "--trust" in refused.reason
     trusting = BatchSettings(trust=True)
     first = planned_case(case, tmp_path, trusting).task
     assert script in first.files
@@ -126,7 +127,7 @@ def test_an_fmu_is_run_where_it_is_trusted_and_part_of_the_key(tmp_path, record)
     unit.write_bytes(b"")
     plant = {"type": "fmu", "twin": "open-circuit", "file": "unit.fmu"}
     case = case_file(tmp_path / "a.yaml", record, plant=plant)
-    assert "FMU unit.fmu: code" in planned_case(case, tmp_path, SETTINGS).entry.reason
+    assert "FMU unit.fmu: code" in planned_case(case, tmp_path, SETTINGS).reason
     trusting = BatchSettings(trust=True)
     first = planned_case(case, tmp_path, trusting).task
     assert unit in first.files
@@ -136,5 +137,5 @@ def test_an_fmu_is_run_where_it_is_trusted_and_part_of_the_key(tmp_path, record)
 
 def test_a_case_that_cannot_be_read_is_a_row(tmp_path):
     planned = planned_case(tmp_path / "gone.yaml", tmp_path, SETTINGS)
-    assert (planned.task, planned.entry.status) == (None, "refused")
-    assert "gone.yaml: cannot be read" in planned.entry.reason
+    assert (type(planned), planned.status) == (IndexEntry, "refused")
+    assert "gone.yaml: cannot be read" in planned.reason
