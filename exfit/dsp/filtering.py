@@ -137,7 +137,11 @@ class Filtering:
 
             whole = np.asarray(sosfiltfilt(self._sections, whole, axis=0))
         elif isinstance(self.filter, Median):
-            whole = whole[_picked(self._bridged(samples), self.filter.samples)]
+            width, picked = self.filter.samples, self._bridged(samples)
+            around = np.arange(len(picked))[:, None] + np.arange(width) - width // 2
+            around = np.clip(around, 0, len(picked) - 1)
+            middle = np.argpartition(picked[around], width // 2, axis=1)[:, [width // 2]]
+            whole = whole[np.take_along_axis(around, middle, axis=1)[:, 0]]
         return np.asarray(whole[self.kept])
 
     @cached_property
@@ -231,14 +235,6 @@ def outliers(time: Array, samples: Array, limit: float, scatter: float | None = 
     away = np.abs(from_line[window, place - window])
     scale = np.maximum(spread(from_line), noise(samples) if scatter is None else scatter)
     return np.asarray(away > limit * scale[window])
-
-
-def _picked(samples: Array, width: int) -> Places:
-    """Return the place of the sample that each running median picks."""
-    around = np.arange(len(samples))[:, None] + np.arange(width) - width // 2
-    around = np.clip(around, 0, len(samples) - 1)
-    middle = np.argpartition(samples[around], width // 2, axis=1)[:, [width // 2]]
-    return np.asarray(np.take_along_axis(around, middle, axis=1)[:, 0])
 
 
 @dataclass(frozen=True, eq=False)

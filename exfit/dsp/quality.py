@@ -43,23 +43,18 @@ def spikes(time: Array, samples: Array, scatter: float, limit: float) -> Places:
     # the first and the last sample return to no level
     outlying = outlying[(outlying > 0) & (outlying < len(samples) - 1)]
     few = 0 < len(outlying) <= max(FEW_SPIKES, SPIKE_SHARE * len(samples))
-    if not few or not _are_alone(samples, outlying, limit * scatter):
+    if not few:
         return np.zeros(0, np.intp)
-    nearly = len(_outlying(time, samples, scatter, NEARLY * limit)) - len(outlying)
-    by_chance = 2.0 * NormalDist().cdf(-NEARLY * limit) * len(samples)
-    apart = nearly <= max(FEW_SPIKES - 1, MOST_NEARLY * len(outlying) + 3.0 * by_chance)
-    return outlying if apart else np.zeros(0, np.intp)
-
-
-def _are_alone(samples: Array, outlying: Places, largest_change: float) -> bool:
-    """Check whether each outlier, or pair of them, returns to the level that it left."""
     for run in np.split(outlying, np.flatnonzero(np.diff(outlying) > 1) + 1):
         before = samples[max(run[0] - LEVEL_SAMPLES, 0) : run[0]]
         after = samples[run[-1] + 1 : run[-1] + 1 + LEVEL_SAMPLES]
         change = abs(float(median(after) - median(before)))
-        if len(run) > LONGEST_SPIKE or change > largest_change:
-            return False
-    return True
+        if len(run) > LONGEST_SPIKE or change > limit * scatter:
+            return np.zeros(0, np.intp)
+    nearly = len(_outlying(time, samples, scatter, NEARLY * limit)) - len(outlying)
+    by_chance = 2.0 * NormalDist().cdf(-NEARLY * limit) * len(samples)
+    apart = nearly <= max(FEW_SPIKES - 1, MOST_NEARLY * len(outlying) + 3.0 * by_chance)
+    return outlying if apart else np.zeros(0, np.intp)
 
 
 def _outlying(time: Array, samples: Array, scatter: float, limit: float) -> Places:

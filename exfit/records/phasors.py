@@ -50,11 +50,6 @@ class Phasor(NamedTuple):
     angle_unit: str
     connection: "Connection | None" = None
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The columns."""
-        return (*self.magnitudes, *self.angles)
-
 
 class Phasors(NamedTuple):
     """The voltage and the current of a unit, and its ratings: kV from line to line, MVA."""

@@ -1,6 +1,6 @@
 """The steps of a record: what its channels show together, when, by how much, within what error."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -212,9 +212,14 @@ def combined_steps(changes: Mapping[str, Sequence[DetectedStep]]) -> tuple[Recor
     )
     groups: list[dict[str, DetectedStep]] = []
     for _, name, change in in_time:
-        if groups and name not in groups[-1] and _close(change, groups[-1].values()):
-            groups[-1][name] = change
-        elif not (groups and _returns(name, change, groups[-1])):
+        group = groups[-1] if groups else {}
+        close = any(
+            change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
+            for other in group.values()
+        )
+        if name not in group and close:
+            group[name] = change
+        elif not (groups and _returns(name, change, group)):
             groups.append({name: change})
     return tuple(_combined(group) for group in groups)
 
@@ -236,14 +241,6 @@ def _combined(group: Mapping[str, DetectedStep]) -> RecordedStep:
         {name: change.size for name, change in group.items()},
         from_start=all(change.from_start for change in group.values()),
         recorded=any(change.jumps for change in group.values()),
-    )
-
-
-def _close(change: DetectedStep, others: Iterable[DetectedStep]) -> bool:
-    """Check whether a channel may show the step that one of the others shows."""
-    return any(
-        change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
-        for other in others
     )
 
 

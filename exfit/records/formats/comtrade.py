@@ -398,7 +398,17 @@ def _find_fault(files: _Files, data: bytes, width: int) -> None:
 def _time(files: _Files, config: "Cfg", samples: _Samples) -> Array:
     """Return the time (M,) in s since the first sample."""
     if config.timestamp_critical or any(rate == 0.0 for rate, _ in config.sample_rates):
-        return _stamped(files, config, samples.stamp)
+        lost = np.flatnonzero((samples.stamp == MISSING_STAMP) | ~np.isfinite(samples.stamp))
+        if lost.size:
+            what = f"no time stamp, and {files.cfg.name} gives no rate"
+            raise RecordError(f"{files.dat}: sample {lost[0] + 1}: {what}")
+        if config.time_base == NANOSECONDS and config.rev_year in ("", "1991", "1999"):
+            raise RecordError(
+                f"{files.cfg}: its dates have ns, but the revision {config.rev_year or '1991'} "
+                "counts time stamps in µs: the two contradict each other"
+            )
+        ticks = samples.stamp.astype(np.float64)
+        return np.asarray((ticks - ticks[0]) * (config.time_base * config.timemult), np.float64)
     time = np.empty(len(samples.number))
     first, before = 0, 0.0
     rates, ends = zip(*config.sample_rates, strict=True)
@@ -407,21 +417,6 @@ def _time(files: _Files, config: "Cfg", samples: _Samples) -> Array:
         time[first:last] = before + count / rate
         first, before = last, float(time[last - 1])
     return time
-
-
-def _stamped(files: _Files, config: "Cfg", stamp: NDArray[Any]) -> Array:
-    """Return the time in s since the first sample, by the time stamps of the samples."""
-    lost = np.flatnonzero((stamp == MISSING_STAMP) | ~np.isfinite(stamp))
-    if lost.size:
-        what = f"no time stamp, and {files.cfg.name} gives no rate"
-        raise RecordError(f"{files.dat}: sample {lost[0] + 1}: {what}")
-    if config.time_base == NANOSECONDS and config.rev_year in ("", "1991", "1999"):
-        raise RecordError(
-            f"{files.cfg}: its dates have ns, but the revision {config.rev_year or '1991'} counts "
-            "time stamps in µs: the two contradict each other"
-        )
-    ticks = stamp.astype(np.float64)
-    return np.asarray((ticks - ticks[0]) * (config.time_base * config.timemult), np.float64)
 
 
 def _analog(config: "Cfg", at: int, raw: NDArray[Any]) -> Array:

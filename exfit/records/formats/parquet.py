@@ -30,7 +30,7 @@ def read(path: Path) -> Columns:
     missing.
     """
     try:
-        from pyarrow import types
+        from pyarrow import ArrowInvalid, types
         from pyarrow.parquet import ParquetFile
     except ImportError:
         raise missing_package(path, "pyarrow", "parquet") from None
@@ -52,7 +52,14 @@ def read(path: Path) -> Columns:
         steps = _steps(field.type)
         if not steps:
             raise column_error(path, field.name, f"{field.type}, not numbers")
-        return _cast(path, field.name, sound(path, PARQUET, partial(column, field.name)), steps)
+        values = sound(path, PARQUET, partial(column, field.name))
+        try:
+            for kind in steps:
+                # an integer beyond 2**53 becomes the float64 next to it; a date beyond ns does not
+                values = values.cast(kind, safe=not types.is_floating(kind))
+        except ArrowInvalid as error:
+            raise column_error(path, field.name, str(error)) from None
+        return np.asarray(values.to_numpy())
 
     schema, rows = sound(path, PARQUET, outline)
     if rows == 0:
@@ -76,21 +83,6 @@ def read(path: Path) -> Columns:
             if types.is_temporal(field.type) and not types.is_interval(field.type)
         ),
     )
-
-
-def _cast(
-    path: Path, name: str, column: "pa.ChunkedArray", steps: "tuple[pa.DataType, ...]"
-) -> NDArray[Any]:
-    from pyarrow import ArrowInvalid
-    from pyarrow.types import is_floating
-
-    try:
-        for kind in steps:
-            # an integer beyond 2**53 becomes the float64 next to it; a date beyond ns does not
-            column = column.cast(kind, safe=not is_floating(kind))
-    except ArrowInvalid as error:
-        raise column_error(path, name, str(error)) from None
-    return np.asarray(column.to_numpy())
 
 
 def _steps(kind: "pa.DataType") -> "tuple[pa.DataType, ...]":

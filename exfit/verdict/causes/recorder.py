@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from exfit.dsp.lines import MAINS, Ripple
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.quality import SPIKE_LIMIT
-from exfit.dsp.step_detection import first_step
 from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
@@ -235,6 +234,8 @@ def _likeliest_window(
 
 def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect another unit of the time, by the instant at which the record shows the first step."""
+    from exfit.dsp.step_detection import first_step
+
     for number, record, _ in evidence.tests:
         overlay = record.comparison.overlays.get("vt")
         instants = record.setup.test.instants
