@@ -109,12 +109,10 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
 
 
 def _clock(time: Array, rate: float, count: int) -> Array:
-    """Return an even clock (count,) from the first instant of a record on."""
     return np.asarray(time[0] + np.arange(count) / rate)
 
 
 def _spline(time: Array, signal: Array, at: Array) -> Array:
-    """Interpolate the samples at other instants by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(time, signal)(at))

@@ -1,7 +1,7 @@
 """One terminal voltage from three recorded phases: waveforms or RMS values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, pi, sqrt
 from types import MappingProxyType
 from typing import Literal
@@ -15,7 +15,7 @@ Connection = Literal["phase-to-ground", "phase-to-phase"]
 
 LINE_VOLTAGE: Mapping[Connection, float] = MappingProxyType(
     {"phase-to-ground": sqrt(3.0), "phase-to-phase": 1.0}
-)  # over the voltage that is recorded
+)  # over the voltage that is recorded, by the points between which it is
 PHASES = 3
 SPACE_VECTOR = sqrt(2.0) / PHASES * np.exp(2j * pi / PHASES * np.arange(PHASES))
 MAINS_FREQUENCIES = (40.0, 70.0)  # Hz: systems of 50 and 60 Hz, and units that run off them
@@ -43,33 +43,6 @@ class PositiveSequence:
     rows: slice
     frequency: float
     window: float
-
-
-def vt_of_waveforms(
-    time: Array, phases: Array, base: float, connection: Connection, cycles: int = 1
-) -> PositiveSequence:
-    """Return the terminal voltage per unit that three waveforms (M, 3) show.
-
-    Args:
-        time: (M,), s, increasing evenly.
-        phases: instantaneous voltages a, b, c to ground, or ab, bc, ca; in the unit of ``base``.
-        base: rated line-to-line RMS voltage.
-        connection: between what the voltages are recorded.
-        cycles: of the window, a whole number.
-
-    Raises ValueError as ``positive_sequence``.
-    """
-    sequence = positive_sequence(time, phases, cycles)
-    return replace(sequence, voltage=sequence.voltage * (LINE_VOLTAGE[connection] / base))
-
-
-def vt_of_rms(phases: Array, base: float, connection: Connection) -> Array:
-    """Return the terminal voltage (M,) per unit that three RMS values (M, 3) show.
-
-    ``base`` is the rated line-to-line RMS voltage, in the unit of the phases. Raises ValueError as
-    ``mean_rms``.
-    """
-    return mean_rms(phases) * (LINE_VOLTAGE[connection] / base)
 
 
 def mean_rms(phases: Array) -> Array:
@@ -163,7 +136,6 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSe
 
 
 def _check_columns(phases: Array) -> None:
-    """Raise a ValueError where there are not three phases."""
     if phases.ndim != 2 or phases.shape[1] != PHASES:
         raise ValueError(f"phases of shape {phases.shape}: {PHASES} columns are needed")
 

@@ -250,7 +250,6 @@ def _none(why: str, *others: str) -> NameReading:
 
 
 def _quantity(kinds: Mapping[str, str]) -> str | None:
-    """Find the quantity that a name says to be measured; None for none, or two."""
     for quantity in reversed(POWERS):  # a reactive power is none that is active
         if quantity in kinds:
             return quantity
@@ -264,7 +263,6 @@ def _row(quantity: str | None, place: str) -> SignalRow | None:
 
 
 def _fits(unit: str | None, row: SignalRow) -> bool:
-    """Check whether numbers in a unit can be a signal."""
     quantity = quantity_of(unit)
     if quantity is None:
         turning = row.symbol == "speed" and unit in OF_SPEED

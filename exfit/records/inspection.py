@@ -283,7 +283,6 @@ def _columns_of_numbers(
 
 
 def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
-    """Find the unit of a column and its source."""
     stated = table.units.get(name)
     unit = unit_in(name) if stated is None else stated
     return (None, "") if unit is None else (usual(unit), "name" if stated is None else "file")
@@ -303,7 +302,6 @@ def _recognised(
 def _phase_groups(
     time: Array, samples: Mapping[str, Array], units: Mapping[str, str]
 ) -> Iterator[InspectedPhases]:
-    """Find the three-phase voltages among the columns."""
     for group in three_phases(tuple(samples), units):
         waves = {mains_frequency(time, samples[name]) is not None for name in group}
         effective = effective_value(samples, group)

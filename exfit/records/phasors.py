@@ -311,7 +311,6 @@ def bad_rows(table: RecordTable, status: Status) -> tuple[BadRow, ...]:
 
 
 def _flags(table: RecordTable, column: str) -> list[str]:
-    """Return the entries of a column as texts."""
     try:
         return [f"{flag:.0f}" for flag in table.numbers([column])[column]]
     except RecordError:

@@ -154,7 +154,6 @@ def _quantity(name: str, unit: str | None, numbered: bool) -> str | None:
 
 
 def _swing(samples: Array) -> float:
-    """Return the range of a magnitude (M,) relative to its level."""
     level = _level(samples)
     return float(np.ptp(samples[np.isfinite(samples)])) / level if level > 0.0 else np.inf
 
@@ -228,7 +227,6 @@ def _groups(pairs: Sequence[_Pair]) -> Iterator[tuple[_Pair, ...]]:
 
 
 def _angle_unit(name: str, angle: Array, units: Mapping[str, str]) -> tuple[str | None, str]:
-    """Return the unit of an angle and its source."""
     stated = units.get(name)
     if stated is not None and (usual(stated) in ANGLE_UNITS or stated in WORDS):
         return usual(stated), "file"
@@ -240,7 +238,6 @@ def _angle_unit(name: str, angle: Array, units: Mapping[str, str]) -> tuple[str 
 
 
 def _first(names: Sequence[str], words: re.Pattern[str]) -> str | None:
-    """Return the first column that words name."""
     return next((name for name in names if words.search(folded(bare(name)))), None)
 
 

@@ -210,7 +210,6 @@ def _check_units(
 
 
 def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Places:
-    """Return the rows in the window."""
     start, end = window or (time[0], time[-1])
     rows = np.flatnonzero((time >= start) & (time <= end))
     if rows.size < FEWEST_SAMPLES:
@@ -266,7 +265,7 @@ def _of_phases(
     With it comes the window (s) of waveforms, over which it is averaged. Raises RecordError where
     the columns are not the three phases of one voltage.
     """
-    from exfit.dsp.three_phase import vt_of_rms, vt_of_waveforms
+    from exfit.dsp.three_phase import LINE_VOLTAGE, mean_rms, positive_sequence
 
     phases = np.stack([columns[name][rows] for name in channel.columns], axis=1)
     huge = np.argwhere(np.isfinite(phases) & (np.abs(phases) > LARGEST))
@@ -274,16 +273,16 @@ def _of_phases(
         row, at = huge[0]
         what = f"{phases[row, at]} {why_unusable(phases[row, at])}"
         raise column_error(table.place(int(rows[row])), channel.columns[at], what)
-    samples, rating = np.full(len(time), np.nan), (channel.base, channel.connection)
+    samples, per_unit = np.full(len(time), np.nan), LINE_VOLTAGE[channel.connection] / channel.base
     try:
         if channel.kind == "rms":
-            samples[rows] = vt_of_rms(phases, *rating)
+            samples[rows] = mean_rms(phases) * per_unit
             return samples, None
-        phasor = vt_of_waveforms(time[rows], phases, *rating, channel.cycles)
+        phasor = positive_sequence(time[rows], phases, channel.cycles)
     except ValueError as fault:
         names = ", ".join(map(repr, channel.columns))
         raise RecordError(f"{table.path}: columns {names}: {fault}") from None
-    samples[rows[phasor.rows]] = phasor.voltage
+    samples[rows[phasor.rows]] = phasor.voltage * per_unit
     return samples, phasor.window
 
 

@@ -101,7 +101,6 @@ def bare(name: str) -> str:
 
 
 def _split(name: str) -> tuple[str, str | None]:
-    """Return a name without its unit, and the unit."""
     name = name.strip()
     if _ALONE.fullmatch(name):
         return name, name

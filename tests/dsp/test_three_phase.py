@@ -7,7 +7,7 @@ import pytest
 from oracle import lively_values, system_of
 
 from exfit.dsp.filtering import Filtering, MovingAverage
-from exfit.dsp.three_phase import mean_rms, positive_sequence, vt_of_rms, vt_of_waveforms
+from exfit.dsp.three_phase import LINE_VOLTAGE, mean_rms, positive_sequence
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
@@ -181,9 +181,12 @@ CONNECTIONS = [("phase-to-ground", 15.75 / sqrt(3.0)), ("phase-to-phase", 15.75)
 @pytest.mark.parametrize(("connection", "rated"), CONNECTIONS)
 def test_the_rated_voltage_is_one_per_unit(connection, rated):
     time = clock(2000.0)
-    course = vt_of_waveforms(time, waves(time, voltage=rated), 15.75, connection)
-    np.testing.assert_allclose(course.voltage, np.ones(len(course.time)), rtol=0.0, atol=ROUNDING)
-    rms = vt_of_rms(np.full((5, 3), rated), 15.75, connection)
+    per_unit = LINE_VOLTAGE[connection] / 15.75
+    course = positive_sequence(time, waves(time, voltage=rated))
+    np.testing.assert_allclose(
+        course.voltage * per_unit, np.ones(len(course.time)), rtol=0.0, atol=ROUNDING
+    )
+    rms = mean_rms(np.full((5, 3), rated)) * per_unit
     np.testing.assert_allclose(rms, np.ones(5), rtol=0.0, atol=1e-14)
 
 
@@ -192,9 +195,9 @@ def test_voltages_to_ground_and_between_the_phases_tell_the_same():
     time = clock(2000.0)
     ground = waves(time, 49.2, 9.0, negative=0.4, zero=0.6)
     between = ground - np.roll(ground, -1, axis=1)
-    from_ground = vt_of_waveforms(time, ground, 15.75, "phase-to-ground")
-    from_lines = vt_of_waveforms(time, between, 15.75, "phase-to-phase")
-    np.testing.assert_allclose(from_ground.voltage, from_lines.voltage, rtol=0.0, atol=ROUNDING)
+    from_ground = positive_sequence(time, ground).voltage * LINE_VOLTAGE["phase-to-ground"]
+    from_lines = positive_sequence(time, between).voltage * LINE_VOLTAGE["phase-to-phase"]
+    np.testing.assert_allclose(from_ground, from_lines, rtol=0.0, atol=ROUNDING)
 
 
 # --- RMS values -----------------------------------------------------------------------------------

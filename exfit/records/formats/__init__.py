@@ -11,8 +11,8 @@ __all__ = ["PLAY_IN", "RecordTable", "open_table"]
 COMTRADE = (".cfg", ".cff")
 BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
 PLAY_IN = ".plb"
-IN_CHILD = {".mat": "matlab", ".parquet": "parquet"}
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+IN_CHILD = {**dict.fromkeys(WORKBOOKS, "excel"), ".mat": "matlab", ".parquet": "parquet"}
 
 
 def open_table(path: Path, sheet: str | None = None, memory: float | None = None) -> RecordTable:
@@ -23,16 +23,16 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
     without sheets.
     """
     suffix = path.suffix.lower()
-    if suffix in WORKBOOKS:
-        return _in_child("excel", path, sheet, memory)
-    if sheet is not None:
+    if sheet is not None and suffix not in WORKBOOKS:
         raise RecordError(f"{path}: a sheet, {sheet!r}, is given, but only workbooks have sheets")
+    if suffix in IN_CHILD:
+        from exfit.records.formats.child import read_table
+
+        return read_table(IN_CHILD[suffix], path, sheet, memory)
     if suffix in COMTRADE or (suffix in BESIDE_CFG and siblings(path, ".cfg")):
         from exfit.records.formats.comtrade import read_comtrade
 
         return read_comtrade(path, memory)
-    if suffix in IN_CHILD:
-        return _in_child(IN_CHILD[suffix], path, None, memory)
     if suffix == PLAY_IN:
         from exfit.records.formats.play_in import read_play_in
 
@@ -40,9 +40,3 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
     from exfit.records.formats.text import read_text_table
 
     return read_text_table(path, memory)
-
-
-def _in_child(module: str, path: Path, sheet: str | None, memory: float | None) -> RecordTable:
-    from exfit.records.formats.child import read_table
-
-    return read_table(module, path, sheet, memory)

@@ -396,7 +396,6 @@ def _find_fault(files: _Files, data: bytes, width: int) -> None:
 
 
 def _time(files: _Files, config: "Cfg", samples: _Samples) -> Array:
-    """Return the time (M,) in s since the first sample."""
     if config.timestamp_critical or any(rate == 0.0 for rate, _ in config.sample_rates):
         lost = np.flatnonzero((samples.stamp == MISSING_STAMP) | ~np.isfinite(samples.stamp))
         if lost.size:

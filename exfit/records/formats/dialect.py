@@ -178,7 +178,6 @@ def _layouts(path: Path, head: Sequence[str]) -> list[_Layout]:
 
 
 def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
-    """Return the error of a file without rows of numbers."""
     filled = [line for line in head if line.strip()]
     if not filled:
         return RecordError(f"{path}: the file is empty")
@@ -218,7 +217,6 @@ def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout |
 
 
 def _filled_rows(path: Path, head: Sequence[str], separator: str | None) -> list[TextRow]:
-    """Return the lines of the head that hold something."""
     split = split_rows(path, head, separator, 1)
     rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
     return [row for row in rows if any(row.cells)]

@@ -31,23 +31,13 @@ def read_play_in(path: Path, memory: float | None = None) -> TextTable:
             f"this one has {listed(table.names)}"
         )
     voltage, frequency = (float(np.median(own)) for own in table.numbers(table.names[1:]).values())
-    units = {"t": "s", "frequency": _unit_of_frequency(path, frequency)}
-    if _within(PER_UNIT, voltage):
+    hertz, per_unit = (low <= frequency <= high for low, high in (HERTZ, PER_UNIT))
+    if not (hertz or per_unit):
+        raise RecordError(
+            f"{path}: column 3: a frequency of {frequency:.6g} (median) is neither in Hz nor per "
+            "unit of the rated one"
+        )
+    units = {"t": "s", "frequency": "Hz" if hertz else "pu"}
+    if PER_UNIT[0] <= voltage <= PER_UNIT[1]:
         units["vt"] = "pu"
     return replace(table, dialect=replace(table.dialect, names=NAMES, units=units))
-
-
-def _unit_of_frequency(path: Path, median: float) -> str:
-    """Return the unit of a frequency; raises RecordError where its numbers are of none."""
-    if _within(HERTZ, median):
-        return "Hz"
-    if _within(PER_UNIT, median):
-        return "pu"
-    raise RecordError(
-        f"{path}: column 3: a frequency of {median:.6g} (median) is neither in Hz nor per unit of "
-        "the rated one"
-    )
-
-
-def _within(limits: tuple[float, float], value: float) -> bool:
-    return limits[0] <= value <= limits[1]

@@ -166,7 +166,6 @@ class TextTable:
 
     @cached_property
     def _start(self) -> int:
-        """The byte at which the rows begin."""
         return self.text.start_of(self.dialect.first_line)
 
     @cached_property

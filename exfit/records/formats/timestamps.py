@@ -77,7 +77,6 @@ def seconds_since_first(cells: Cells) -> Array:
 
 
 def _read(all_cells: Cells, column: int) -> _Stamps:
-    """Return the cells of a column as numbers."""
     cells = all_cells[:, column]
     first = _form(column, 0, bytes(cells[0]))
     kind = _kind(first)
