@@ -123,7 +123,7 @@ def tangents_by_equations(
     directions: Sequence[Sequence[Direction]],
     tests: "Sequence[Simulator] | None",
 ) -> tuple[Array, Array, Counts]:
-    """Simulate as `Simulator.tangents_of_many`, by the equations of the system."""
+    """Simulate as `Simulator.tangents_of_many`."""
     system = simulator.system
     p, parts = simulator.prepared(sets)
     reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Span, kernel, linear_kernel
 from exfit.engine.sampling import Course, Courses, Segment
-from exfit.engine.system import System, time_constants
+from exfit.engine.system import System
 from exfit.plants import REFERENCES
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
@@ -182,11 +182,6 @@ class Simulator:
             return self._sampling
         return Interpolation(self._grid, self.times, self.delay)
 
-    @property
-    def time_constants(self) -> tuple[str, ...]:
-        """The parameters in seconds that matter to the response."""
-        return time_constants(self.system)
-
     def substeps(self, values: Values) -> int:
         """Return into how many parts each step is divided for these values.
 
@@ -246,10 +241,6 @@ class Simulator:
             test = self.system, self.inputs, self.times, self.step
             simulator = Simulator(*test, required, self.delay, self.responder)
         return simulator
-
-    def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
-        """Largest change of any of the outputs by halving every step, per unit."""
-        return max(self.step_errors(values, outputs).values())
 
     def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
         """Largest change of each output by halving every step, per unit.
@@ -313,15 +304,6 @@ class Simulator:
         """
         if self.responder is not None:
             return self.responder.samples_of_many(self, sets, outputs, tests)
-        return self.samples_by_equations(sets, outputs, tests)
-
-    def samples_by_equations(
-        self,
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        tests: "Sequence[Simulator] | None" = None,
-    ) -> tuple[Array, Counts]:
-        """Simulate as `samples_of_many`, by the equations of the system."""
         p, parts = self.prepared(sets)
         courses = [test.course() for test in tests or [self]]
         alike = tests is None or all(test._segments is tests[0]._segments for test in tests)
@@ -359,16 +341,6 @@ class Simulator:
         """
         if self.responder is not None:
             return self.responder.tangents_of_many(self, sets, outputs, directions, tests)
-        return self.tangents_by_equations(sets, outputs, directions, tests)
-
-    def tangents_by_equations(
-        self,
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        directions: Sequence[Sequence[Direction]],
-        tests: "Sequence[Simulator] | None" = None,
-    ) -> tuple[Array, Array, Counts]:
-        """Simulate as `tangents_of_many`, by the equations of the system."""
         from exfit.simulation.directions import tangents_by_equations
 
         return tangents_by_equations(self, sets, outputs, directions, tests)

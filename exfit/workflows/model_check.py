@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from exfit.case.case import Case
+from exfit.engine.system import time_constants
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.problem import free_parameters
@@ -83,7 +84,7 @@ def check(case: Case, program: Program | None = None) -> Check:
         of_rest += unstable_rest_notes(simulator, at)
         signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))
-        error = max(error, simulator.step_error(at, signals))
+        error = max(error, *simulator.step_errors(at, signals).values())
         substeps = max(substeps, experiment.simulator.substeps(at))
     own_values: Sequence[str] = ()
     from_program: Mapping[str, Mapping[str, float]] = {}
@@ -95,7 +96,7 @@ def check(case: Case, program: Program | None = None) -> Check:
     at = experiments[0].parameters(values)
     return Check(
         deviations={} if case.has_no_equations else deviations(residuals),
-        bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
+        bypassed=tuple(name for name in time_constants(first.system) if at[name] < SHORTEST),
         substeps=substeps,
         step=first.step,
         step_error=error,

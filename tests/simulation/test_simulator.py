@@ -465,7 +465,7 @@ def test_a_simulator_made_from_another_keeps_its_steps_and_its_delay():
         Simulator(STIFFENING, moved.inputs, times, 0.02 / n, parts).samples(values, ("x",))[0]
         for n in (1, 2)
     )
-    assert moved.step_error(values, ("x",)) == np.abs(coarse - fine).max() > 0.0
+    assert moved.step_errors(values, ("x",))["x"] == np.abs(coarse - fine).max() > 0.0
 
 
 # --- limits ---------------------------------------------------------------------------------------
@@ -655,7 +655,7 @@ def test_the_error_of_a_step_is_that_of_a_finer_run(name):
     times = np.linspace(0.0, 2.0, 41)
     coarse, fine = (samples(name, values, UP, times, h) for h in (step, 1e-3))
     error = np.abs(coarse - fine).max()
-    assert simulator.step_error(values, ("vt",)) == pytest.approx(error, rel=0.15)
+    assert simulator.step_errors(values, ("vt",))["vt"] == pytest.approx(error, rel=0.15)
 
 
 def test_sub_steps_along_a_response_are_at_least_those_of_its_start(exciter):

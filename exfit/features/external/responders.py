@@ -25,6 +25,11 @@ Tests = Sequence[Simulator] | None
 QUOTIENT_STEP = 1e-3  # of scaled parameters: far above the tolerances of programs that integrate
 
 
+def _twin(simulator: Simulator) -> Simulator:
+    """Return the simulator of the same test by the equations."""
+    return simulator.with_responder(None)
+
+
 @dataclass(frozen=True, eq=False)
 class ProgramSignals:
     """The ``signals`` of a test that a program gives.
@@ -119,7 +124,7 @@ class RunResponder(ProgramResponder):
             samples = np.full((len(sets), len(simulator.times), len(outputs)), np.nan)
             _, parts = simulator.prepared(sets)
         else:
-            samples, parts = simulator.samples_by_equations(sets, outputs, tests)
+            samples, parts = _twin(simulator).samples_of_many(sets, outputs, tests)
         return self._with_runs(samples, parts, tests or [simulator] * len(sets), sets, outputs)
 
     def tangents_of_many(
@@ -131,7 +136,7 @@ class RunResponder(ProgramResponder):
         tests: Tests,
     ) -> tuple[Array, Array, Counts]:
         """Run outputs (K, M, ny) of K sets, with the derivatives (K, M, ny, N) of the twin."""
-        samples, slopes, parts = simulator.tangents_by_equations(sets, outputs, directions, tests)
+        samples, slopes, parts = _twin(simulator).tangents_of_many(sets, outputs, directions, tests)
         simulators = tests or [simulator] * len(sets)
         samples, parts = self._with_runs(samples, parts, simulators, sets, outputs)
         return samples, slopes, parts
@@ -227,7 +232,7 @@ class SettledResponder(ProgramResponder, ABC):
         tests: Tests,
     ) -> tuple[Array, Counts]:
         """Find outputs (K, M, ny) of K sets, corrected."""
-        samples, parts = simulator.samples_by_equations(sets, outputs, tests)
+        samples, parts = _twin(simulator).samples_of_many(sets, outputs, tests)
         simulators = tests or [simulator] * len(sets)
         for own, test, values in zip(samples, simulators, sets, strict=True):
             self.correct(own, test, values, outputs)
@@ -324,7 +329,7 @@ class CorrectedResponder(SettledResponder):
         tests: Tests,
     ) -> tuple[Array, Array, Counts]:
         """Simulate outputs (K, M, ny) of K sets, corrected, with the derivatives of the twin."""
-        samples, slopes, parts = simulator.tangents_by_equations(sets, outputs, directions, tests)
+        samples, slopes, parts = _twin(simulator).tangents_of_many(sets, outputs, directions, tests)
         for own, values in zip(samples, sets, strict=True):
             self.correct(own, simulator, values, outputs)
         return samples, slopes, parts
