@@ -27,7 +27,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slices
 from exfit.inference.noise import SURPRISING, is_white, whiteness
-from exfit.inference.wording import digits
+from exfit.util.text import digits
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

@@ -32,7 +32,7 @@ from exfit.inference.identifiability import (
     identifiability,
 )
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
-from exfit.inference.wording import listed
+from exfit.util.text import listed
 from exfit.util.typed import IN_FILE, KEY
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 from exfit.inference.linear import Array, Factors, Linearisation, factored
 from exfit.inference.noise import Noise, noise_of
 from exfit.inference.quantiles import student_quantile, wave_quantile
-from exfit.inference.wording import digits, listed
+from exfit.util.text import digits, listed
 from exfit.util.typed import IN_FILE
 
 LEVEL = 0.95

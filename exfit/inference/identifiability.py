@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from exfit.inference.confidence import Confidence
 from exfit.inference.linear import Array, Factors, Linearisation, Mask, factored, tall_svd
 from exfit.inference.noise import Noise
-from exfit.inference.wording import digits, listed
+from exfit.util.text import digits, listed
 from exfit.util.typed import KEY
 
 Indices = NDArray[np.intp]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.inference.wording import digits
+from exfit.util.text import digits
 
 if TYPE_CHECKING:
     from exfit.inference.noise import Noise

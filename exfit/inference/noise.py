@@ -9,7 +9,7 @@ import numpy as np
 
 from exfit.inference.linear import Array, Factors, ResidualBlock
 from exfit.inference.quantiles import chi_square_tail
-from exfit.inference.wording import digits
+from exfit.util.text import digits
 
 SURPRISING = 0.01  # of tests of what is true reject it
 LAGS = 20  # the most that a test of whiteness takes (Box, Jenkins & Reinsel 1994, section 8.2.2)

@@ -34,7 +34,7 @@ def moved_parameters(typical: TypicalValue, fitted: Mapping[str, float]) -> str:
 
     A shift of the first order that exceeds the value itself says no more than that it is large.
     """
-    from exfit.inference.wording import digits
+    from exfit.util.text import digits
 
     moves = []
     for name in typical.matters_to:
@@ -53,7 +53,7 @@ def by_weight(values: Mapping[str, TypicalValue]) -> dict[str, TypicalValue]:
 
 def first_of(names: Sequence[str]) -> str:
     """Return the first few names as "A, B and 3 more"."""
-    from exfit.inference.wording import listed
+    from exfit.util.text import listed
 
     others = len(names) - MOST_NAMED
     if others <= 1:  # one more is as short as its name
@@ -152,7 +152,7 @@ class RecorderAverages:
         """What is in doubt."""
         over = f"over {1e3 * self.window:.3g} ms"
         if self.shown:
-            from exfit.inference.wording import digits
+            from exfit.util.text import digits
 
             chi_square = digits(self.chi_square)
             return f"the record shows averages {over}, no single instants (chi-square {chi_square})"

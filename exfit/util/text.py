@@ -8,6 +8,7 @@ from types import NoneType
 from typing import Any
 
 Place = tuple[str | int, ...]  # the keys and indices that lead to a value in nested data
+PLAIN = 1e4  # below it a number is printed without an exponent
 
 
 def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
@@ -183,3 +184,16 @@ def magnitude_fault(value: float) -> str | None:
     if 0.0 < abs(value) < SMALLEST:
         return f"{value:g} is not 0, but below {SMALLEST:g}"
     return None
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as "A, B and C"."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def digits(number: float) -> str:
+    """Return a number with two digits."""
+    text = f"{number:.2g}"
+    if "e" in text and 1.0 <= abs(number) < PLAIN:
+        return f"{float(text):.0f}"
+    return text.replace("e-0", "e-").replace("e+0", "e")

@@ -14,10 +14,10 @@ from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.recorded_steps import is_table
 from exfit.fitting.residuals import Residuals
-from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
 from exfit.plants import REFERENCES
 from exfit.results.comparisons import Comparison
+from exfit.util.text import listed
 from exfit.verdict.run_quality import (
     INVISIBLE,
     LARGEST_STEP_ERROR,

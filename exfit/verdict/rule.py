@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from exfit.estimate import Stop
-from exfit.inference.wording import digits, listed
 from exfit.results.comparisons import Overlay
 from exfit.results.influences import RecorderAverages, first_of
 from exfit.results.verdict import (
@@ -21,6 +20,7 @@ from exfit.results.verdict import (
     Verdict,
     VerdictWords,
 )
+from exfit.util.text import digits, listed
 from exfit.verdict.causes import Evidence, causes_of
 from exfit.verdict.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.verdict.residual_tests import residual_tests

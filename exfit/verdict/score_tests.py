@@ -15,10 +15,10 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slices, slopes_of
 from exfit.inference.whitening import BIAS_KNOWN_TO
-from exfit.inference.wording import digits, listed
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
 from exfit.results.verdict import REJECTED, Cause
+from exfit.util.text import digits, listed
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
 from exfit.verdict.causes.steps import correct_instant, correct_step

@@ -31,7 +31,6 @@ from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.inference.noise import LEAST_P, SURPRISING, whiteness
-from exfit.inference.wording import digits
 from exfit.registry import parts
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
@@ -44,6 +43,7 @@ from exfit.results.intervals.determination import (
 )
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
 from exfit.util.strategies import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
+from exfit.util.text import digits
 from exfit.workflows.responses import aligned, validation_of
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from scipy.linalg import qr
 from exfit.inference.confidence import confidence
 from exfit.inference.identifiability import WEAK, identifiability
 from exfit.inference.linear import PriorRow, ResidualBlock, pivots
-from exfit.inference.wording import digits, listed
+from exfit.util.text import digits, listed
 from exfit.util.typed import plain
 
 SAMPLES = 300

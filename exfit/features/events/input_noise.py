@@ -32,10 +32,10 @@ from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference.whitening import PropagatedNoise, whitening
-from exfit.inference.wording import digits, listed
 from exfit.plants.parts import initial
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
+from exfit.util.text import digits, listed
 
 ORDER = 4  # of the differences that show the noise of a signal which swings
 PULSE = 1e-5  # pu or rad: the response to it is linear, and far above rounding

@@ -14,9 +14,9 @@ from exfit.fitting.uncertainty import shared_reason
 from exfit.inference.confidence import Confidence, confidence, rises
 from exfit.inference.identifiability import Identifiability, identifiability
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
-from exfit.inference.wording import listed
 from exfit.results.intervals.determination import of_profiles
 from exfit.results.intervals.value_errors import first_order_shifts, widened_by
+from exfit.util.text import listed
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.inference.confidence import Interval
-from exfit.inference.wording import listed
 from exfit.results.model import FittedParameter
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, Verdict
-from exfit.util.text import rounded_value
+from exfit.util.text import listed, rounded_value
 from exfit.util.typed import IN_FILE
 
 Array = NDArray[np.float64]

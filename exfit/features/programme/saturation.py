@@ -33,7 +33,7 @@ from exfit.features.programme.saturation_forms import (
     fitted,
 )
 from exfit.inference.quantiles import student_quantile
-from exfit.inference.wording import listed
+from exfit.util.text import listed
 
 WITHOUT_CURRENT = 0.01  # of the largest field current: a point of remanence
 TURN = 0.01  # pu: a smaller fall of the voltage is no falling branch

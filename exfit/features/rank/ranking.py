@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.inference.noise import effective_samples, is_white, whiteness
-from exfit.inference.wording import listed
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import NOT_ACCEPTED, outcome_of
 from exfit.results.verdict import GOOD, MATCHES, MISSES
+from exfit.util.text import listed
 
 Array = NDArray[np.float64]
 Records = Literal["fit", "validation"]

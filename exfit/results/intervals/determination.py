@@ -30,8 +30,8 @@ from exfit.fitting.uncertainty import (
     uncertainty_at,
 )
 from exfit.inference.confidence import Uncertainty
-from exfit.inference.wording import listed
 from exfit.signals import SIGNALS
+from exfit.util.text import listed
 
 Array = NDArray[np.float64]
 Watch = Callable[[estimate.Progress], object]

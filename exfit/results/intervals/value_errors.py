@@ -16,9 +16,9 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import typical_values_used
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation, slopes_of
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
-from exfit.inference.wording import digits, listed
 from exfit.results.influences import DEVIATION, TypicalValue
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals
+from exfit.util.text import digits, listed
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,11 @@ from exfit.case.case import Case
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.parameters import FreeParameter
-from exfit.inference.wording import listed
 from exfit.plants import MACHINE
 from exfit.results.influences import DEVIATION, first_of, moved_parameters
 from exfit.results.verdict import Cause
 from exfit.simulation.limits import Extreme, extremes
-from exfit.util.text import dotted
+from exfit.util.text import dotted, listed
 from exfit.verdict.causes.evidence import (
     CERTAIN,
     LAST,
