@@ -1,4 +1,4 @@
-"""One side of a profile: a parameter moves away from a minimum, and all others follow it.
+"""Profile likelihood: how far a parameter can move if all others may follow.
 
 From point to point the others are predicted along the tangent of the profile and its bend, then
 refitted as far as the cost needs. A point has the slope of the profile as well as its cost, so that
@@ -147,9 +147,13 @@ class Side:
         return self
 
     def go_on(self) -> Steps[ProfileEnd | None]:
-        """Add a point; return why there are no more to come, if so."""
-        last, points = self.spots[-1], self.valley.points
-        if last.place == self.bound:
+        """Add a point, predicted by the tangent of the profile and its bend.
+
+        Return why there are no more to come, if so.
+        """
+        box, points, last = self.valley.box, self.valley.points, self.spots[-1]
+        bound = float((box.high if self.sign > 0 else box.low)[self.index])
+        if last.place == bound:
             return ProfileEnd.BOUND
         low, high = self.known
         if low <= last.place <= high and not low <= self.spots[0].place <= high:
@@ -158,11 +162,17 @@ class Side:
             return ProfileEnd.FAILED
         if len(self.spots) > MOST_POINTS * points:
             return ProfileEnd.FLAT
-        self.stride = self.step()
+        room = abs(bound - last.place)
+        self.stride = self.step(room)
         step = min(self.stride, self.way_to_corner())
         for tries in range(MOST_HALVINGS + 1):
-            patient = tries == MOST_HALVINGS
-            spot = yield from self.refit(self.predicted(step), patient)
+            move = self.sign * step
+            x = last.best + move * last.tangent
+            if len(self.spots) > 1:
+                before = self.spots[-2]
+                x += 0.5 * move**2 * (last.tangent - before.tangent) / (last.place - before.place)
+            guess = self.at(bound if step >= room else last.place + move, x)
+            spot = yield from self.refit(guess, patient=tries == MOST_HALVINGS)
             if spot is not None and spot.height - last.height <= LEAPS / points:
                 break
             self.stride = step = 0.5 * step
@@ -171,24 +181,17 @@ class Side:
         self.spots.append(spot)
         return ProfileEnd.RISE if spot.height >= 1.0 else None
 
-    @property
-    def bound(self) -> float:
-        """The bound that the parameter moves towards."""
-        box = self.valley.box
-        return float((box.high if self.sign > 0 else box.low)[self.index])
-
-    @property
-    def room(self) -> float:
-        """How far the bound is."""
-        return abs(self.bound - self.spots[-1].place)
-
-    def step(self) -> float:
+    def step(self, room: float) -> float:
         """Length of the step to the next height, by the slope of the profile and its bend."""
         last, share = self.spots[-1], 1.0 / self.valley.points
         higher = last.height + share
         gain = (LAST if higher > 1.0 - 0.5 * share else higher) - last.height
-        if len(self.spots) == 1:
-            return self.first_step(last.height + gain)
+        if len(self.spots) == 1:  # the cost is a parabola there
+            way = inf
+            if self.curvature > 0.0:
+                way = sqrt((last.height + gain) ** 2 - last.height**2) / self.curvature
+            unit = float(self.valley.box.unit[self.index])
+            return way if isfinite(way) else min(unit, room) / self.valley.points
         before = self.spots[-2]
         risen = last.height - before.height
         longest = MOST_GROWTH * max(1.0, gain / share) * self.stride
@@ -212,24 +215,6 @@ class Side:
         meeting[self.index] = False
         return float(np.min(room[meeting] / np.abs(moves[meeting]), initial=inf))
 
-    def first_step(self, height: float) -> float:
-        """Distance of a height from the minimum, where the cost is a parabola."""
-        if self.curvature > 0.0:
-            way = sqrt(height**2 - self.spots[0].height ** 2) / self.curvature
-            if isfinite(way):
-                return way
-        unit = float(self.valley.box.unit[self.index])
-        return min(unit, self.room) / self.valley.points
-
-    def predicted(self, step: float) -> Array:
-        """Return all parameters a step farther, by the tangent of the profile and its bend."""
-        last, move = self.spots[-1], self.sign * step
-        x = last.best + move * last.tangent
-        if len(self.spots) > 1:
-            before = self.spots[-2]
-            x += 0.5 * move**2 * (last.tangent - before.tangent) / (last.place - before.place)
-        return self.at(self.bound if step >= self.room else last.place + move, x)
-
     def at(self, place: float, x: Array) -> Array:
         """Return x within the bounds, with the parameter at a place."""
         inside = self.snapped(x)
@@ -247,16 +232,13 @@ class Side:
 
         Not ``patient``: also where the full step fails far from the minimum.
         """
-        valley, fine = self.valley, FINE * self.rise
-        low, high = (
-            self.at(guess[self.index], valley.box.low),
-            self.at(guess[self.index], valley.box.high),
-        )
+        valley, fine, place = self.valley, FINE * self.rise, float(guess[self.index])
+        low, high = self.at(place, valley.box.low), self.at(place, valley.box.high)
         held = replace(valley.box, low=low, high=high)
         problem = Problem(valley.functions, None, held, valley.scaled)
         point = yield from problem.evaluate(guess)
         if point.cost == inf:
-            self.failed = float(guess[self.index])
+            self.failed = place
             return None
         linear, before = (yield from linearise(problem, point, valley.bottom)), None
         for _ in range(MOST_CORRECTIONS):
@@ -281,7 +263,7 @@ class Side:
         x, cost = linear.point.x, linear.point.cost
         place = float(x[self.index])
         if not linear.finite:
-            return Spot(x, cost, place, self.height(cost), 0.0, x, self.alone())
+            return Spot(x, cost, place, self.height(cost), 0.0, x, np.eye(len(x))[self.index])
         smooth = linear.full.promise <= FINE * self.rise
         best, left = (self.snapped(linear.full.target), linear.full.promise) if smooth else (x, 0.0)
         tangent, _ = self.tangent(linear, best)
@@ -295,18 +277,12 @@ class Side:
         """Return the root of the rise of a cost, in units of that asked."""
         return sqrt(max(0.0, cost - self.valley.lowest) / self.rise)
 
-    def alone(self) -> Array:
-        """Return the direction in which the parameter moves and no other (N,)."""
-        direction = np.zeros(len(self.valley.box.low))
-        direction[self.index] = 1.0
-        return direction
-
     def tangent(self, linear: LinearModel, x: Array) -> tuple[Array, float]:
         """Rates of all variables along the parameter (N,), and of the residuals with them.
 
         Others on a bound stay there.
         """
-        box, direction = self.valley.box, self.alone()
+        box, direction = self.valley.box, np.eye(len(x))[self.index]
         others = (x > box.low) & (x < box.high) & (direction == 0.0)
         alone = effect_of(linear, direction)
         if others.any():
@@ -499,9 +475,31 @@ def profiles(
         deepest = deepest_of(sides)
         if not whole or deepest.cost >= valley.lowest - margin:
             break
-        valley, known = finish(valley_at(bottom_near(valley, deepest.x), inf)), {}
-    pairs = zip(sides[::2], sides[1::2], strict=True)
-    return tuple(joined(below, above, valley, restarts > 0) for below, above in pairs)
+        descent = Descent(
+            functions=functions,
+            bounds=(box.low, box.high),
+            method="lm-then-dgn",
+            x_scale=None if x_scale is None else box.unit,
+        )
+        lower = finish(descent.begin(deepest.x)).x
+        valley, known = finish(valley_at(lower, inf)), {}
+    profiles = []
+    for below, above in zip(sides[::2], sides[1::2], strict=True):
+        spots = [*below.spots[:0:-1], *above.spots]
+        own = CostProfile(
+            index=below.index,
+            at=np.array([spot.place for spot in spots]),
+            costs=np.array([spot.cost for spot in spots]),
+            xs=np.stack([spot.x for spot in spots]),
+            low=below.crossing,
+            high=above.crossing,
+            ends=(below.end, above.end),
+            x=valley.bottom.point.x,
+            cost=valley.bottom.point.cost,
+            moved=restarts > 0,
+        )
+        profiles.append(own)
+    return tuple(profiles)
 
 
 def valley_about(
@@ -552,31 +550,3 @@ def finish_sides(
             watch(Progress("profiling", done, len(sides), deepest_of(sides).cost))
 
     return finish_all([side.walk(limit) for side in sides], workers, receive)
-
-
-def bottom_near(valley: Valley, x: Array) -> Array:
-    """Return the minimum that all parameters together find from a point."""
-    descent = Descent(
-        functions=valley.functions,
-        bounds=(valley.box.low, valley.box.high),
-        method="lm-then-dgn",
-        x_scale=valley.box.unit if valley.scaled else None,
-    )
-    return finish(descent.begin(x)).x
-
-
-def joined(below: Side, above: Side, valley: Valley, moved: bool) -> CostProfile:
-    """Return the profile of two sides."""
-    spots = [*below.spots[:0:-1], *above.spots]
-    return CostProfile(
-        index=below.index,
-        at=np.array([spot.place for spot in spots]),
-        costs=np.array([spot.cost for spot in spots]),
-        xs=np.stack([spot.x for spot in spots]),
-        low=below.crossing,
-        high=above.crossing,
-        ends=(below.end, above.end),
-        x=valley.bottom.point.x,
-        cost=valley.bottom.point.cost,
-        moved=moved,
-    )
