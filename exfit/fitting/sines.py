@@ -1,20 +1,19 @@
-"""A periodic disturbance of a channel: what a fit finds of it, with exact derivatives."""
+"""Periodic disturbances of channels: as a case names them, or as residuals show them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from math import inf, pi
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import RecordFile, SineSection, Unknown
+from exfit.case.schema import RecordFile, Unknown
 from exfit.dsp.lines import Line, cosine_and_sine, largest_line
 from exfit.errors import RecordError
 from exfit.fitting.descents import descent_near
 from exfit.fitting.experiment import Channel, ExperimentSetup
+from exfit.fitting.noise import noise_of
 from exfit.fitting.nuisances import (
     COSINE,
     FREQUENCY,
@@ -79,17 +78,14 @@ class Sine:
 
 MOST_OF_LINE = 4.0  # times the amplitude of a line that was found: how large it may become
 
+Place = tuple[str, str]  # a record and a signal
 
-class Bounded(NamedTuple):
-    """Start and bounds of a parameter of a disturbance."""
 
-    start: float
-    low: float
-    high: float
+# ---- disturbances that a case names
 
 
 def with_sines(
-    case: Case, file: RecordFile, setup: ExperimentSetup, values: Mapping[str, float]
+    case: Case, file: RecordFile, setup: ExperimentSetup, values: Values
 ) -> ExperimentSetup:
     """Return a test with the periodic disturbances that the section of its record names.
 
@@ -97,127 +93,86 @@ def with_sines(
     ``values`` or those given beside the case. Raises RecordError for a frequency that the record
     cannot show.
     """
-    prefix = prefix_from(setup.name)
     given = {**values, **{name: each.value for name, each in case.given_values.items()}}
     for channel in setup.channels:
         section = file.channels[channel.signal].sine
         if section is None:
             continue
-        frequency = _frequency(f"{prefix}{channel.signal}.sine", section, setup, given)
-        if frequency is None:
-            waiting = {**setup.automatic_sines, channel.signal: _range(section)}
-            setup = replace(setup, automatic_sines=waiting)
-            continue
-        from exfit.fitting.noise import noise_of
-
-        measured = channel.measured[channel.kept]
+        name, frequency = _name(setup, channel), section.frequency
+        found: float | FreeParameter
+        if not isinstance(frequency, Unknown):
+            _refuse_unseen(name, setup, frequency)
+            found = frequency
+        elif frequency.start == "auto":
+            start = given.get(f"{name}.{FREQUENCY}")
+            if start is None:
+                low, high = frequency.min or 0.0, inf if frequency.max is None else frequency.max
+                waiting = {**setup.automatic_sines, channel.signal: (low, high)}
+                setup = replace(setup, automatic_sines=waiting)
+                continue
+            found = _near(setup, name, start)
+        elif frequency.min is None or frequency.max is None:
+            raise TypeError(f"{name} has no bounds")
+        else:
+            _refuse_unseen(name, setup, frequency.min, frequency.max)
+            bounds = (frequency.start, frequency.min, frequency.max)
+            found = FreeParameter(f"{name}.{FREQUENCY}", *bounds, logarithmic=False)
         noise = noise_of(channel)
-        largest = max(0.5 * float(np.ptp(measured)), noise)
-        setup = _with_sine(prefix, setup, channel, frequency, (noise, 0.0), largest)
+        largest = max(0.5 * float(np.ptp(channel.measured[channel.kept])), noise)
+        setup = _with_sine(setup, channel, found, (noise, 0.0), largest)
     return setup
 
 
-def with_line(prefix: str, setup: ExperimentSetup, signal: str, line: Line) -> ExperimentSetup:
-    """Return a test with a line of the errors of a signal, simulated less measured, in it."""
-    channel = next(channel for channel in setup.channels if channel.signal == signal)
-    frequency = _near(setup, line.frequency)
-    amplitudes = (-line.cosine, -line.sine)
-    largest = MOST_OF_LINE * line.amplitude
-    return _with_sine(prefix, setup, channel, frequency, amplitudes, largest)
+def _name(setup: ExperimentSetup, channel: Channel) -> str:
+    return f"{prefix_from(setup.name)}{channel.signal}.sine"
 
 
-def _frequency(
-    name: str, section: SineSection, setup: ExperimentSetup, given: Mapping[str, float]
-) -> float | Bounded | None:
-    """Return the frequency of a disturbance, None where residuals must show it first."""
-    frequency = section.frequency
-    if not isinstance(frequency, Unknown):
-        _refuse_unseen(name, setup, frequency)
-        return frequency
-    if frequency.start == "auto":
-        start = given.get(f"{name}.{FREQUENCY}")
-        return None if start is None else _near(setup, start)
-    if frequency.min is None or frequency.max is None:
-        raise TypeError(f"{name} has no bounds")
-    _refuse_unseen(name, setup, frequency.min)
-    _refuse_unseen(name, setup, frequency.max)
-    return Bounded(frequency.start, frequency.min, frequency.max)
-
-
-def _range(section: SineSection) -> tuple[float, float]:
-    """Return the range of a frequency that residuals show, Hz."""
-    frequency = section.frequency
-    if not isinstance(frequency, Unknown):
-        return frequency, frequency
-    low, high = frequency.min, frequency.max
-    return 0.0 if low is None else low, inf if high is None else high
-
-
-def _near(setup: ExperimentSetup, frequency: float) -> Bounded:
-    """Return a frequency with bounds between which no other line can be told from it."""
-    time = setup.record.time
-    width = 1.0 / float(time[-1] - time[0])
-    return Bounded(frequency, max(frequency - width, 0.5 * width), frequency + width)
-
-
-def _refuse_unseen(name: str, setup: ExperimentSetup, frequency: float) -> None:
+def _refuse_unseen(name: str, setup: ExperimentSetup, *frequencies: float) -> None:
     """Raise RecordError for a frequency with no whole period, or fewer than two samples in one."""
     time = setup.record.time
     low, high = 1.0 / float(time[-1] - time[0]), 0.5 / float(np.median(np.diff(time)))
-    if not low <= frequency <= high:
-        raise RecordError(
-            f"{setup.record.source}: {name}.{FREQUENCY}: {frequency:g} Hz: a record of this length "
-            f"and sampling shows {low:.3g} ... {high:.4g} Hz"
-        )
+    for frequency in frequencies:
+        if not low <= frequency <= high:
+            raise RecordError(
+                f"{setup.record.source}: {name}.{FREQUENCY}: {frequency:g} Hz: a record of this "
+                f"length and sampling shows {low:.3g} ... {high:.4g} Hz"
+            )
+
+
+def _near(setup: ExperimentSetup, name: str, frequency: float) -> FreeParameter:
+    """Return a frequency with bounds between which no other line can be told from it."""
+    time = setup.record.time
+    width = 1.0 / float(time[-1] - time[0])
+    bounds = max(frequency - width, 0.5 * width), frequency + width
+    return FreeParameter(f"{name}.{FREQUENCY}", frequency, *bounds, logarithmic=False)
 
 
 def _with_sine(
-    prefix: str,
     setup: ExperimentSetup,
     channel: Channel,
-    frequency: float | Bounded,
+    frequency: float | FreeParameter,
     amplitudes: tuple[float, float],
     largest: float,
 ) -> ExperimentSetup:
-    name = f"{prefix}{channel.signal}.sine"
-    time = setup.record.time
-    fixed = frequency if isinstance(frequency, float) else None
+    name, time, experiment = _name(setup, channel), setup.record.time, setup.experiment
+    fixed = None if isinstance(frequency, FreeParameter) else frequency
     sine = Sine(name, channel.signal, 0.5 * float(time[0] + time[-1]), fixed)
-    bounds: dict[NuisanceKind, Bounded] = {
-        **({} if isinstance(frequency, float) else {"frequency": frequency}),
-        "cosine": Bounded(amplitudes[0], -largest, largest),
-        "sine": Bounded(amplitudes[1], -largest, largest),
-    }
-    experiment = setup.experiment
-    nuisances = [Nuisance(f"{name}.{kind}", kind, signal=channel.signal) for kind in bounds]
-    free = [
-        FreeParameter(f"{name}.{kind}", *values, logarithmic=False)
-        for kind, values in bounds.items()
-    ]
-    return replace(
-        setup,
-        experiment=replace(
-            experiment,
-            nuisances=(*experiment.nuisances, *nuisances),
-            sines=(*experiment.sines, sine),
-        ),
-        free=(*setup.free, *free),
+    free = [frequency] if isinstance(frequency, FreeParameter) else []
+    kinds: list[NuisanceKind] = ["frequency"] if free else []
+    kinds += ["cosine", "sine"]
+    for kind, start in zip((COSINE, SINE), amplitudes, strict=True):
+        bounds = (start, -largest, largest)
+        free.append(FreeParameter(f"{name}.{kind}", *bounds, logarithmic=False))
+    nuisances = [Nuisance(f"{name}.{kind}", kind, signal=channel.signal) for kind in kinds]
+    experiment = replace(
+        experiment,
+        nuisances=(*experiment.nuisances, *nuisances),
+        sines=(*experiment.sines, sine),
     )
+    return replace(setup, experiment=experiment, free=(*setup.free, *free))
 
 
-class Place(NamedTuple):
-    """A channel of a record."""
-
-    record: str
-    signal: str
-
-    @property
-    def label(self) -> str:
-        """Its name in a note."""
-        return f"{prefix_from(self.record)}{self.signal}"
-
-
-Lines = Mapping[Place, Line]
+# ---- those that residuals show
 
 
 def with_found_lines(
@@ -225,15 +180,16 @@ def with_found_lines(
 ) -> tuple[tuple[ExperimentSetup, ...], tuple[str, ...]]:
     """Return the tests with the lines that stand out of their residuals at theta (N,), and notes.
 
+    A sine is fitted only where a line stands out of residuals that are white beside it: of coloured
+    noise it takes a part that looks like a response, and the parameters take what belongs to it.
+
     ``residuals`` are those of a fit without the lines. Raises KeyboardInterrupt at an interruption.
     """
     notes: dict[Place, str] = {}
     lines = dict(_candidates(setups, residuals, theta, notes))
     if lines:
-        fitted = [
-            replace(setup, experiment=experiment)
-            for setup, experiment in zip(setups, residuals.experiments, strict=True)
-        ]
+        pairs = zip(setups, residuals.experiments, strict=True)
+        fitted = [replace(setup, experiment=experiment) for setup, experiment in pairs]
         for place in _coloured(_disturbed(fitted, lines), residuals, theta):
             if place in lines:
                 notes[place] = (
@@ -244,8 +200,8 @@ def with_found_lines(
         notes[place] = (
             f"{_words(line)} stands out of the residuals: a sine is fitted with the parameters"
         )
-    texts = tuple(f"{place.label}: {text}" for place, text in notes.items())
-    return _disturbed(setups, lines), texts
+    texts = (f"{prefix_from(record)}{signal}: {text}" for (record, signal), text in notes.items())
+    return _disturbed(setups, lines), tuple(texts)
 
 
 def _candidates(
@@ -257,11 +213,13 @@ def _candidates(
     for setup, experiment in zip(setups, residuals.experiments, strict=True):
         for channel in experiment.channels:
             block = next(blocks)
-            if channel.signal not in setup.automatic_sines:
+            within = setup.automatic_sines.get(channel.signal)
+            if within is None:
                 continue
-            place = Place(setup.name, channel.signal)
+            place, weight = (setup.name, channel.signal), channel.weight
+            own = errors[block] / weight, channel.kept, slopes[block] / weight
             try:
-                line = _largest_line(setup, channel, errors[block], slopes[block])
+                line = largest_line(setup.record.time, *own, within)
             except ValueError as fault:
                 notes[place] = f"no sine is fitted: {fault}"
                 continue
@@ -274,36 +232,36 @@ def _candidates(
                 )
 
 
-def _largest_line(setup: ExperimentSetup, channel: Channel, errors: Array, slopes: Array) -> Line:
-    within = setup.automatic_sines[channel.signal]
-    weight = channel.weight
-    time = setup.record.time
-    return largest_line(time, errors / weight, channel.kept, slopes / weight, within)
-
-
 def _coloured(
     setups: Sequence[ExperimentSetup], residuals: Residuals, theta: Array
 ) -> Iterator[Place]:
     """Yield the channels whose residuals are not white with the lines of the tests fitted."""
     known = {parameter.name for parameter in residuals.free}
-    of_records = chain.from_iterable(setup.free for setup in setups)
-    new = [parameter for parameter in of_records if parameter.name not in known]
+    new = [own for setup in setups for own in setup.free if own.name not in known]
     experiments = [setup.experiment for setup in setups]
     disturbed = replace(residuals, experiments=experiments, free=(*residuals.free, *new))
     start = np.append(theta, [parameter.scaled(parameter.start) for parameter in new])
     errors = disturbed.errors(descent_near(disturbed, start).x)[0]
-    places = [Place(setup.name, channel.signal) for setup in setups for channel in setup.channels]
+    places = [(setup.name, channel.signal) for setup in setups for channel in setup.channels]
     for place, block in zip(places, slices(disturbed.sizes), strict=True):
         if not is_white(whiteness(errors[block])):
             yield place
 
 
-def _disturbed(setups: Sequence[ExperimentSetup], lines: Lines) -> tuple[ExperimentSetup, ...]:
-    """Return the tests with lines in their channels; none of them waits for residuals any more."""
+def _disturbed(
+    setups: Sequence[ExperimentSetup], lines: Mapping[Place, Line]
+) -> tuple[ExperimentSetup, ...]:
+    """Return the tests with lines of their errors, simulated less measured, in their channels.
+
+    None of them waits for residuals any more.
+    """
     disturbed = {setup.name: replace(setup, automatic_sines={}) for setup in setups}
-    for place, line in lines.items():
-        prefix = prefix_from(place.record)
-        disturbed[place.record] = with_line(prefix, disturbed[place.record], place.signal, line)
+    for (record, signal), line in lines.items():
+        setup = disturbed[record]
+        channel = next(channel for channel in setup.channels if channel.signal == signal)
+        frequency = _near(setup, _name(setup, channel), line.frequency)
+        amplitudes, largest = (-line.cosine, -line.sine), MOST_OF_LINE * line.amplitude
+        disturbed[record] = _with_sine(setup, channel, frequency, amplitudes, largest)
     return tuple(disturbed.values())
 
 
