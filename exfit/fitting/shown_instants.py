@@ -48,16 +48,22 @@ def with_shown_instants(setup: ExperimentSetup, values: Values) -> ExperimentSet
     what chi-square does at 95 %, and never beyond those of ``setup``, which has sub-steps enough.
     An instant whose step moves nothing stays as it is, and so does one that the values have.
     """
-    at = setup.with_start_values(values)
-    free = {parameter.name: parameter for parameter in setup.free}
-    for name, before, after in _sought(setup, at):
-        if name in values:
-            continue
-        shown = _shown(setup, at, free[name], before, after)
-        if shown is not None:
-            free[name] = shown
-            at[name] = shown.start
-    return replace(setup, free=tuple(free.values()))
+    at, time = setup.with_start_values(values), setup.record.time
+    names = instants_of(setup)
+    simulator = setup.experiment.with_inputs(at)
+    every = sorted(step.at + simulator.delay for step in simulator.inputs.steps)
+    free = []
+    for own in setup.free:
+        if own.name in names and own.name not in values:
+            # between these times its step is the only one
+            before = max((each for each in every if each < own.low), default=float(time[0]))
+            after = min((each for each in every if each > own.high), default=float(time[-1]))
+            middle = 0.5 * (before + at[own.name])
+            first = max(middle, at[own.name] - REST_BEFORE, float(time[0]))
+            own = _shown(setup, at, own, first, after)
+            at[own.name] = own.start
+        free.append(own)
+    return replace(setup, free=tuple(free))
 
 
 def instants_of(setup: ExperimentSetup) -> frozenset[str]:
@@ -75,40 +81,29 @@ def instants_of(setup: ExperimentSetup) -> frozenset[str]:
     )
 
 
-def _sought(setup: ExperimentSetup, values: Values) -> Iterator[tuple[str, float, float]]:
-    """Yield each instant that is found, and between which times its step is the only one."""
-    simulator, time = setup.experiment.with_inputs(values), setup.record.time
-    names = instants_of(setup)
-    every = sorted(step.at + simulator.delay for step in simulator.inputs.steps)
-    for parameter in setup.free:
-        if parameter.name in names:
-            at = values[parameter.name]
-            before = max((each for each in every if each < parameter.low), default=float(time[0]))
-            after = min((each for each in every if each > parameter.high), default=float(time[-1]))
-            yield parameter.name, max(0.5 * (before + at), at - REST_BEFORE, float(time[0])), after
-
-
 def _shown(
     setup: ExperimentSetup, values: Values, instant: FreeParameter, before: float, after: float
-) -> FreeParameter | None:
-    """Return an instant as the record shows it, None where nothing moves with its step."""
+) -> FreeParameter:
+    """Return an instant as the record shows it, as it was where nothing moves with its step."""
     beginnings = [*_beginnings(setup, values, instant.low, before, after)]
     freedom = sum(len(each.samples) - SHAPES for each in beginnings)
     low, high = instant.low, instant.high
     if freedom < 1:
-        return None
+        return instant
     for _ in range(STAGES):
         tried = np.linspace(low, high, TRIED)
-        costs = _costs(setup, values, instant.name, tried, beginnings)
+        sets = [{**values, instant.name: float(at)} for at in tried]
+        responses, _ = setup.experiment.samples_of_many(sets)
+        costs = np.array([_left_of(setup, response, beginnings) for response in responses])
         best = int(np.argmin(costs))
         left = float(costs[best])
         if not (isfinite(left) and np.any(costs > left)):
-            return None
+            return instant
         interval = interval_below(tried, costs, left + CHI_SQUARE * max(1.0, left / freedom))
         beside = float(tried[1] - tried[0])
         low = max(low, interval.earliest - beside)
         high = min(high, interval.latest + beside)
-    at = vertex(tried, costs, best)
+    at = _vertex(tried, costs, best)
     least = LEAST_ERROR * float(median(np.diff(setup.record.time)))
     return replace(
         instant,
@@ -138,42 +133,27 @@ def _beginnings(
             yield Beginning(place, inside[:end], samples[:end], noise)
 
 
-def _costs(
-    setup: ExperimentSetup,
-    values: Values,
-    name: str,
-    instants: Array,
-    beginnings: Sequence[Beginning],
-) -> Array:
-    """Return the sums of squares (K,), in units of the noise, that instants of a step leave."""
-    sets = [{**values, name: float(at)} for at in instants]
-    responses, _ = setup.experiment.samples_of_many(sets)
-    return np.array([_left_of(setup, response, beginnings) for response in responses])
-
-
 def _left_of(setup: ExperimentSetup, response: Array, beginnings: Sequence[Beginning]) -> float:
-    """Remainder of beginnings after a response (M, channels) of any size, and its integrals."""
+    """Remainder of beginnings after a response (M, channels) of any size, and its integrals.
+
+    It is the sum of squares in units of the noise.
+    """
     total = 0.0
     for place, inside, samples, noise in beginnings:
-        channel = setup.channels[place]
-        simulated = compared(channel, response[:, place])[inside]
+        simulated = compared(setup.channels[place], response[:, place])[inside]
         if not np.isfinite(simulated).all():
             return inf
-        moved, time = simulated - simulated[0], setup.record.time[inside]
-        once = integral(time, moved)
-        shapes = np.column_stack([np.ones_like(moved), moved, once, integral(time, once)])
-        found = np.linalg.lstsq(shapes, samples, rcond=None)[0]
-        total += float(np.sum((samples - shapes @ found) ** 2)) / noise**2
+        shapes, between = [simulated - simulated[0]], np.diff(setup.record.time[inside])
+        for _ in range(2):  # integrals by trapezoids
+            means = 0.5 * (shapes[-1][1:] + shapes[-1][:-1])
+            shapes.append(np.append(0.0, np.cumsum(means * between)))
+        columns = np.column_stack([np.ones_like(simulated), *shapes])
+        found = np.linalg.lstsq(columns, samples, rcond=None)[0]
+        total += float(np.sum((samples - columns @ found) ** 2)) / noise**2
     return total
 
 
-def integral(time: Array, samples: Array) -> Array:
-    """Return the integral of samples (M,) from the first of them on, by trapezoids."""
-    means = 0.5 * (samples[1:] + samples[:-1])
-    return np.append(0.0, np.cumsum(means * np.diff(time)))
-
-
-def vertex(at: Array, costs: Array, best: int) -> float:
+def _vertex(at: Array, costs: Array, best: int) -> float:
     """Place of the lowest point of a parabola through the least of evenly spaced costs (K,)."""
     if 0 < best < len(at) - 1:
         before, least, after = costs[best - 1 : best + 2]

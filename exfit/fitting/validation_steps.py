@@ -1,6 +1,6 @@
 """The test of a record that its case does not describe: its steps, as the record shows them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -35,7 +35,6 @@ from exfit.records.steps import (
     steps_of_record,
     with_sizes,
 )
-from exfit.simulation.simulator import Response
 from exfit.util.text import show
 
 Array = NDArray[np.float64]
@@ -75,38 +74,46 @@ def with_steps_of_record(
     be found within bounds. Raises RecordError where the record shows no step, CaseError where the
     steps given cannot be used.
     """
+
+    def built(recording: Recording, test: Test, *notes: str) -> SetupOfRecord:
+        changed = recording.test.model_copy(update=test)
+        other = recording.model_copy(update={"test": changed})
+        return SetupOfRecord(build_experiment(case, other, values), notes)
+
     given_record, file = case.given_records.get(recording.name), recording.record
     record = given_record or read_section(file, case.folder, case.kind.per_unit)
-    if case.kind.finds_rest:
+    anew: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
+    if case.kind.finds_rest:  # it has a rest, no steps
         if any(given):
             text = f"step and at: not allowed with plant {case.kind.name}: the record drives it"
             raise CaseError([f"{case.path}: {text}"])
-        test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))  # it has a rest, no steps
-        return SetupOfRecord(_built(case, recording, values, {**test, "vref": (), "vs": ()}))
+        return built(recording, {**anew, "vref": (), "vs": ()})
     signal = _stepped(case, recording.test)
     inspection = None if given_record else _inspected(file, case.folder)
     if signal == "vref" and not any(given) and not case.kind.plays_back:
         recording = _with_own_reference(recording, inspection)
         if recording.test.vref == "recorded":
-            test = dict.fromkeys(("vt0", "begin", "steady_until"))
-            return SetupOfRecord(_built(case, recording, values, test), (OWN_REFERENCE,))
+            return built(recording, anew, OWN_REFERENCE)
     steps = _lasting(record, _shown(record, inspection, given), given)
     if signal is None:
-        test = {"steady_until": _earliest(record, steps, 0), "vt0": None}
-        return SetupOfRecord(_built(case, recording, values, test))
+        return built(recording, {"steady_until": _earliest(record, steps, 0), "vt0": None})
 
-    def setup_with(sizes: Sequence[float], earlier: Test) -> ExperimentSetup:
+    def setup_with(sizes: Sequence[float], earlier: Test, *notes: str) -> SetupOfRecord:
         events = tuple(_events(record, steps, sizes, given))
         test = {**_start(record, steps), **earlier, signal: (*earlier.get(signal, ()), *events)}
-        return _built(case, recording, values, test)
+        return built(recording, test, *notes)
 
-    sizes = _sizes(record, steps, given, lambda sizes: setup_with(sizes, {}).response(values))
+    sizes = _sizes(record, steps, given)
+    if not given.sizes:
+        simulated = setup_with(sizes, {}).setup.response(values).signals.get("vt")
+        if simulated is not None:  # else it drives
+            sizes = _through_gain(record, steps, sizes, simulated)
     earlier = _earlier(recording.test, signal, record)
     if earlier:
-        setup = setup_with(sizes, earlier)
-        if _begins_there(setup, values, steps[0], sizes):
-            return SetupOfRecord(setup, (EARLIER_STEPS,))
-    return SetupOfRecord(setup_with(sizes, {}))
+        test = setup_with(sizes, earlier, EARLIER_STEPS)
+        if _begins_there(test.setup, values, steps[0], sizes):
+            return test
+    return setup_with(sizes, {})
 
 
 def _stepped(case: Case, test: BumpTest) -> str | None:
@@ -123,12 +130,6 @@ def _stepped(case: Case, test: BumpTest) -> str | None:
     if not case.kind.events:
         return None
     return next((signal for signal in REFERENCES if test.reference(signal)), "vref")
-
-
-def _built(case: Case, recording: Recording, values: Values, test: Test) -> ExperimentSetup:
-    """Return the setup of a recording with another test."""
-    changed = recording.test.model_copy(update=test)
-    return build_experiment(case, recording.model_copy(update={"test": changed}), values)
 
 
 # ---- the steps
@@ -193,13 +194,8 @@ def _lasting(
     return lasting
 
 
-def _sizes(
-    record: Record,
-    steps: Sequence[RecordedStep],
-    given: GivenSteps,
-    response: Callable[[Sequence[float]], Response],
-) -> tuple[float, ...]:
-    """Return the sizes of the steps: those given, else vt's through the gain of the simulation.
+def _sizes(record: Record, steps: Sequence[RecordedStep], given: GivenSteps) -> tuple[float, ...]:
+    """Return the sizes of the steps: those given, else those of vt.
 
     Raises CaseError where as many are not given as there are steps, RecordError where vt does not
     show one.
@@ -215,33 +211,30 @@ def _sizes(
         if "vt" not in step.sizes:
             text = f"no lasting change of vt at {step.at:.4g} s"
             raise RecordError(f"{record.source}: {text}; {GIVE_STEP}")
-    sizes = tuple(step.sizes["vt"] for step in steps)
-    simulated = response(sizes).signals.get("vt")
-    if simulated is None:  # it drives
-        return sizes
-    changes = with_sizes(steps, {"vt": simulated}, {}, record.time)
-    return tuple(
-        _through_gain(size, change.sizes.get("vt", 0.0))
-        for size, change in zip(sizes, changes, strict=True)
-    )
+    return tuple(step.sizes["vt"] for step in steps)
 
 
-def _through_gain(size: float, change: float) -> float:
-    """Return the size of a step that changes vt by as much as one of ``size`` does by ``change``.
+def _through_gain(
+    record: Record, steps: Sequence[RecordedStep], sizes: Sequence[float], simulated: Array
+) -> tuple[float, ...]:
+    """Return the sizes of steps that change vt (M,) by those of the record.
 
-    It stays where the simulation moves the other way, which no size mends.
+    One stays where the simulation moves the other way, which no size mends.
     """
-    gain = change / size
-    return size / gain if gain > 0.0 and isfinite(size / gain) else size
+    through = []
+    changes = with_sizes(steps, {"vt": simulated}, {}, record.time)
+    for size, change in zip(sizes, changes, strict=True):
+        gain = change.sizes.get("vt", 0.0) / size
+        through.append(size / gain if gain > 0.0 and isfinite(size / gain) else size)
+    return tuple(through)
 
 
 def _events(
     record: Record, steps: Sequence[RecordedStep], sizes: Sequence[float], given: GivenSteps
-) -> list[FindableStep]:
-    """Return the steps of a test: numbers where they are given, else with bounds."""
+) -> Iterator[FindableStep]:
+    """Yield the steps of a test: numbers where they are given, else with bounds."""
     last = float(record.time[-1])
     ends = [*(_earliest(record, steps, k) for k in range(1, len(steps))), last]
-    events = []
     for k, (step, size, end) in enumerate(zip(steps, sizes, ends, strict=True)):
         at: float | Unknown = step.at
         if not given.instants and not step.from_start:
@@ -250,8 +243,7 @@ def _events(
             at = Unknown(start=step.at, min=low, max=min(step.at + step.error, end))
         low, high = bounds_about(size)
         found = Unknown(start=size, min=low, max=high)
-        events.append(FindableStep(at=at, step=size if given.sizes else found))
-    return events
+        yield FindableStep(at=at, step=size if given.sizes else found)
 
 
 def _earliest(record: Record, steps: Sequence[RecordedStep], k: int) -> float:
@@ -268,11 +260,10 @@ def _start(record: Record, steps: Sequence[RecordedStep]) -> Test:
     test: dict[str, Any] = dict.fromkeys(("vt0", "begin", "duration", "steady_until"))
     test |= dict.fromkeys(REFERENCES, ())
     vt = record.signals.get("vt")
-    first = steps[0]
-    if vt is None or not first.from_start:
+    if vt is None or not steps[0].from_start:
         return {**test, "steady_until": _earliest(record, steps, 0)}
-    level = float(vt[np.isfinite(vt)][0])
-    within = FIRST_SAMPLE_WITHIN * noise_of(vt[np.isfinite(vt)])
+    vt = vt[np.isfinite(vt)]
+    level, within = float(vt[0]), FIRST_SAMPLE_WITHIN * noise_of(vt)
     sought = Unknown(start=level, min=level - within, max=level + within)
     return {**test, "vt0": sought if within > 0.0 else level}
 
