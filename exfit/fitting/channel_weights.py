@@ -52,7 +52,11 @@ def balanced(
     ``deviations`` (channels,) are those to begin with; by default those of the records themselves:
     of all signals the same share is matched then.
     """
-    before = _movements(problem.residuals) if deviations is None else deviations
+    before = deviations
+    if before is None:
+        channels = problem.residuals.channels
+        movements = [float(np.std(channel.measured[channel.kept])) for channel in channels]
+        before = np.maximum(movements, LEAST_NOISE)
     problem = with_deviations(problem, before, of_residuals=deviations is not None)
     for _ in range(MOST_REWEIGHTINGS):
         theta = descent_near(problem.compressed.counted_by(counter), theta).x
@@ -72,14 +76,13 @@ def residual_deviations(residuals: Residuals, theta: Array) -> Array:
     """
     errors, _ = residuals.errors(theta)
     influence, curvature = residuals.influence(errors)
-    ends = [0, *accumulate(residuals.sizes)]
-    pairs = zip(residuals.channels, pairwise(ends), strict=True)
-    return np.array([_deviation(c, influence[a:b], curvature[a:b]) for c, (a, b) in pairs])
-
-
-def _deviation(channel: Channel, influence: Array, curvature: Array) -> float:
-    scale = channel.weight * max(float(np.mean(curvature)), np.finfo(float).eps)
-    return max(float(np.sqrt(influence @ influence / channel.samples)) / scale, LEAST_NOISE)
+    ends, deviations = [0, *accumulate(residuals.sizes)], list[float]()
+    for channel, (a, b) in zip(residuals.channels, pairwise(ends), strict=True):
+        own = influence[a:b]
+        scale = channel.weight * max(float(np.mean(curvature[a:b])), np.finfo(float).eps)
+        spread = float(np.sqrt(own @ own / channel.samples))
+        deviations.append(max(spread / scale, LEAST_NOISE))
+    return np.array(deviations)
 
 
 def with_deviations(
@@ -102,12 +105,6 @@ def _weighted(residuals: Residuals, deviations: Array, of_residuals: bool) -> Re
 
     experiments = [_with_channels(experiment, weighted) for experiment in residuals.experiments]
     return replace(residuals, experiments=experiments)
-
-
-def _movements(residuals: Residuals) -> Array:
-    """Return the standard deviation (channels,) of what each channel shows, per unit."""
-    movements = [float(np.std(channel.measured[channel.kept])) for channel in residuals.channels]
-    return np.maximum(movements, LEAST_NOISE)
 
 
 def _agree(before: Array, after: Array, tolerance: float) -> bool:

@@ -45,11 +45,11 @@ Array = NDArray[np.float64]
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
 ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
-JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {
-    "exact": lambda residuals: residuals.exact,
-    "central": lambda residuals: residuals.central,
-    "forward": lambda residuals: residuals.forward,
-    "backward": lambda residuals: residuals.backward,
+JACOBIANS: Mapping[str, Callable[[Residuals, Array], Array]] = {
+    "exact": lambda residuals, theta: residuals.exact(theta),
+    "central": lambda residuals, theta: residuals.central(theta),
+    "forward": lambda residuals, theta: residuals.forward(theta),
+    "backward": lambda residuals, theta: residuals.backward(theta),
 }
 
 
@@ -176,9 +176,15 @@ class CaseSearches:
         """Descend from the start of the case."""
         residuals, options, program = self.residuals, self.options, self.program
 
+        match = None
+        if options.good_enough is not None:
+            priors = len(residuals.priors)
+            share = (residuals.samples + priors) / (residuals.count + priors)
+            match = float(options.good_enough.rmse * np.sqrt(share))
+
         def jacobian(theta: Array) -> Array:
             try:
-                return JACOBIANS[options.jacobian](residuals)(theta)
+                return JACOBIANS[options.jacobian](residuals, theta)
             except SimulationError:  # the model has none
                 return np.full((1, 1), np.nan)
 
@@ -188,7 +194,7 @@ class CaseSearches:
                 own,
                 max_iterations=options.most_iterations,
                 jacobian_error=jacobian_error(options.jacobian, options.difference_step),
-                good_enough=self._good_enough,
+                good_enough=match,
                 searches=searches_of(options),
             )
             return own if program is None else program.coarser(own)
@@ -215,15 +221,6 @@ class CaseSearches:
             xtol=tolerance.step,
             matches=None if stop is None else partial(self.residuals.match, rmse=stop.rmse),
         )
-
-    @property
-    def _good_enough(self) -> float | None:
-        """The root mean square of the residuals that the case calls a match, if it does."""
-        if self.options.good_enough is None:
-            return None
-        priors = len(self.residuals.priors)
-        share = (self.residuals.samples + priors) / (self.residuals.count + priors)
-        return float(self.options.good_enough.rmse * np.sqrt(share))
 
     def further(self, earlier: Sequence[estimate.Result]) -> FurtherDescents:
         """Find the minima from further starts, beside earlier descents."""

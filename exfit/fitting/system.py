@@ -33,26 +33,24 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
     where the equations of a user's own model cannot be traced, CaseError where a record lacks a
     signal that drives it.
     """
-    system = _system_of(case, recording)
-    if case.model is not None and case.model.endswith(".py"):
-        _refuse_untraceable(system, case.folder / case.model)
-    return system
-
-
-def _system_of(case: Case, recording: Recording | None) -> System:
     kind, parts = case.kind, case.parts
     if kind.has_exciter and parts.exciter is None:
         raise CaseError([f"{case.path}: model: missing"])
     if parts.exciter is not None:
         _refuse_missing_gates(case, parts.exciter)
+    stabiliser = None
+    if parts.stabiliser is not None and case.stabiliser is not None:
+        listens_to = case.stabiliser.inputs or parts.stabiliser.inputs
+        stabiliser = Stabilised(parts.stabiliser, listens_to)
+    records = [{*file.channels} for file in _record_files(case).values()]
     equipment = Equipment(
         exciter=parts.exciter,
         machine=parts.machine,
         saturation=SATURATION[case.saturation],
         inputs=inputs_of(case, recording),
-        recorded=recorded_in_all(case),
+        recorded=frozenset(set.intersection(*records) if records else ()),
         given=frozenset(case.plant.given),
-        stabiliser=stabilised(case),
+        stabiliser=stabiliser,
         swing=getattr(case.plant, "swing", "power"),
         power_at=getattr(case.plant, "power_at", "recorded-voltage"),
         governor=parts.governor,
@@ -60,13 +58,17 @@ def _system_of(case: Case, recording: Recording | None) -> System:
     )
     if kind.plays_back and parts.exciter is not None:
         _refuse_missing_drivers(case, parts.exciter, equipment.saturation)
-    return kind.build(equipment)
+    system = kind.build(equipment)
+    if case.model is not None and case.model.endswith(".py"):
+        _refuse_untraceable(system, case.folder / case.model)
+    return system
 
 
 def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]:
     """Inputs that the tests and records of a case change; the reference always is one.
 
-    The breaker is one where it opens: in the test of the ``recording``, or else in any.
+    The breaker is one where it opens: in the test of the ``recording``, or else in any; then so is
+    what drives the machine after that.
     """
     changed = {"vref"}
     for test in case.tests:
@@ -76,16 +78,12 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}
-    changed |= _inputs_of_breaker(case, recording)
+    if recording is not None and recording.test.breaker:
+        changed |= {BREAKER, *driving_after_opening(case, recording)}
+    elif recording is None and any(test.breaker for test in case.tests):
+        changed.add(BREAKER)
     inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
-
-
-def _inputs_of_breaker(case: Case, recording: Recording | None) -> set[str]:
-    """Return the breaker where it opens, and what then drives the machine."""
-    if recording is None:
-        return {BREAKER} if any(test.breaker for test in case.tests) else set()
-    return {BREAKER, *driving_after_opening(case, recording)} if recording.test.breaker else set()
 
 
 def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:
@@ -99,20 +97,6 @@ def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:
     driving = () if case.kind.has_exciter else case.kind.driving
     speed = () if breaker.speed == "simulated" else (SPEED,)
     return tuple(signal for signal in (*driving, *speed) if signal in channels)
-
-
-def stabilised(case: Case) -> Stabilised | None:
-    """Return the stabiliser of a case with the signals that it listens to."""
-    model = case.parts.stabiliser
-    if model is None or case.stabiliser is None:
-        return None
-    return Stabilised(model, case.stabiliser.inputs or model.inputs)
-
-
-def recorded_in_all(case: Case) -> frozenset[str]:
-    """Signals in all records of a case."""
-    records = [{*file.channels} for file in _record_files(case).values()]
-    return frozenset(set.intersection(*records) if records else ())
 
 
 def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationForm) -> None:

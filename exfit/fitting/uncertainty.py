@@ -13,14 +13,12 @@ from exfit.dsp.rounding import is_coarse, noise_before_rounding, rounding_waves
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel
-from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference.confidence import (
     CORRELATED,
     TIED,
     Confidence,
-    Uncertainty,
     confidence,
     partners_on_bounds,
     rises,
@@ -162,7 +160,15 @@ def uncertainty_at(
 
 def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> UncertaintyAnalysis:
     """Analyse the uncertainty by a linearisation at theta (N,)."""
-    intervals = within_bounds(confidence(linear), problem.residuals.free)
+    intervals = confidence(linear)
+    within = {**intervals.parameters}
+    for parameter in problem.residuals.free:  # no interval beyond the bounds of its parameter
+        own = within[parameter.name]
+        low, high = own.interval or (None, None)
+        if low is not None and high is not None:
+            cut = max(low, parameter.low), min(high, parameter.high)
+            within[parameter.name] = replace(own, interval=cut)
+    intervals = replace(intervals, parameters=within)
     return UncertaintyAnalysis(
         confidence=intervals,
         identifiability=identifiability(linear, intervals),
@@ -172,19 +178,6 @@ def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> 
         tied_to_bounds=partners_on_bounds(linear, intervals.noise, TIED),
         rises=rises(linear, intervals),
     )
-
-
-def within_bounds(intervals: Confidence, free: Sequence[FreeParameter]) -> Confidence:
-    """Return the same, no interval beyond the bounds of its parameter."""
-
-    def cut(parameter: FreeParameter) -> Uncertainty:
-        own = intervals.parameters[parameter.name]
-        low, high = own.interval or (None, None)
-        if low is None or high is None:
-            return own
-        return replace(own, interval=(max(low, parameter.low), min(high, parameter.high)))
-
-    return replace(intervals, parameters={parameter.name: cut(parameter) for parameter in free})
 
 
 def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
@@ -241,15 +234,13 @@ def linearisation(
         influence=influence,
         curvature=curvature,
         channels=tuple(_channels(residuals, problem.compressed.sizes, errors, slopes)),
-        priors=tuple(_prior_rows(residuals)),
+        priors=tuple(
+            PriorRow(k, prior.mean, prior.std, residuals.noise)
+            for k, prior in residuals.priors.items()
+        ),
         nuisances=tuple(parameter.name in of_record for parameter in free),
         through_zero=tuple(parameter.low < 0.0 < parameter.high for parameter in free),
     )
-
-
-def _prior_rows(residuals: Residuals) -> Iterator[PriorRow]:
-    for k, prior in residuals.priors.items():
-        yield PriorRow(k, prior.mean, prior.std, residuals.noise)
 
 
 def _channels(
@@ -260,22 +251,20 @@ def _channels(
     ``slopes`` (R, N) are the derivatives of the errors, in as many rows or in fewer.
     """
     several = len(residuals.experiments) > 1
-    each = [
-        (experiment, channel)
-        for experiment in residuals.experiments
-        for channel in experiment.channels
-    ]
     places = zip(slices(rows), slices(residuals.sizes), strict=True)
-    for (experiment, channel), (own, samples) in zip(each, places, strict=True):
-        label = f"{experiment.name} {channel.signal}" if several else channel.signal
+    for experiment in residuals.experiments:
         white = experiment.whitening is not None
-        noise = None if white or channel.noise is None else channel.noise * channel.weight
-        block = ResidualBlock(label, own, noise, channel.weight, samples)
-        as_many = own.stop - own.start == samples.stop - samples.start
-        of_record = any(nuisance.signal == channel.signal for nuisance in experiment.nuisances)
-        if channel.plain and as_many and not (of_record or white):
-            block = replace(block, rounding=_rounding(channel, errors[samples], slopes[own]))
-        yield block
+        for channel in experiment.channels:
+            own, samples = next(places)
+            label = f"{experiment.name} {channel.signal}" if several else channel.signal
+            noise = None if white or channel.noise is None else channel.noise * channel.weight
+            block = ResidualBlock(label, own, noise, channel.weight, samples)
+            as_many = own.stop - own.start == samples.stop - samples.start
+            of_record = any(nuisance.signal == channel.signal for nuisance in experiment.nuisances)
+            if channel.plain and as_many and not (of_record or white):
+                rounding = _rounding(channel, errors[samples], slopes[own])
+                block = replace(block, rounding=rounding)
+            yield block
 
 
 def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None:
@@ -301,17 +290,6 @@ def slices(sizes: Sequence[int]) -> list[slice]:
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
 
 
-class TraceEnd(NamedTuple):
-    """End of a parameter's linear interval: all parameters there, scaled (N,).
-
-    ``within``: all of them lie within their bounds.
-    """
-
-    name: str
-    x: Array
-    within: bool
-
-
 def nonlinear_parameters(
     residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis, of_record: Sequence[str]
 ) -> tuple[str, ...]:
@@ -323,13 +301,13 @@ def nonlinear_parameters(
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
-    ends = [end for end in trace_ends(residuals, theta, uncertainty) if end.within]
+    ends = [(name, x) for name, x, within in trace_ends(residuals, theta, uncertainty) if within]
     if not ends:
         return ()
-    rises = residuals.costs([end.x for end in ends]) - half_square(residuals(theta))
-    expected = np.array([uncertainty.rises[end.name] for end in ends])
+    rises = residuals.costs([x for _, x in ends]) - half_square(residuals(theta))
+    expected = np.array([uncertainty.rises[name] for name, _ in ends])
     alike = (rises >= expected / MOST_RISE) & (rises <= expected * MOST_RISE)
-    names = dict.fromkeys(end.name for end, linear in zip(ends, alike, strict=True) if not linear)
+    names = dict.fromkeys(name for (name, _), linear in zip(ends, alike, strict=True) if not linear)
     return tuple(name for name in names if name not in of_record)
 
 
@@ -343,7 +321,8 @@ def not_served_by_linear_theory(
     without an interval, and those that correlate with any of these and so follow it where linear
     theory does not. ``theta`` (N,) is the solution.
     """
-    leaving = {end.name for end in trace_ends(residuals, theta, uncertainty) if not end.within}
+    ends = trace_ends(residuals, theta, uncertainty)
+    leaving = {name for name, _, within in ends if not within}
     failing = {*uncertainty.nonlinear, *uncertainty.leaning_on_bounds, *leaving}
     parameters = uncertainty.confidence.parameters
     failed = np.array([name in failing or not own.determined for name, own in parameters.items()])
@@ -359,17 +338,18 @@ def not_served_by_linear_theory(
 
 def trace_ends(
     residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
-) -> Iterator[TraceEnd]:
-    """Yield both ends of each linear interval, with the other parameters along."""
+) -> Iterator[tuple[str, Array, bool]]:
+    """Yield both ends of each linear interval, with the other parameters along.
+
+    These are scaled (N,); then follows whether all of them lie within their bounds.
+    """
     low, high = residuals.bounds
-    own = np.array([free.slope(float(x)) for free, x in zip(residuals.free, theta, strict=True)])
+    own = slopes_of(residuals, theta)
     covariance = np.nan_to_num(uncertainty.confidence.covariance / np.outer(own, own))
     for k, free in enumerate(residuals.free):
         for limit in uncertainty.confidence.parameters[free.name].interval or ():
             if limit is not None:
                 along = covariance[:, k] / covariance[k, k] * (free.scaled(limit) - theta[k])
                 end = theta + along
-                within = free.low < limit < free.high
-                yield TraceEnd(
-                    free.name, end, within and bool(np.all((end >= low) & (end <= high)))
-                )
+                within = bool(np.all((end >= low) & (end <= high)))
+                yield free.name, end, free.low < limit < free.high and within

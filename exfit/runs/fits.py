@@ -139,13 +139,22 @@ def planned(
     Cases and records are read; raises CaseError with the faults of all of them.
     """
     read: list[Case] = []
+
+    def check_fit(source: Any) -> None:
+        """Read the records of a case; raises ExfitError where no fit could begin."""
+        case = load(source)
+        fitted(case)
+        for recording in case.validations:
+            build_experiment(case, recording, case.values())
+        read.append(case)
+
     files = [case for case in cases if not isinstance(case, Case)]
     faults = [
         *_repeated("case", files, [Path(file).resolve() for file in files]),
         *_repeated("strategy", strategies, strategies),
         *_faults(checked_strategy, strategies),
         *_faults(checked_search, [] if search is None else [search]),
-        *_faults(lambda source: read.append(_ready(load(source))), cases),
+        *_faults(check_fit, cases),
     ]
     if faults:
         raise CaseError(faults)
@@ -156,19 +165,13 @@ def planned(
         for strategy in strategies or [case.estimate.strategy]
     ]
     runs = numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
-    return tuple(
-        PlannedFit(name, case, strategy, _how_far(case, strategies, search), run)
-        for (name, case, strategy), run in zip(combinations, runs, strict=True)
-    )
-
-
-def _how_far(case: Case, strategies: Sequence[str], search: str | None) -> str | None:
-    """Choose how far to search, None: as the case says.
-
-    Several strategies are compared: a search that goes on would lead all of them to one minimum.
-    """
-    asked = search is not None or case.estimate.model_fields_set & {"search", "starts"}
-    return "local" if len(strategies) > 1 and not asked else search
+    plan = []
+    for (name, case, strategy), run in zip(combinations, runs, strict=True):
+        asked = search is not None or case.estimate.model_fields_set & {"search", "starts"}
+        # strategies are compared: a search that goes on would lead all of them to one minimum
+        far = "local" if len(strategies) > 1 and not asked else search
+        plan.append(PlannedFit(name, case, strategy, far, run))
+    return tuple(plan)
 
 
 def run_all(
@@ -184,15 +187,6 @@ def run_all(
         return FitRun(fit.name, fit.case_name, result)
 
     return FitSeries(*run_in_turn(plan, run, finished))
-
-
-def _ready(case: Case) -> Case:
-    """Return a case whose records have been read; raises ExfitError where no fit could begin."""
-    fitted(case)
-    start = case.values()
-    for recording in case.validations:
-        build_experiment(case, recording, start)
-    return case
 
 
 def _faults(check: Callable[[Any], object], subjects: Iterable[object]) -> Iterator[str]:

@@ -94,7 +94,7 @@ def test_exact_and_difference_jacobians_agree(exciter, signals, logarithmic):
     assert exact.shape == (101 * len(signals), len(theta))
     size = np.abs(exact).max(axis=0)
     for kind, tolerance, step in KINDS:
-        got = JACOBIANS[kind](residuals)(theta)
+        got = JACOBIANS[kind](residuals, theta)
         error = np.abs(got - exact).max(axis=0)
         assert (error <= tolerance * size + ROUNDING / step).all(), kind
 
@@ -112,7 +112,7 @@ def test_a_jacobian_at_a_bound_stays_within(exciter):
         )
         exact = residuals.exact(residuals.start)
         for kind, _, step in KINDS:
-            got = JACOBIANS[kind](residuals)(residuals.start)
+            got = JACOBIANS[kind](residuals, residuals.start)
             # at the bound even the central ones are one-sided
             error = np.abs(got - exact).max()
             assert error < 1e-4 * np.abs(exact).max() + ROUNDING / step, kind

@@ -166,7 +166,7 @@ def test_the_step_of_differences_sets_their_error(tmp_path, kind, order):
         settings = {"jacobian": kind, "difference_step": step}
         case = case_of({**config("first_order"), "estimate": settings}, tmp_path)
         residuals = fitted(case)[1].residuals
-        apart = JACOBIANS[kind](residuals)(residuals.start) - residuals.exact(residuals.start)
+        apart = JACOBIANS[kind](residuals, residuals.start) - residuals.exact(residuals.start)
         errors.append(np.linalg.norm(apart))
     assert errors[0] / errors[1] == pytest.approx(2.0**order, rel=0.01)
 
@@ -242,7 +242,7 @@ def test_what_differences_make_of_a_redundant_gain_lies_below_their_error(jacobi
     rng, error = np.random.default_rng(2026), jacobian_error(jacobian, step)
     for _ in range(3):
         theta = residuals.start + 0.05 * rng.uniform(-1.0, 1.0, len(low)) * (high - low)
-        quotients = JACOBIANS[jacobian](residuals)(np.clip(theta, low, high))
+        quotients = JACOBIANS[jacobian](residuals, np.clip(theta, low, high))
         singular = np.linalg.svd(quotients, compute_uv=False)
         # what rounding makes is a third of the error, what the record determines ten times it
         assert singular[-1] < error * singular[0]

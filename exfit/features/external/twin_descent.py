@@ -7,11 +7,10 @@ derivatives of the twin are corrected by that.
 Source: the correction is that of manifold mapping, Echeverria & Hemker 2005.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from exfit import estimate
 from exfit.estimate import half_square
 from exfit.features.external.responders import QUOTIENT_STEP
 from exfit.fitting.descents import Announce, following
-from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -36,20 +34,6 @@ class TwinDoubtedError(Exception):
     """Steps by the derivatives of the twin failed, though they promised a visible gain."""
 
 
-class LinearisedAt(NamedTuple):
-    """A point (N,) with the residuals (M,) and the Jacobian (M, N) that a search uses there."""
-
-    theta: Array
-    residuals: Array
-    jacobian: Array
-
-    def promise(self, theta: Array) -> float:
-        """Share of the cost by which a step to another point lowers the linear model's."""
-        cost = half_square(self.residuals)
-        step = self.residuals + self.jacobian @ (theta - self.theta)
-        return (cost - half_square(step)) / cost if cost > 0.0 else 0.0
-
-
 class ProgramFunctions:
     """Residuals of the program, with the derivatives of its twin and their correction.
 
@@ -62,7 +46,7 @@ class ProgramFunctions:
         self.quotients = 0
         self.best = residuals.start
         self._correction: Array | None = None
-        self._linear: LinearisedAt | None = None
+        self._linear: tuple[Array, Array, Array] | None = None  # where, residuals, Jacobian
         self._lowest, self._corrected_cost, self._failed = inf, inf, 0
 
     @property
@@ -76,17 +60,26 @@ class ProgramFunctions:
         cost = half_square(residuals)
         if cost < self._lowest:
             self.best, self._lowest, self._failed = theta.copy(), cost, 0
-        elif np.isfinite(cost) and self._linear and self._linear.promise(theta) > VISIBLE_GAIN:
+        elif np.isfinite(cost) and self._promise(theta) > VISIBLE_GAIN:
             self._failed += 1
             if self._failed >= FAILED_STEPS and not self.is_corrected:
                 raise TwinDoubtedError
         return residuals
 
+    def _promise(self, theta: Array) -> float:
+        """Share of the cost by which a step to a point (N,) lowers the linear model's."""
+        if self._linear is None:
+            return 0.0
+        here, residuals, jacobian = self._linear
+        cost = half_square(residuals)
+        step = residuals + jacobian @ (theta - here)
+        return (cost - half_square(step)) / cost if cost > 0.0 else 0.0
+
     def jacobian(self, theta: Array) -> Array:
         """Return the Jacobian (M, N) of the twin, corrected."""
         exact = self.residuals_of.exact(theta)
         jacobian = exact if self._correction is None else exact + self._correction
-        self._linear = LinearisedAt(theta.copy(), self.residuals_of(theta), jacobian)
+        self._linear = theta.copy(), self.residuals_of(theta), jacobian
         return jacobian
 
     def correct(self) -> None:
@@ -115,18 +108,12 @@ class ProgramFunctions:
 
         Only then the derivatives of the twin can lead to another end than those of the program.
         """
-        count = self.residuals_of.count
+        channels, count = self.residuals_of.channels, self.residuals_of.count
         own = self.residuals_of(self.best)[:count]
         twin = twin_of(self.residuals_of)(self.best)[:count]
-        moves = np.concatenate(
-            [channel.weight * (channel.record - channel.record[0]) for channel in self._channels]
-        )
-        difference = _rms(own - twin)
-        return difference > max(DISTINCT * _rms(own), NEGLIGIBLE_DIFFERENCE * _rms(moves))
-
-    @property
-    def _channels(self) -> Sequence[Channel]:
-        return self.residuals_of.channels
+        moves = [channel.weight * (channel.record - channel.record[0]) for channel in channels]
+        least = max(DISTINCT * _rms(own), NEGLIGIBLE_DIFFERENCE * _rms(np.concatenate(moves)))
+        return _rms(own - twin) > least
 
 
 def _interrupt(_: estimate.SolverIteration) -> None:
