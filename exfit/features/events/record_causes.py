@@ -76,8 +76,6 @@ STILL_UNLIKE = 0.2  # of the sizes of both: a better one is not right
 
 def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the records of grid events of faults that they show themselves."""
-    if not evidence.case.kind.finds_rest:
-        return
     for record in evidence.records:
         steady = record.steady_until
         if steady is not None:

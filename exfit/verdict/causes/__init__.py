@@ -87,7 +87,7 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     nothing_to_explain = matched or evidence.interrupted
     recognisers = recognisers_of(evidence.case)
     if nothing_to_explain:
-        recognisers = {**ALWAYS, **_of_features("CAUSES_AT_REST")}
+        recognisers = {**ALWAYS, **_of_events("CAUSES_AT_REST", evidence.case)}
     pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
     try:
         for done, recognise in enumerate(recognisers.values()):
@@ -107,13 +107,15 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
 
 def recognisers_of(case: Case) -> Mapping[str, Recogniser]:
     """List what looks for the causes of a misfit in turn, the recorder's last."""
-    at_rest = _of_features("CAUSES_AT_REST")
-    of_events = _of_features("CAUSES_OF_EVENTS") if case.kind.finds_rest else {}
+    at_rest = _of_events("CAUSES_AT_REST", case)
+    of_events = _of_events("CAUSES_OF_EVENTS", case)
     return {**WITHOUT_TRIAL, **at_rest, **of_events, **BY_TRIAL, **AFTER_TRIALS}
 
 
-def _of_features(plug: str) -> Mapping[str, Recogniser]:
-    return {words: part.load() for words, part in parts(plug).items()}
+def _of_events(plug: str, case: Case) -> Mapping[str, Recogniser]:
+    """Load what features add for the case of a grid event; other cases spare the import."""
+    found = parts(plug) if case.kind.finds_rest else {}
+    return {words: part.load() for words, part in found.items()}
 
 
 def _credible(
