@@ -16,8 +16,8 @@ feature is imported before it is used:
     FAULTS    what contradicts itself in a case, by the kind of its plant: given its content and
               its parts
     PICTURES  what draws models: "overview" writes a page of some of them to a folder
-    CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of the misfit of a grid event, by what it
-              looks at; of a match only the former
+    CAUSES_AT_REST, CAUSES_OF_EVENTS  what looks for a cause of the misfit of a grid event, by what
+              it looks at; of a match only the former
 
 The core asks for plugs here and names no feature.
 """
