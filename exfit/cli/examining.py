@@ -24,7 +24,7 @@ def check(case: Path) -> None:
     """
     from exfit import workflows
     from exfit.case.peek import keys_of
-    from exfit.show import checks, terminal
+    from exfit.show import models, terminal
 
     keys = keys_of(case)
     for key, checked in parts("CHECKS").items():
@@ -33,7 +33,7 @@ def check(case: Path) -> None:
                 raise SystemExit(NOT_CONVERGED)
             return
     result = workflows.check(case)
-    terminal.show(terminal.console(), checks.check(result))
+    terminal.show(terminal.console(), models.check(result))
     if not (result.agrees and result.flat):
         raise SystemExit(NOT_CONVERGED)
 

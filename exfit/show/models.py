@@ -1,11 +1,15 @@
-"""The models of the catalogue as blocks."""
+"""The models of the catalogue, and the check of the model of a case, as blocks."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
-from exfit.show.blocks import Block, Note, Table, Verbatim, columns, notes, paragraph, row
+from exfit.show.blocks import Block, Note, Table, Verbatim, columns, notes, paragraph, remarks, row
+
+if TYPE_CHECKING:
+    from exfit.workflows.model_check import Check
 
 EDITION = re.compile(r"421\.5-(\d{4})")
 
@@ -59,3 +63,38 @@ def model(described: Model | Machine) -> Iterator[Block]:
         yield paragraph(f"free in the case of `exfit new`: {', '.join(free)}")
     if described.doubt:
         yield from notes([f"{described.name} {described.doubt}"])
+
+
+def check(result: "Check") -> Iterator[Block]:
+    """Yield the result of a check: derivatives, a flat run, sub-steps, what must be known."""
+    from exfit.workflows.model_check import STEPS
+
+    if not result.has_equations:
+        yield paragraph("without a twin there are no equations to check")
+    elif result.deviations:
+        heads = [*(f"{step:.0e}" for step in STEPS), "best"]
+        rows = (
+            row(name, *(f"{value:.0e}" for value in values), f"{min(values):.1e}")
+            for name, values in result.deviations.items()
+        )
+        title = "exact Jacobian against central differences, relative, by their step"
+        yield Table(columns("parameter", *heads, numbers=heads), tuple(rows), title)
+        agrees = "agree" if result.agrees else "DISAGREE"
+        yield paragraph(f"derivatives {agrees}", "ok" if result.agrees else "bad")
+    else:
+        yield paragraph("no free parameter: no derivative to check")
+    if result.has_equations:
+        stays = "stays" if result.flat else "is NOT"
+        text = f"a run without a step {stays} flat: it drifts by {result.drift:.1e} pu in 60 s"
+        yield paragraph(text, "ok" if result.flat else "bad")
+        yield paragraph(f"sub-steps: {result.substeps} in each step of {result.step:g} s")
+        yield paragraph(f"halving every step moves the response by {result.step_error:.1e} pu")
+        yield paragraph(f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
+    other = "twin" if result.has_equations else "record"
+    for record, differences in result.from_program.items():
+        listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
+        yield paragraph(
+            f"largest difference of program and {other} at the start, {record}: {listed}"
+        )
+    yield from remarks("warning:", result.warnings, kind="warning")
+    yield from notes(result.notes)

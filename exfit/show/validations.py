@@ -1,9 +1,9 @@
 """Records beside simulations, as blocks."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from exfit.dsp.features import LABELS
-from exfit.results.comparisons import Comparison, Excursion
+from exfit.results.comparisons import Comparison, Excursion, StepFeatures
 from exfit.show.blocks import (
     Block,
     Cell,
@@ -26,12 +26,34 @@ def comparisons(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
     if all_of_them:
         yield _errors(all_of_them)
     yield from played(all_of_them)
-    stepped = [
-        match for match in all_of_them if match.features.measured or match.features.simulated
-    ]
-    if stepped:
-        yield _features(stepped)
-        yield from remarks("-", _without(stepped), "faint")
+    stepped = {
+        match.name: match.features
+        for match in all_of_them
+        if match.features.measured or match.features.simulated
+    }
+    if not stepped:
+        return
+    beside = (
+        TableColumn(kind, number=True, group=name, folds=True)
+        for name in stepped
+        for kind in FEATURE_COLUMNS
+    )
+    rows = (
+        row(label, unit, *(cell for each in stepped.values() for cell in each.cells(key)))
+        for label, key, unit in LABELS
+    )
+    yield Table((*columns("step of vt", "unit"), *beside), tuple(rows), leading=2)
+    yield from remarks("-", _without(stepped), "faint")
+
+
+def _without(stepped: Mapping[str, StepFeatures]) -> Iterator[str]:
+    """Name the lines that features are read without, and the features that are missing."""
+    for name, features in stepped.items():
+        if features.measured is not None and features.measured.removed:
+            yield f"{name}: measured without {features.measured.removed}"
+    for name, features in stepped.items():
+        why = {} if features.measured is None else features.measured.why
+        yield from (f"{name}: {label}: {why[key]}" for label, key, _ in LABELS if key in why)
 
 
 def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
@@ -110,32 +132,3 @@ def _errors(matches: Sequence[Comparison]) -> Table:
 
 def _peak(excursion: Excursion | None) -> str:
     return "-" if excursion is None else f"{excursion.value:+.4g}"
-
-
-def _features(matches: Sequence[Comparison]) -> Table:
-    beside = (
-        TableColumn(kind, number=True, group=match.name, folds=True)
-        for match in matches
-        for kind in FEATURE_COLUMNS
-    )
-    rows = (
-        row(
-            label,
-            unit,
-            *(cell for match in matches for cell in match.features.cells(key)),
-        )
-        for label, key, unit in LABELS
-    )
-    return Table((*columns("step of vt", "unit"), *beside), tuple(rows), leading=2)
-
-
-def _without(matches: Iterable[Comparison]) -> Iterator[str]:
-    """Name the lines that features are read without, and the features that are missing."""
-    measured = {match.name: match.features.measured for match in matches}
-    for name, features in measured.items():
-        if features is not None and features.removed:
-            yield f"{name}: measured without {features.removed}"
-    for name, features in measured.items():
-        for label, key, _ in LABELS if features is not None else ():
-            if features is not None and key in features.why:
-                yield f"{name}: {label}: {features.why[key]}"

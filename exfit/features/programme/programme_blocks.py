@@ -7,7 +7,7 @@ from exfit.features.programme.result import EnteredValue, FinishedTest, Programm
 from exfit.features.programme.results_at_rest import MeasuredValue, SaturationResult, VCurve
 from exfit.features.programme.run import CheckedStep
 from exfit.results.model import FitResult
-from exfit.show import checks, fits
+from exfit.show import fits, models
 from exfit.show.blocks import (
     Block,
     Heading,
@@ -55,7 +55,7 @@ def checked_step(checked: CheckedStep) -> Iterator[Block]:
     tests = "" if step.tests in ((), (step.name,)) else f" of {', '.join(step.tests)}"
     yield Heading(f"{step.name}{tests} ({step.kind})")
     if isinstance(checked.outcome, Check):
-        yield from checks.check(checked.outcome)
+        yield from models.check(checked.outcome)
     elif checked.outcome is None:
         yield paragraph(checked.fault, "bad")
     else:

@@ -153,27 +153,15 @@ def widened_by(
     ``size`` is what counts as 100 %; ``names`` are those of the values.
     """
     linear = own.std_error if own.method == "linear" else None
-    share = hypot(linear or 0.0, shift) / size
-    widened = _widened(own, parameter, scaled, shift, share <= UNDETERMINED)
-    if own.interval is None or share <= UNDETERMINED:
-        return widened
-    why = f"is not determined for the errors of {listed(names)}: standard error"
-    return replace(widened, why=f"{why} {digits(100.0 * share)} %")
-
-
-def _widened(
-    own: Uncertainty, parameter: FreeParameter, scaled: float, shift: float, determined: bool
-) -> Uncertainty:
-    """Widen the uncertainty of a parameter by a shift in its own unit.
-
-    It keeps its interval only where it is still ``determined``.
-    """
-    value = parameter.value(scaled)
+    share, value = hypot(linear or 0.0, shift) / size, parameter.value(scaled)
     std_error = None if own.std_error is None else hypot(own.std_error, shift)
     relative = std_error / abs(value) if std_error is not None and value else None
     wider = replace(own, std_error=std_error, relative_error=relative)
-    if own.interval is None or not determined:
-        return replace(wider, interval=None)
+    if own.interval is None:
+        return wider
+    if share > UNDETERMINED:
+        why = f"is not determined for the errors of {listed(names)}: standard error"
+        return replace(wider, interval=None, why=f"{why} {digits(100.0 * share)} %")
     beyond = NORMAL * shift / parameter.slope(scaled)
     bounds = parameter.scaled(parameter.low), parameter.scaled(parameter.high)
 
@@ -200,8 +188,19 @@ def shifts_by_values(
 
     Source: the implicit function theorem on the gradient, with the Gauss-Newton matrix.
     """
-    jacobian = _in_own_units(residuals, theta, deviations)
-    if jacobian is None:
+    given = {name: residuals.fixed[name] for name in deviations}
+    added = [
+        FreeParameter(name, value or deviations[name], -np.inf, np.inf, logarithmic=False)
+        for name, value in given.items()
+    ]
+    fixed = {name: value for name, value in residuals.fixed.items() if name not in given}
+    extended = replace(residuals, free=[*residuals.free, *added], fixed=fixed, counter=None)
+    point = np.array([*theta, *(free.scaled(given[free.name]) for free in added)])
+    try:
+        jacobian = extended.exact(point) / slopes_of(extended, point)  # in their own units
+    except SimulationError:
+        return None
+    if not np.isfinite(jacobian).all():
         return None
     count, values = len(residuals.free), residuals.values(theta)
     own, of_values = jacobian[:, :count], jacobian[:, count:] * [*deviations.values()]
@@ -233,25 +232,6 @@ def _least_squares(matrix: Array, right: Array) -> Array:
     size = np.linalg.norm(own, axis=0)
     size[size == 0.0] = 1.0
     return np.asarray(np.linalg.lstsq(own / size, other)[0] / size[:, None])
-
-
-def _in_own_units(
-    residuals: Residuals, theta: Array, deviations: Mapping[str, float]
-) -> Array | None:
-    """Return the Jacobian by the free parameters and other values, None where not finite."""
-    given = {name: residuals.fixed[name] for name in deviations}
-    added = [
-        FreeParameter(name, value or deviations[name], -np.inf, np.inf, logarithmic=False)
-        for name, value in given.items()
-    ]
-    fixed = {name: value for name, value in residuals.fixed.items() if name not in given}
-    extended = replace(residuals, free=[*residuals.free, *added], fixed=fixed, counter=None)
-    point = np.array([*theta, *(free.scaled(given[free.name]) for free in added)])
-    try:
-        jacobian = extended.exact(point) / slopes_of(extended, point)
-    except SimulationError:
-        return None
-    return jacobian if np.isfinite(jacobian).all() else None
 
 
 def influence_of_typical_values(

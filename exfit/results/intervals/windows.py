@@ -70,22 +70,28 @@ def spread_over_windows(
 
     if case.kind is not MACHINE_PLAYBACK or TPD0 not in {free.name for free in residuals.free}:
         return None
-    estimates = estimates_of_windows(case, setups, residuals, values)
-    if sum(each.kind == "step" for each in estimates) < FEWEST_STEPS:
+    estimates = _estimates_of_all(case, setups, residuals, values)
+    steps = [each for each in estimates if each.kind == "step"]
+    if len(steps) < FEWEST_STEPS:
         return None
     low, high = uncertainty.confidence.parameters[TPD0].interval or (None, None)
     interval = None if low is None or high is None else (low, high)
+    ends = [each.value for each in estimates] + [*(interval or ())]
+    for each in steps:
+        ends += [each.value - NORMAL * each.std_error, each.value + NORMAL * each.std_error]
+    # halves are tested apart from the windows that they are parts of: the smaller counts twice
+    tails = [_tail(steps), *_tail_of_halves(estimates)]
     return WindowSpread(
         name=TPD0,
         unit=case.units()[TPD0],
         windows=tuple(estimates),
-        p_value=p_value_of(estimates),
+        p_value=min(1.0, len(tails) * min(tails)),
         interval=interval,
-        hull=hull_of(estimates, interval),
+        hull=(min(ends), max(ends)),
     )
 
 
-def estimates_of_windows(
+def _estimates_of_all(
     case: Case, setups: Sequence[ExperimentSetup], residuals: Residuals, values: Values
 ) -> list[WindowEstimate]:
     """Return T'd0 by each window of all records, if these hold several steps."""
@@ -94,25 +100,10 @@ def estimates_of_windows(
         for setup, recording in zip(setups, case.recordings, strict=True)
         for window in windows_of(setup)
     ]
-    if len(windows) < FEWEST_STEPS:
-        return []
-    return [
-        by_window
-        for setup, recording, window in windows
-        for by_window in _estimates(case, recording, setup, window, residuals, values)
-    ]
-
-
-def hull_of(
-    estimates: Sequence[WindowEstimate], interval: tuple[float, float] | None
-) -> tuple[float, float]:
-    """Enclose an interval, those by the steps at 95 %, and the values by their halves."""
-    ends = [each.value for each in estimates]
-    for each in estimates:
-        if each.kind == "step":
-            ends += [each.value - NORMAL * each.std_error, each.value + NORMAL * each.std_error]
-    ends += interval or ()
-    return min(ends), max(ends)
+    estimates = list[WindowEstimate]()
+    for setup, recording, window in windows if len(windows) >= FEWEST_STEPS else ():
+        estimates += _estimates(case, recording, setup, window, residuals, values)
+    return estimates
 
 
 def with_spread(
@@ -143,19 +134,14 @@ def windows_of(setup: ExperimentSetup) -> Iterator[Window]:
         before = at
 
 
-def p_value_of(estimates: Sequence[WindowEstimate]) -> float:
-    """Probability that estimates of one value lie so far apart.
-
-    The halves of the windows are tested apart from the windows, of which they are parts: the
-    smaller of two probabilities counts twice.
-    """
-    whole = [each for each in estimates if each.kind == "step"]
+def _tail_of_halves(estimates: Sequence[WindowEstimate]) -> Iterator[float]:
     halves = [each for each in estimates if each.kind != "step"]
-    tails = [_tail(group) for group in (whole, halves) if len(group) >= FEWEST_STEPS]
-    return min(1.0, len(tails) * min(tails))
+    if len(halves) >= FEWEST_STEPS:
+        yield _tail(halves)
 
 
 def _tail(estimates: Sequence[WindowEstimate]) -> float:
+    """Probability that estimates of one value lie so far apart."""
     values = np.array([each.value for each in estimates])
     weights = 1.0 / np.array([each.std_error for each in estimates]) ** 2
     mean = float(weights @ values / np.sum(weights))
