@@ -110,7 +110,7 @@ def fit(
         folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
         fit_again_and_again(case, given, folder, settings, output, verbose)
         return
-    from exfit.verdict.causes.before_fit import case_warnings, event_warnings
+    from exfit.verdict.diagnostics import case_warnings, event_warnings
 
     loaded = given.load(case)
     for warning in (*case_warnings(loaded), *event_warnings(loaded)):

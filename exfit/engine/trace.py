@@ -5,6 +5,7 @@ model written with them: that run is what the compiled one is tested against.
 """
 
 import math
+import operator
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self
 
@@ -15,13 +16,8 @@ from exfit.errors import ModelError
 Signal = Any  # a Node while tracing, else a float or a NumPy array: the operators are the same
 Key = tuple[Any, ...]
 
-ARITHMETIC = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-}
-TRUTHS = ("<", "<=", "&", "|")
+ARITHMETIC = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+TRUTHS = {"<": operator.lt, "<=": operator.le, "&": operator.and_, "|": operator.or_}
 
 
 class Node:
@@ -309,29 +305,20 @@ def evaluate(targets: Iterable[Node], values: Mapping[Node, Any]) -> dict[Node, 
     """
     computed: dict[Node, Any] = dict(values)
     for node in in_order(targets):
-        if node not in computed:
-            computed[node] = _value(node, [computed[operand] for operand in node.operands])
-    return computed
-
-
-def _value(node: Node, args: list[Any]) -> Any:
-    match node.op:
-        case "constant":
-            return node.constant
-        case "+" | "-" | "*" | "/":
+        if node in computed:
+            continue
+        args = [computed[operand] for operand in node.operands]
+        if node.constant is not None:
+            computed[node] = node.constant
+        elif node.op in ARITHMETIC:
             with np.errstate(all="ignore"):
-                return ARITHMETIC[node.op](np.float64(args[0]), args[1])
-        case "<":
-            return args[0] < args[1]
-        case "<=":
-            return args[0] <= args[1]
-        case "&":
-            return args[0] & args[1]
-        case "|":
-            return args[0] | args[1]
-        case "select":
-            return where(*args)
-        case "clip":
-            return clip(*args)
-        case name:
-            return function(name, args[0])
+                computed[node] = ARITHMETIC[node.op](np.float64(args[0]), args[1])
+        elif node.op in TRUTHS:
+            computed[node] = TRUTHS[node.op](*args)
+        elif node.op == "select":
+            computed[node] = where(*args)
+        elif node.op == "clip":
+            computed[node] = clip(*args)
+        else:
+            computed[node] = function(node.op, *args)
+    return computed

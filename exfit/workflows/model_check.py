@@ -14,8 +14,13 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
 from exfit.signals import OF_FLAT_RUN
-from exfit.verdict.causes.before_fit import case_warnings, event_warnings, record_warnings
-from exfit.verdict.diagnostics import diagram_notes, search_range_notes
+from exfit.verdict.diagnostics import (
+    case_warnings,
+    diagram_notes,
+    event_warnings,
+    record_warnings,
+    search_range_notes,
+)
 from exfit.verdict.run_quality import typical_notes, unstable_rest_notes
 from exfit.workflows.responses import FLAT_DRIFT, flat_drift
 

@@ -28,7 +28,7 @@ from exfit.results.validation_result import ValidationResult
 from exfit.util.criteria import Criteria
 from exfit.util.file_names import folded
 from exfit.util.sources import NOT_STATED
-from exfit.verdict.causes.before_fit import causes_before_fit
+from exfit.verdict.diagnostics import causes_before_fit
 from exfit.verdict.run_quality import (
     step_error_notes,
     switching_notes,

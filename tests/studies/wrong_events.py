@@ -25,7 +25,7 @@ from event_files import BAD, FREE, GOOD, bad_file, good_file, noisy, sound_file
 from unit_events import MACHINE, simulated
 
 from exfit.errors import ExfitError
-from exfit.verdict.causes.before_fit import event_warnings
+from exfit.verdict.diagnostics import event_warnings
 
 MODELS = ("AC8B", "AC1A", "ST1A", "SEXS", "EXST1", "AC7B", "DC4B")
 OFF = 0.4  # of the machine's data

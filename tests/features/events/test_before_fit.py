@@ -7,7 +7,7 @@ from unit_events import simulated
 
 from exfit import workflows
 from exfit.errors import ExfitError
-from exfit.verdict.causes.before_fit import event_warnings
+from exfit.verdict.diagnostics import event_warnings
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from step_records import step_record
 
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
-from exfit.verdict.causes.before_fit import case_warnings, record_warnings
+from exfit.verdict.diagnostics import case_warnings, record_warnings
 
 RECORD = step_record(0, length=5.0)  # of AC1A
 COLUMNS = dict(RECORD.table.content)
