@@ -24,7 +24,7 @@ FEW = (
 )  # fmt: skip
 
 # folders whose tests are of the models themselves; elsewhere a law takes a model as an example
-OF_MODELS = {"models", "plants", "planner"}
+OF_MODELS = {"models", "planner"}
 
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)
 hypothesis.settings.register_profile("all", max_examples=100, deadline=None, derandomize=True)

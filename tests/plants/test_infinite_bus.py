@@ -296,6 +296,7 @@ def test_short_times_of_a_stabiliser_ask_for_sub_steps():
 IDLE = {("KPR", "KIR"), ("KPM", "KIM"), ("KPA", "KIA"), ("KP", "KI")}  # a regulator without a gain
 
 
+@pytest.mark.each_model
 def test_slopes_at_rest_have_derivatives_with_one_and_with_two_gains_of_zero(exciter):
     """Without them the sub-steps cannot be counted, and the rest is refused."""
     made = system(MACHINES["GENROU"], exciter=exciter)

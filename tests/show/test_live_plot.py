@@ -187,7 +187,9 @@ def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("jacobian", ["exact", pytest.param("central", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "jacobian", ["exact", pytest.param("central", marks=pytest.mark.every_example)]
+)
 def test_a_look_sees_what_each_iteration_led_to_and_is_not_counted(monkeypatch, tmp_path, jacobian):
     content = config("ac1a_typical")
     content["estimate"] |= {"jacobian": jacobian, "search": "local"}

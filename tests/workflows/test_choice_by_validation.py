@@ -100,7 +100,7 @@ def test_auto_goes_on_from_a_minimum_that_noise_and_validation_exclude():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", examples_of(THESIS, 3))
+@pytest.mark.parametrize("name", examples_of(THESIS, 1))
 def test_an_end_that_auto_trusts_is_the_lowest_and_holds_on_the_validation(name):
     """From the start of the thesis and from random ones; tests/studies/auto.py has more of them."""
     case = load_case(ROOT / "configs" / f"{name}.yaml")

@@ -174,19 +174,19 @@ def test_added_samples_leave_the_simulator_as_it_is(folder, event):
 
 @pytest.mark.long
 def test_intervals_hold_the_truth_and_a_bias_of_many_deviations_goes():
-    """Of 10 records with X''d and T'd0 free: `tests/studies/playback_noise.py` has more.
+    """Of 5 records with X''d and T'd0 free: `tests/studies/playback_noise.py` has more.
 
-    Less than 7 of 10 hold by chance in one of 1000 sets for a parameter; the mean of 10 is known to
-    0.3 deviations, and the bias without weights is 5.
+    Less than 3 of 5 hold by chance in one of 1000 sets for a parameter; the mean of 5 is known to
+    0.45 deviations, and the bias without weights is 5.
     """
     from studies import playback_noise
 
     free = (*playback_noise.FREE, "machine.Xppd", "machine.Tpd0")
-    rows = playback_noise.figures([*playback_noise.fits(10, free)], free)
+    rows = playback_noise.figures([*playback_noise.fits(5, free)], free)
     for name, row in rows.items():
-        assert row["holds"] >= 70.0, name
+        assert row["holds"] >= 60.0, name
         assert abs(row["bias"]) < 1.5, name
-    plain = playback_noise.figures([*playback_noise.fits(3, free, plain=True)], free)
+    plain = playback_noise.figures([*playback_noise.fits(2, free, plain=True)], free)
     assert plain["machine.Xppd"]["bias"] > 3.0
 
 
