@@ -58,11 +58,7 @@ class Columns:
         return self.time_columns or find_clock(self.names, self.stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
-
-        Raises RecordError for a column that is missing or there twice, that holds no numbers or
-        lacks one, and for columns that are not equally long.
-        """
+        """Return columns (M,), nan where a sample is missing in a ``gappy`` one; see RecordTable."""
         columns = self._fetched([*names], gappy)
         for name, column in columns.items():
             if column.dtype.kind != "f":
@@ -70,11 +66,7 @@ class Columns:
         return {name: np.asarray(column, np.float64) for name, column in columns.items()}
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s; of timestamps and epochs, since the first of them.
-
-        ``columns`` are one, or a date and a time of day; ``unit`` is that of numbers: s, ms, us or
-        min. Raises RecordError where it contradicts the file, and where a sample is missing.
-        """
+        """Return the time (M,) in s, of numbers in ``unit`` or of timestamps; see RecordTable."""
         if are_soc(columns):
             return soc_in_seconds(self.path, columns, self.numbers(columns))
         whole = self._fetched(columns, NONE)
@@ -98,14 +90,16 @@ class Columns:
 
     def _fetched(self, names: Sequence[str], gappy: frozenset[str]) -> dict[str, NDArray[Any]]:
         """Fetch columns of one length, which lack no sample where they are not ``gappy``."""
+        places = positions(self.path, self.names, names)
         if self.limit is not None:
-            lengths = dict(zip(self.names, self.lengths, strict=True))
-            self.limit.check_columns([lengths.get(name, 0) for name in names], self.held)
+            self.limit.check_columns([self.lengths[at] for at in places.values()], self.held)
         columns = {}
-        for name, at in positions(self.path, self.names, names).items():
+        for name, at in places.items():
             columns[name] = self.fetch(at)
+            if name in gappy:
+                continue
             lost = np.flatnonzero(np.isnan(columns[name]))  # NaT too
-            if lost.size and name not in gappy:
+            if lost.size:
                 raise column_error(self.place(int(lost[0])), name, "the sample is missing")
         refuse_uneven(self.path, columns)
         return columns

@@ -132,16 +132,14 @@ def read_bytes(path: Path) -> bytes:
 
 def positions(path: Path, names: Sequence[str], wanted: Iterable[str]) -> dict[str, int]:
     """Return the positions of columns; raises RecordError for one that is missing or twice."""
-    places: dict[str, list[int]] = {}
-    for at, name in enumerate(names):
-        places.setdefault(name, []).append(at)
+    places = {name: at for at, name in enumerate(names)}
     for name in (wanted := [*wanted]):
         if name not in places:
             raise RecordError(f"{path}: no column {name!r}; {_columns_like(name, names)}")
-        if len(places[name]) > 1:
-            numbers = " and ".join(str(at + 1) for at in places[name])
+        if len(places) < len(names) and names.count(name) > 1:
+            numbers = " and ".join(str(at) for at, other in enumerate(names, 1) if other == name)
             raise RecordError(f"{path}: {name!r} names more than one column: {numbers}")
-    return {name: places[name][0] for name in wanted}
+    return {name: places[name] for name in wanted}
 
 
 def _columns_like(name: str, names: Sequence[str]) -> str:

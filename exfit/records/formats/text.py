@@ -103,10 +103,7 @@ class TextTable:
         return find_clock(self.names, stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
-
-        Raises RecordError for a column that is not there, and a cell that is no number.
-        """
+        """Return columns (M,), nan where a sample is missing in a ``gappy`` one; see RecordTable."""
         names = [*names]
         self.limit.check_columns([self._count] * len(names), len(self.text.data))
         places = positions(self.path, self.names, names)
@@ -131,11 +128,7 @@ class TextTable:
         return {name: data[:, at] for at, name in enumerate(places)}
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s; of timestamps and epochs, since the first of them.
-
-        ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
-        RecordError where it contradicts the file, or a cell is neither number nor timestamp.
-        """
+        """Return the time (M,) in s, of numbers in ``unit`` or of timestamps; see RecordTable."""
         places = positions(self.path, self.names, columns)
         if are_soc(columns):
             return soc_in_seconds(self.path, columns, self.numbers(columns))
