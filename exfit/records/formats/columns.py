@@ -58,7 +58,7 @@ class Columns:
         return self.time_columns or find_clock(self.names, self.stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,), nan where a sample is missing in a ``gappy`` one; see RecordTable."""
+        """Return columns (M,), nan for samples that a ``gappy`` one lacks; see RecordTable."""
         columns = self._fetched([*names], gappy)
         for name, column in columns.items():
             if column.dtype.kind != "f":

@@ -103,7 +103,7 @@ class TextTable:
         return find_clock(self.names, stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,), nan where a sample is missing in a ``gappy`` one; see RecordTable."""
+        """Return columns (M,), nan for samples that a ``gappy`` one lacks; see RecordTable."""
         names = [*names]
         self.limit.check_columns([self._count] * len(names), len(self.text.data))
         places = positions(self.path, self.names, names)
