@@ -14,7 +14,7 @@ from exfit.estimate import Descent, spread
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import Way
 from exfit.fitting.problem import FitProblem, compressed
-from exfit.fitting.residuals import Residuals, SideBySide, SimulationCounter
+from exfit.fitting.residuals import Residuals, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.simulation.simulator import Simulator
@@ -81,7 +81,7 @@ def further_starts(
 def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> Descent:
     """Return the descent of a further start on the case's own grid."""
     return Descent(
-        functions=SideBySide(problem.compressed.counted_by(counter)),
+        functions=problem.compressed.counted_by(counter),
         bounds=problem.residuals.bounds,
         method=DEFAULT_STRATEGY,
         max_iterations=MOST_ITERATIONS,
@@ -100,7 +100,7 @@ def legs_of(residuals: Residuals, own: Descent) -> tuple[tuple[Descent, ...], st
 
     def leg(form: Residuals, method: str, iterations: int) -> Descent:
         return Descent(
-            functions=SideBySide(compressed(form)),
+            functions=compressed(form),
             bounds=own.bounds,
             method=method,
             max_iterations=iterations,

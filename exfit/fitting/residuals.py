@@ -163,7 +163,7 @@ class Residuals:
 
     def __call__(self, theta: Array) -> Array:
         """Return the residuals (samples + priors,)."""
-        return self.of_many([theta])[0]
+        return self.residuals([theta])[0]
 
     def errors(self, theta: Array) -> tuple[Array, Array]:
         """Return the weighted errors (samples,) and their exact derivatives (samples, N).
@@ -248,7 +248,7 @@ class Residuals:
         count = len(theta)
         return np.asarray((columns[:, count:] - columns[:, :count]) / (up - down))
 
-    def of_many(self, points: Sequence[Array]) -> list[Array]:
+    def residuals(self, points: Sequence[Array]) -> list[Array]:
         """Return the residuals at each of points (N,), infinite where there are none.
 
         They run side by side; those of a point do not depend on what the others are.
@@ -259,10 +259,13 @@ class Residuals:
     def costs(self, points: Sequence[Array]) -> Array:
         """Return half the sum of squares at each of points (N,), infinite where there are none."""
         with np.errstate(over="ignore"):
-            return np.array([half_square(residuals) for residuals in self.of_many(points)])
+            return np.array([half_square(residuals) for residuals in self.residuals(points)])
 
-    def exact_of_many(self, points: Sequence[Array]) -> list[Array]:
-        """Return the exact Jacobian at each of points (N,), nan where there is none."""
+    def jacobians(self, points: Sequence[Array]) -> list[Array]:
+        """Return the exact Jacobian at each of points (N,), nan where there is none.
+
+        They too run side by side, as searches in lock-step ask for them.
+        """
         at_once = max(1, MOST_NUMBERS_AT_ONCE // (self.count * max(1, len(self.free))))
         return [
             jacobian
@@ -365,18 +368,3 @@ class Residuals:
 def _stacked(blocks: Sequence[Array], axis: int = 0) -> Array:
     """Return the blocks of all records as one, without a copy of a single one."""
     return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=axis)
-
-
-@dataclass(frozen=True, eq=False)
-class SideBySide:
-    """Residuals and Jacobians of many points at once, as searches in lock-step ask for them."""
-
-    residuals_of: Residuals
-
-    def residuals(self, points: Sequence[Array]) -> Sequence[Array]:
-        """Return the residuals (M,) at each of points (N,)."""
-        return self.residuals_of.of_many(points)
-
-    def jacobians(self, points: Sequence[Array]) -> Sequence[Array]:
-        """Return the Jacobian (M, N) at each of points (N,)."""
-        return self.residuals_of.exact_of_many(points)

@@ -18,7 +18,6 @@ from rich.table import Table
 from exfit import estimate
 from exfit.case.load import load_case
 from exfit.fitting.parameters import UNIT
-from exfit.fitting.residuals import SideBySide
 from exfit.fitting.search import fitted, names_of_records, search
 from exfit.fitting.uncertainty import uncertainty_at
 
@@ -69,7 +68,7 @@ def main():
 
         def profiled(points, workers, residuals=residuals, x=x, rises=rises):
             """Return how often functions were called, processor and elapsed time."""
-            functions = Counted(SideBySide(residuals))
+            functions = Counted(residuals)
             began, used = time.perf_counter(), time.process_time()
             estimate.profiles(
                 functions, x, rises, residuals.bounds, points=points, workers=workers, x_scale=UNIT

@@ -81,7 +81,7 @@ def test_no_limit_matters(large_steps):
 def test_sets_side_by_side_have_the_linear_response_as_well(large_steps):
     linear = linear_form(large_steps)
     points = linear.start + np.array([[0.0], [0.1]])
-    for point, errors in zip(points, linear.of_many(points), strict=True):
+    for point, errors in zip(points, linear.residuals(points), strict=True):
         assert errors == pytest.approx(linear(point), abs=ENLARGED_ROUNDING)
 
 

@@ -123,7 +123,7 @@ def test_differences_of_what_moves_are_those_of_runs_one_by_one(everything_open)
     """An experiment with moving steps cannot be run side by side; the residuals are the same."""
     residuals = everything_open
     points = residuals.start + np.array([[0.0], [1e-3]])
-    costs = [0.5 * float(errors @ errors) for errors in residuals.of_many(points)]
+    costs = [0.5 * float(errors @ errors) for errors in residuals.residuals(points)]
     one_by_one = [0.5 * float(np.sum(residuals(point) ** 2)) for point in points]
     assert costs == pytest.approx(one_by_one, rel=1e-12)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from discrete_models import Data, Model, arx, instrumental, regressors, transferred
 from frequency_weights import Weighted, Whitened, equal, least_spread, weighted
-from related_work import SideBySide, descended, each, figures, lowest_cost, matched, subject
+from related_work import descended, each, figures, lowest_cost, matched, subject
 from stochastic_approximation import recursive_gauss_newton, robbins_monro, spsa
 
 INTERVAL = 0.01  # s
@@ -85,7 +85,7 @@ def test_blocks_of_a_unit_without_noise_have_its_parameters():
 
 def test_equal_weights_in_the_frequency_domain_are_least_squares_in_time():
     residuals = coloured().residuals
-    own = SideBySide(residuals)
+    own = residuals
     in_time, slopes = own.residuals([residuals.start])[0], own.jacobians([residuals.start])[0]
     by_frequency = Weighted(own, equal(in_time))
     errors, tilted = (

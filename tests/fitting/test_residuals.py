@@ -256,7 +256,7 @@ def test_a_tie_without_a_value_costs_infinity_and_has_no_derivative():
     residuals = with_extras("AC1A", [first, *plain.free[2:]], ties)
     below = residuals.start - np.eye(len(residuals.free))[0] * 0.1
     assert np.all(residuals(below) == np.inf)
-    assert np.isinf(residuals.of_many([below])[0]).all()
+    assert np.isinf(residuals.residuals([below])[0]).all()
     for jacobian in (residuals.exact, residuals.central):
         with pytest.raises(SimulationError, match=re.escape(f"({first.name}-")):
             jacobian(residuals.start)

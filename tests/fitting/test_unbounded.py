@@ -267,7 +267,7 @@ def test_what_a_model_refuses_costs_infinity(found):
     for refused in ([0.0, 0.02, 1.0], [300.0, -0.02, 1.0], [300.0, 0.02, -1.0], [300.0, 0.02, 0.0]):
         assert np.isinf(residuals(np.array(refused))).all(), refused
     for point in ([-5.0, 0.02, 1.0], [300.0, 0.0, 1.0]):
-        assert residuals.of_many([np.array(point)])[0].shape == (residuals.count,)
+        assert residuals.residuals([np.array(point)])[0].shape == (residuals.count,)
     # the points of a difference do not cross 0
     tiny = np.array([300.0, 2e-4, 1.0])
     steep = replace(residuals, difference_step=1e-3)

@@ -24,7 +24,7 @@ from exfit.estimate import Descent
 from exfit.estimate.starts import multistart, spread
 from exfit.fitting.further_starts import legs_of
 from exfit.fitting.parameters import UNIT
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO, fitted, search
 from exfit.simulation.simulator import Simulator
 from exfit.workflows.given_values import with_values
@@ -108,7 +108,7 @@ def descents(name: str, count: int) -> tuple[Residuals, dict[tuple[str, str], np
     residuals = residuals_named(name)
     points = {"Sobol": spread(residuals.bounds, count), "uniform": uniform(residuals.bounds, count)}
     own = Descent(
-        functions=SideBySide(residuals),
+        functions=residuals,
         bounds=residuals.bounds,
         method="dgn",
         ftol=1e-8,

@@ -11,7 +11,6 @@ from coverage_cases import covariance_of, truth_of
 from exfit.estimate import Descent
 from exfit.estimate.lockstep import finish_all
 from exfit.fitting.parameters import UNIT
-from exfit.fitting.residuals import SideBySide
 
 CHI_SQUARE = 3.841  # of one degree of freedom, 95 %
 OVER_BOUNDS, NEAR, ABOUT_PRINTED = 9, 15, 15  # values
@@ -32,7 +31,7 @@ def dense_intervals(name, problem, search, printed):
     starts = [search.best.x, truth, *(m.x for m in minima if m.cost < highest)]
     likely = np.array(starts)
     low, high = residuals.bounds
-    functions, descents, places = SideBySide(residuals), [], []
+    functions, descents, places = residuals, [], []
     for k in range(len(truth)):
         about = ends_of(printed[residuals.free[k].name], residuals.free[k], low[k], high[k])
         for value in values_of(likely[:, k], errors[k], about, low[k], high[k]):

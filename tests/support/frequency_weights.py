@@ -15,7 +15,6 @@ from related_work import (
     Estimate,
     Functions,
     Residuals,
-    SideBySide,
     descent,
     linear_form,
     local,
@@ -93,7 +92,7 @@ def weighted(weighting: Weighting) -> Callable[[Residuals, np.ndarray], Estimate
         stages = [matched(record, start)]
         stages.append(local(record, stages[0].point))
         for _ in range(ROUNDS):
-            functions = Weighted(SideBySide(record), weighting(record(stages[-1].point)))
+            functions = Weighted(record, weighting(record(stages[-1].point)))
             stages.append(descent(functions, stages[-1].point, record.bounds))
         return Estimate(stages[-1].point, sum(stage.simulations for stage in stages))
 
@@ -126,7 +125,7 @@ def whitened_in_time(record: Residuals, start: np.ndarray) -> Estimate:
     stages = [matched(record, start)]
     stages.append(local(record, stages[0].point))
     for _ in range(ROUNDS):
-        functions = Whitened(SideBySide(record), repeated_share(record(stages[-1].point)))
+        functions = Whitened(record, repeated_share(record(stages[-1].point)))
         stages.append(descent(functions, stages[-1].point, record.bounds))
     return Estimate(stages[-1].point, sum(stage.simulations for stage in stages))
 
@@ -138,7 +137,7 @@ def curve(highest: float) -> Callable[[Residuals, np.ndarray], Estimate]:
         times = record.experiments[0].simulator.times
         frequency = np.fft.rfftfreq(len(times), times[1] - times[0])
         within = ((frequency > 0.0) & (frequency <= highest)).astype(float)
-        functions = Weighted(SideBySide(linear_form(record)), within, differenced=True)
+        functions = Weighted(linear_form(record), within, differenced=True)
         return descent(functions, start, record.bounds)
 
     return estimate

@@ -20,7 +20,7 @@ from exfit.estimate import Descent, Functions, spread
 from exfit.estimate.solver import NotFinite
 from exfit.fitting.further_starts import coarse_form, linear_form
 from exfit.fitting.parameters import UNIT
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO, fitted
 
 STARTS, DRAWS, SEED = 64, 200, 2026
@@ -100,7 +100,7 @@ def with_samples(residuals: Residuals, measured: np.ndarray) -> Residuals:
 def errors_of(records: Sequence[Residuals], points: np.ndarray) -> np.ndarray:
     """Return the errors (K, M) of K records of one test, each at a point of its own, in one go."""
     measured = np.array([samples(record) for record in records])
-    return np.array(records[0].of_many([*points])) + measured[0] - measured
+    return np.array(records[0].residuals([*points])) + measured[0] - measured
 
 
 def descent(
@@ -124,12 +124,12 @@ def descent(
 
 def local(record: Residuals, start: np.ndarray) -> Estimate:
     """Return the descent on a record from a start."""
-    return descent(SideBySide(record), start, record.bounds)
+    return descent(record, start, record.bounds)
 
 
 def matched(record: Residuals, start: np.ndarray) -> Estimate:
     """Return where the small-signal response of the model matches a record, from a start."""
-    return descent(SideBySide(linear_form(record)), start, record.bounds, "lm", LINEAR_ITERATIONS)
+    return descent(linear_form(record), start, record.bounds, "lm", LINEAR_ITERATIONS)
 
 
 def each(estimate: Callable[[Residuals, np.ndarray], Estimate]) -> Method:

@@ -75,8 +75,8 @@ def some_samples(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return errors (K, m) and derivatives (K, m, N) of samples drawn at random."""
     measured = np.array([samples(record) for record in records])
-    errors = np.array(records[0].of_many([*points])) + measured[0] - measured
-    slopes = np.array(records[0].exact_of_many([*points]))
+    errors = np.array(records[0].residuals([*points])) + measured[0] - measured
+    slopes = np.array(records[0].jacobians([*points]))
     chosen = rng.choice(errors.shape[1], int(PORTION * errors.shape[1]), replace=False)
     return errors[:, chosen], slopes[:, chosen]
 

@@ -37,7 +37,7 @@ from exfit.features.translate.steps import (
     translation_task,
 )
 from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.residuals import Residuals
 from exfit.models import MODELS, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.counterparts import has_effect
@@ -214,7 +214,7 @@ def _fitted(
     experiments = [step.experiment(task.target, at) for step in task.fitted]
     residuals = Residuals(experiments, free, fixed)
     descent = estimate.Descent(
-        functions=SideBySide(residuals),
+        functions=residuals,
         bounds=residuals.bounds,
         max_iterations=ITERATIONS,
         ftol=LEAST_GAIN,

@@ -21,7 +21,7 @@ from exfit.fitting.experiment import Experiment, ExperimentSetup
 from exfit.fitting.global_search import AT_TOLERANCE, SearchResult
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
 from exfit.fitting.uncertainty import (
     UncertaintyAnalysis,
@@ -288,7 +288,7 @@ def profiles_about(
             continue
         known = None if minimum is solution else estimate.LowerMinimum(solution.cost, limits)
         about_minimum = estimate.profiles(
-            SideBySide(residuals),
+            residuals,
             minimum.x,
             within,
             residuals.bounds,
@@ -373,7 +373,7 @@ def free_instants(problem: FitProblem) -> Iterator[FreeInstant]:
 
 def minima_between_samples(problem: FitProblem, x: Array) -> list[FoundMinimum]:
     """Return the minima (N,) near a solution x (N,), two of each interval between samples."""
-    functions, (low, high) = SideBySide(problem.compressed), problem.compressed.bounds
+    functions, (low, high) = problem.compressed, problem.compressed.bounds
     descents = []
     for instant in free_instants(problem):
         parameter, k = problem.residuals.free[instant.place], instant.place

@@ -13,7 +13,7 @@ import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.features.design.experiment_design import identify
-from exfit.features.external.twin_descent import ProgramFunctions
+from exfit.features.external.case_program import ProgramFunctions
 from exfit.results.tables import parameter_file
 from exfit.workflows import check, profile, validation_result
 
