@@ -1,14 +1,18 @@
 """What was fitted to what: the tests, the models with their data sheets; what the fit does."""
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from math import nan
 from typing import Annotated, NamedTuple
 
+from exfit import __version__
 from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
 from exfit.simulation.small_signal import SmallSignal
 from exfit.util.sources import NOT_STATED, TYPICAL
 
+LIBRARIES = ("numpy", "llvmlite", "pydantic")
 # their parameters are named machine.Tpd0
 PARTS = (
     *("machine", "network", "stabiliser", "governor"),
@@ -77,14 +81,6 @@ class UnitDescription:
     parts: tuple[PartDescription, ...] = ()
     values: Mapping[str, float] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
-
-    def values_of(self, prefix: str) -> dict[str, float]:
-        """Return the values whose names begin so, by what follows."""
-        return {
-            name.removeprefix(prefix): value
-            for name, value in self.values.items()
-            if name.startswith(prefix)
-        }
 
 
 @dataclass(frozen=True)
@@ -179,3 +175,12 @@ def source_in_words(name: str, sources: Mapping[str, str], ties: Mapping[str, st
     if name not in ties:
         return word
     return f"tied {ties[name]}" + (f", {TYPICAL}" if word == TYPICAL else "")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    return {
+        "exfit": __version__,
+        "python": ".".join(map(str, sys.version_info[:3])),
+        **{name: import_module(name).__version__ for name in LIBRARIES},
+    }

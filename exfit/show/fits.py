@@ -79,8 +79,13 @@ def _brief(
         yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
     if folder is not None:
         shown = quote(folder.as_posix())
-        yield paragraph(f"written to {folder}; all of it: `exfit show --all {shown}`")
+        yield paragraph(f"{written_to(folder)}; all of it: `exfit show --all {shown}`")
     yield verdict(result)
+
+
+def written_to(folder: Path) -> str:
+    """Say where files are: a path stays in one line, whatever blanks it has."""
+    return f"written to {folder}".replace(" ", NO_BREAK)
 
 
 def whole(
@@ -130,7 +135,7 @@ def whole(
     yield from rejections(result.validation)
     yield from _causes(result)
     if folder is not None:
-        yield paragraph(f"written to {folder}")
+        yield paragraph(written_to(folder))
     yield verdict(result)
 
 

@@ -204,8 +204,8 @@ def validation_result(
     fitted then. ``sources`` says where values come from that are given by name.
     """
     from exfit.fitting.program import program_of
+    from exfit.results.description import versions
     from exfit.results.model import FitResult
-    from exfit.util.versions import versions
     from exfit.workflows import validation
     from exfit.workflows.validation import validation_result
 

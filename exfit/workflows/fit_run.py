@@ -19,7 +19,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Uncertainty
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
-from exfit.results.description import Behaviour
+from exfit.results.description import Behaviour, versions
 from exfit.results.influences import RecorderAverages, TypicalValue, WindowSpread, by_weight
 from exfit.results.intervals.averages import allowing_for_averages, recorder_averages
 from exfit.results.intervals.minima import minima_notes, minima_of
@@ -33,7 +33,6 @@ from exfit.results.intervals.value_errors import (
 from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.util.criteria import Criteria
-from exfit.util.versions import versions
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.causes.evidence import time_for_causes
 from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tolerance_notes

@@ -18,7 +18,7 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.report.page import html
-from exfit.results import io as fit_files
+from exfit.results import io
 from exfit.results.io import load_result
 from exfit.results.tables import DIGITS, parameter_file, table
 from exfit.show import figure_files, run_folder
@@ -334,13 +334,13 @@ def test_an_interruption_while_drawing_leaves_the_numbers_and_nothing_half(twice
 def test_an_interruption_while_the_numbers_are_made_waits_for_all_of_them(twice, monkeypatch):
     result, folder = twice
     former = signal.signal(signal.SIGINT, signal.default_int_handler)
-    make = fit_files.history_table
+    make = io.history_table
 
     def interrupted(result):
         signal.raise_signal(signal.SIGINT)
         return make(result)
 
-    monkeypatch.setattr(fit_files, "history_table", interrupted)
+    monkeypatch.setattr(io, "history_table", interrupted)
     try:
         with pytest.raises(KeyboardInterrupt):
             run_folder.write_fit(result, folder).draw()

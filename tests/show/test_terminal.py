@@ -87,6 +87,15 @@ def test_the_verdict_comes_last_below_its_causes_whole_and_once(missed, width):
     assert max(map(len, lines[causes:])) <= width
 
 
+@pytest.mark.parametrize("width", range(40, 121, 8))
+def test_a_folder_stays_in_one_line_whatever_blanks_its_name_has(missed, width):
+    folder = Path("runs of the second unit", "as it was")
+    for blocks in (fits.whole(missed, folder), next(fits.briefs(missed, folder))):
+        stream = io.StringIO()
+        terminal.show(Console(file=stream, width=width, force_terminal=True), blocks)
+        assert str(folder) in stream.getvalue()
+
+
 @pytest.mark.parametrize("width", [40, 80])
 @pytest.mark.parametrize("count", [1, 9, 40])
 def test_in_brief_a_fit_has_thirty_lines_at_most_and_the_verdict_last(missed, width, count):

@@ -13,7 +13,7 @@ from exfit.features.report.words import DASH, number
 from exfit.models.families import family_of
 from exfit.results import facts
 from exfit.results.criteria import judged_by_criteria
-from exfit.results.description import PartDescription, RecordedTest
+from exfit.results.description import PartDescription, RecordedTest, values_of_part
 from exfit.results.facts import AskedFact, answer, stated
 from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported, ValidationResult
@@ -182,7 +182,7 @@ def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
     answers = FormAnswers(
         responses=silent,
         parts=unit.parts,
-        machine=unit.values_of("machine."),
+        machine=values_of_part(unit.values, "machine."),
         source_of=lambda name: unit.sources.get(name, NOT_STATED),
         excitation=silent,
         before=silent,
