@@ -3,25 +3,29 @@
 A shell calls it at every press of a key: nothing heavy is imported, and nothing can fail.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from itertools import chain
 from pathlib import Path
 
 import click
 
-
-def models(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    """Return the names of all models of the catalogue, in upper or lower case."""
-    from exfit.models import GOVERNORS, LIMITERS, MACHINE_NAMES, MODELS, STABILISERS
-
-    names = (*MODELS, *MACHINE_NAMES, *STABILISERS, *GOVERNORS, *LIMITERS)
-    return _beginning(names, incomplete.upper())
+Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
 
-def exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    """Return the names of exciters, in upper or lower case."""
-    from exfit.models import MODELS
+def names_of(*shelves: str) -> Completion:
+    """Complete the names of models on shelves of `exfit.models`, in upper or lower case."""
 
-    return _beginning(MODELS, incomplete.upper())
+    def completed(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+        catalogue = vars(import_module("exfit.models"))
+        names = chain.from_iterable(catalogue[shelf] for shelf in shelves)
+        return _beginning(names, incomplete.upper())
+
+    return completed
+
+
+models = names_of("MODELS", "MACHINE_NAMES", "STABILISERS", "GOVERNORS", "LIMITERS")
+exciters, machines = names_of("MODELS"), names_of("MACHINE_NAMES")
 
 
 def several_exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
@@ -32,13 +36,6 @@ def several_exciters(_: click.Context, __: click.Parameter, incomplete: str) -> 
     taken = given.upper().split(",")
     names = _beginning((name for name in MODELS if name not in taken), last.upper())
     return [f"{given}{comma}{name}" for name in names]
-
-
-def machines(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    """Return the names of machines, in upper or lower case."""
-    from exfit.models import MACHINE_NAMES
-
-    return _beginning(MACHINE_NAMES, incomplete.upper())
 
 
 def free_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:

@@ -231,8 +231,7 @@ def fit_several(
     if output.shown:
         terminal.written(console, folder)
     output.draw(of_all)
-    if output.figures:
-        draw_each(figures, output)
+    draw_each(figures, output)
     if series.failed:
         raise FileError(f"{name}: {fault}" for name, fault in series.failed.items())
     if not series.all_hold:
@@ -269,6 +268,8 @@ def run_planned(
 
 def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
     """Draw the figures of each fit, with a line for each fit where results are shown."""
+    if not output.figures:
+        return
     left = [*figures]
     try:
         for name, of_fit in figures.items():

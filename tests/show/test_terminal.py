@@ -12,10 +12,9 @@ from pages import Page
 from rich.console import Console
 
 from exfit import workflows
-from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.folder import Fleet, summary_of
 from exfit.features.fleet.page import fleet_page
 from exfit.features.fleet.sisters import sisters
-from exfit.features.fleet.summary import summary_of
 from exfit.features.report.page import html as report_html
 from exfit.results.verdict import MATCHES, MISSES, Cause, Verdict
 from exfit.show import fits, terminal

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from saturation_curves import QUANTITIES, drawn_curve, hits_of, shares
 
-from exfit.features.programme.saturation_forms import EXCESS
+from exfit.features.programme.saturation import EXCESS
 
 COUNT = 200
 SEED = 2026

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from exfit.features.fleet.folder import Fleet
-from exfit.features.fleet.summary import (
+from exfit.features.fleet.folder import (
     CaseSummary,
+    Fleet,
     SummaryCurve,
     SummaryParameter,
     SummaryValidation,

@@ -174,10 +174,10 @@ def _of_a_batch() -> Mapping[str, bytes]:
         Failure,
         IndexEntry,
         prepare_folder,
+        summary_of,
         write_entry,
         write_outcome,
     )
-    from exfit.features.fleet.summary import summary_of
     from exfit.results.io import load_result
 
     done, failed = "0" * 31 + "1", "0" * 31 + "2"

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.features.programme.results_at_rest import SaturationForm
-from exfit.features.programme.saturation import saturation_curve
-from exfit.features.programme.saturation_forms import EXCESS
+from exfit.features.programme.result import SaturationForm
+from exfit.features.programme.saturation import EXCESS, saturation_curve
 
 Array = NDArray[np.float64]
 

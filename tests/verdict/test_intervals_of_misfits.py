@@ -11,10 +11,9 @@ from rich.console import Console
 from tiers import few_of
 
 from exfit import workflows
-from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.folder import Fleet, summary_of
 from exfit.features.fleet.page import fleet_page
 from exfit.features.fleet.sisters import sisters
-from exfit.features.fleet.summary import summary_of
 from exfit.features.fleet.table import fleet_table, parameter_table
 from exfit.features.report.page import html as report_html
 from exfit.results.verdict import MISSES, NO_MATCH

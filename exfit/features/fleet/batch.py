@@ -11,6 +11,7 @@ from types import MappingProxyType
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import (
     CaseOutcome,
+    CaseSummary,
     Fleet,
     IndexEntry,
     case_name,
@@ -28,12 +29,10 @@ from exfit.features.fleet.local import Compute, in_this_process, local_workers
 from exfit.features.fleet.plan import (
     BatchSettings,
     PlannedCase,
-    Share,
     case_files,
     planned_case,
     share_of,
 )
-from exfit.features.fleet.summary import CaseSummary
 from exfit.features.fleet.task import FurtherFiles
 from exfit.runs.runner import FitSettings
 from exfit.util.interrupts import endings_as_interruptions
@@ -125,11 +124,11 @@ def batch(
         >>> {case.name: case.verdict for case in fleet.cases}
     """
     given = [cases] if isinstance(cases, str | PathLike) else [*cases]
-    place, share = Path(folder), Share(*part)
-    _refuse(share, workers, time_limit, strategy, search)
+    place = Path(folder)
+    _refuse(part, workers, time_limit, strategy, search)
     existing = case_files(map(Path, given), place) if given or not made else ()
     each_once = {case_name(place, file): file for file in (*existing, *made)}
-    files = share_of([*each_once.values()], share, place)
+    files = share_of([*each_once.values()], part, place)
     settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
     run = BatchRun(files, place, settings, observer or BatchObserver(), made)
     count = min(workers or processors(), max(1, len(files)))
@@ -150,12 +149,16 @@ def batch(
 
 
 def _refuse(
-    share: Share, workers: int | None, time_limit: float, strategy: str | None, search: str | None
+    part: tuple[int, int],
+    workers: int | None,
+    time_limit: float,
+    strategy: str | None,
+    search: str | None,
 ) -> None:
     """Raise ExfitError with all that is wrong with the arguments of a batch."""
-    faults = []
-    if not 1 <= share.number <= share.of:
-        faults.append(f"part {share.number}/{share.of}: must be 1/N ... N/N")
+    faults, (number, of) = [], part
+    if not 1 <= number <= of:
+        faults.append(f"part {number}/{of}: must be 1/N ... N/N")
     if workers is not None and workers < 0:
         faults.append(f"workers: {workers} must be 0 or more")
     if not 0.0 < time_limit <= inf:

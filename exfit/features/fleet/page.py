@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.sampling import kept_rows
-from exfit.features.fleet.folder import FAILED, Fleet
+from exfit.features.fleet.folder import FAILED, CaseSummary, Fleet, SummaryCurve, SummaryParameter
 from exfit.features.fleet.sisters import OUTLIER, SisterGroup, SisterValue, missing_interval
-from exfit.features.fleet.summary import CaseSummary, SummaryCurve, SummaryParameter
 from exfit.features.report.page import TEMPLATES, environment
 from exfit.inference.outliers import FEWEST, LEVEL
 from exfit.results.side_by_side import NOT_ACCEPTED

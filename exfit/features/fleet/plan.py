@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 from exfit.case.peek import command_of, content_of, files_in, fmu_of
 from exfit.case.yaml import decoded, open_places
 from exfit.errors import CaseError, ExfitError, FileError
-from exfit.features.fleet.folder import IndexEntry, case_name
-from exfit.features.fleet.summary import facts_of
+from exfit.features.fleet.folder import IndexEntry, case_name, facts_of
 from exfit.features.fleet.task import CODE, CaseTask, FurtherFiles, key_of
 from exfit.runs.runner import FitSettings
 from exfit.util.files import read_regular, refuse_bytes
@@ -23,13 +22,6 @@ SUFFIXES = (".yaml", ".yml")
 KEYS_OF_CASES = frozenset({"plant", "test", "record", "records", "tests"})
 WITH_RECORD = frozenset({"record", "records", "tests"})
 NO_RECORD = "nothing to fit: the case has no record"
-
-
-class Share(NamedTuple):
-    """A share of the cases: the ``number`` th, from 1, of so many."""
-
-    number: int = 1
-    of: int = 1
 
 
 @dataclass(frozen=True)
@@ -97,8 +89,8 @@ def _may_be_case(file: Path) -> bool:
     return not content or bool(KEYS_OF_CASES & content.keys())
 
 
-def share_of(cases: Sequence[Path], part: Share, folder: Path) -> tuple[Path, ...]:
-    """Return the share of a part: all parts together have every case once.
+def share_of(cases: Sequence[Path], part: tuple[int, int], folder: Path) -> tuple[Path, ...]:
+    """Return the share of a part, (number, of): all parts together have every case once.
 
     The cases are counted in the order of a hash of their paths, so that no part has more of some
     models than chance gives it, whatever they are called.
@@ -108,7 +100,8 @@ def share_of(cases: Sequence[Path], part: Share, folder: Path) -> tuple[Path, ..
         name = case_name(folder, case)
         return hashlib.sha256(name.encode()).digest(), name
 
-    own = {*sorted(cases, key=place)[part.number - 1 :: part.of]}
+    number, of = part
+    own = {*sorted(cases, key=place)[number - 1 :: of]}
     return tuple(case for case in cases if case in own)
 
 

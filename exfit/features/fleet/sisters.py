@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.features.fleet.summary import CaseSummary
+from exfit.features.fleet.folder import CaseSummary
 from exfit.inference.outliers import FEWEST, Estimates, deviations
 from exfit.results.facts import MAKER, MODEL, PLANT, RATED, TYPE, UNIT, stated
 from exfit.results.verdict import WITHOUT_INTERVALS

@@ -9,10 +9,9 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.folder import CaseSummary, Fleet, SummaryParameter
 from exfit.features.fleet.page import REPORT, fleet_page
 from exfit.features.fleet.sisters import SisterGroup, missing_interval, sisters
-from exfit.features.fleet.summary import CaseSummary, SummaryParameter
 from exfit.results.model import FitResult
 from exfit.results.tables import DIGITS, csv_text
 from exfit.signals import SIGNALS

@@ -13,8 +13,14 @@ from traceback import extract_tb
 from typing import TYPE_CHECKING
 
 from exfit.errors import ExfitError
-from exfit.features.fleet.folder import KEY_DIGITS, CaseOutcome, Failure
-from exfit.features.fleet.summary import CaseSummary, SummaryParameter, summary_of
+from exfit.features.fleet.folder import (
+    KEY_DIGITS,
+    CaseOutcome,
+    CaseSummary,
+    Failure,
+    SummaryParameter,
+    summary_of,
+)
 from exfit.runs import store
 from exfit.runs.runner import FitSettings
 from exfit.util.file_names import WHOLE_PROGRAMME

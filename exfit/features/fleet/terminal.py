@@ -13,8 +13,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from exfit.features.fleet.batch import BatchObserver
-from exfit.features.fleet.folder import Fleet
-from exfit.features.fleet.summary import CaseSummary
+from exfit.features.fleet.folder import CaseSummary, Fleet
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.show.blocks import Block, Mark, Note, Table, columns, row
 from exfit.show.terminal import STYLES, paragraph, show, written

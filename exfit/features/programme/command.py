@@ -1,10 +1,10 @@
 """The command run."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from exfit.cli.fitting import draw_each
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import (
     NOT_CONVERGED,
@@ -12,12 +12,8 @@ from exfit.cli.options import (
     Output,
     output_options,
     print_json,
-    warn,
 )
 from exfit.errors import FileError
-
-if TYPE_CHECKING:
-    from exfit.features.programme.result import ProgrammeResult
 
 
 @click.command(short_help="Run all tests of a unit, each feeding the later ones.")
@@ -61,38 +57,28 @@ def run(programme: Path, again: bool, output: Output) -> None:
         result = run_programme(loaded, folder, again, keep=programme_folder.write_test)
     if result.interrupted and not result.tests:
         raise Interruption("no test is done")
-    _write(result, folder, output)
-    if result.failed:
-        raise FileError(f"{name}: {fault}" for name, fault in result.failed.items())
-    if not result.holds:
-        raise SystemExit(NOT_CONVERGED)
-
-
-def _write(result: "ProgrammeResult", folder: Path, output: Output) -> None:
-    """Write the results of all tests and their report, show them, and draw the figures."""
-    from exfit.features.programme import folder as programme_folder
-    from exfit.features.programme import programme_blocks
-    from exfit.features.report.writing import write_report
-    from exfit.show import terminal
-
     try:
         programme_folder.write_programme(result, folder)
         if not result.interrupted:
+            from exfit.features.report.writing import write_report
+
             write_report(folder)
     finally:  # whatever becomes of the files
         if output.as_json:
             print_json(result.to_dict())
         elif output.shown:
+            from exfit.features.programme import programme_blocks
+
             console = terminal.console()
             terminal.show(console, programme_blocks.programme(result))
             console.print()
             terminal.written(console, folder)
-    if not output.figures or result.interrupted:
-        return
-    for name, figures in programme_folder.figures_of(result, folder).items():
-        warn(figures.draw())
-        if output.shown:
-            terminal.figures_of_fit(terminal.console(), name)
+    if not result.interrupted:
+        draw_each(programme_folder.figures_of(result, folder), output)
+    if result.failed:
+        raise FileError(f"{name}: {fault}" for name, fault in result.failed.items())
+    if not result.holds:
+        raise SystemExit(NOT_CONVERGED)
 
 
 def check(path: Path) -> bool:

@@ -18,9 +18,10 @@ from exfit.features.programme.result import (
     KeptSummary,
     ProgrammeResult,
     ProgrammeStep,
+    SaturationResult,
     StepResult,
+    VCurve,
 )
-from exfit.features.programme.results_at_rest import SaturationResult, VCurve
 from exfit.results.io import load_result, result_text
 from exfit.results.model import FitResult
 from exfit.results.tables import table

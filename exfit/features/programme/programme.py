@@ -251,14 +251,13 @@ class Programme:
         """Build the case without a record that all tests share."""
         return self.single or self._case(common_content(dict(self.content)))
 
-    def bump_case(self) -> Case:
-        """Return the case of all bump tests."""
-        return self.single or self._case(bump_content(dict(self.content)))
-
-    def rejection_case(self, name: str) -> Case:
-        """Return the case of a test that determines data of the machine."""
+    def case_of(self, name: str) -> Case:
+        """Return the case of a test that determines data of the machine; of "fit" of all bumps."""
+        content = dict(self.content)
+        if name == FIT:
+            return self.single or self._case(bump_content(content))
         names = [test.name for test in self.tests]
-        return self._case(machine_content(dict(self.content), names.index(name)))
+        return self._case(machine_content(content, names.index(name)))
 
     def _case(self, inner: CaseContent) -> Case:
         faults: list[Fault] = []

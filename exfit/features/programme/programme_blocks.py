@@ -3,8 +3,14 @@
 from collections.abc import Iterator, Sequence
 from math import inf, isfinite
 
-from exfit.features.programme.result import EnteredValue, FinishedTest, ProgrammeResult
-from exfit.features.programme.results_at_rest import MeasuredValue, SaturationResult, VCurve
+from exfit.features.programme.result import (
+    EnteredValue,
+    FinishedTest,
+    MeasuredValue,
+    ProgrammeResult,
+    SaturationResult,
+    VCurve,
+)
 from exfit.features.programme.run import CheckedStep
 from exfit.results.model import FitResult
 from exfit.show import fits, models

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.features.programme.results_at_rest import Array, SaturationResult, VCurve
+from exfit.features.programme.result import Array, SaturationResult, VCurve
 from exfit.show.figures.style import (
     COLORS,
     GREEN,

@@ -7,8 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from exfit.features.programme.programme_blocks import saturation, v_curve, values_table
-from exfit.features.programme.result import FinishedTest, ProgrammeResult
-from exfit.features.programme.results_at_rest import FieldReading, SaturationResult, VCurve
+from exfit.features.programme.result import (
+    FieldReading,
+    FinishedTest,
+    ProgrammeResult,
+    SaturationResult,
+    VCurve,
+)
 from exfit.features.report.charts import COLOURS, TALL
 from exfit.features.report.form import (
     form_table,

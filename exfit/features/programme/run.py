@@ -11,16 +11,17 @@ from exfit import estimate, workflows
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme.folder import KEY, RESULTS, Keep, keep, key_of, result_kept
-from exfit.features.programme.programme import FIT, Programme, load_programme, steps_of
+from exfit.features.programme.programme import Programme, load_programme, steps_of
 from exfit.features.programme.programme_schema import BUMP, SaturationTest, SteadyTest
 from exfit.features.programme.result import (
     EnteredValue,
     FinishedTest,
     ProgrammeResult,
     ProgrammeStep,
+    SaturationResult,
     StepResult,
+    VCurve,
 )
-from exfit.features.programme.results_at_rest import SaturationResult, VCurve
 from exfit.features.programme.tests_at_rest import points_of, saturation, steady
 from exfit.fitting.recordings import record_of
 from exfit.plants import MACHINE
@@ -117,7 +118,7 @@ def refuse_unreadable(programme: Programme) -> None:
         if isinstance(section, SaturationTest | SteadyTest):
             readings.append(partial(points_of, section, programme.folder))
         else:
-            case = case_of(programme, step)
+            case = programme.case_of(step.name)
             records = (*case.recordings, *case.validations)
             readings += [partial(record_of, case, recording) for recording in records]
     faults: list[str] = []
@@ -128,11 +129,6 @@ def refuse_unreadable(programme: Programme) -> None:
             faults += str(fault).splitlines()
     if faults:
         raise CaseError(dict.fromkeys(faults))
-
-
-def case_of(programme: Programme, step: ProgrammeStep) -> Case:
-    """Return the case of a fit of a programme, without what other tests measured."""
-    return programme.bump_case() if step.name == FIT else programme.rejection_case(step.name)
 
 
 def finished_test(
@@ -187,7 +183,7 @@ def _result_of(
         std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
         points = points_of(section, programme.folder)
         return steady(section, points, machine, data, std_errors)
-    case = with_values(case_of(programme, step), values)
+    case = with_values(programme.case_of(step.name), values)
     return workflows.fit(case, settings.strategy, progress, progress, search=settings.search)
 
 
@@ -322,7 +318,7 @@ def check_programme(programme: Programme) -> Iterator[CheckedStep]:
                 values = (*values, *values_given(test, programme))
                 yield CheckedStep(step, test)
             else:
-                case = case_of(programme.with_bases(bases_of(values)), step)
+                case = programme.with_bases(bases_of(values)).case_of(step.name)
                 yield CheckedStep(step, workflows.check(with_values(case, values)))
         except ExfitError as fault:
             yield CheckedStep(step, None, str(fault))

@@ -18,7 +18,7 @@ from exfit.features.programme.programme_schema import (
     SaturationTest,
     SteadyTest,
 )
-from exfit.features.programme.results_at_rest import SaturationResult, VCurve
+from exfit.features.programme.result import SaturationResult, VCurve
 from exfit.features.programme.saturation import FieldWinding, saturation_curve
 from exfit.features.programme.v_curve import (
     FieldMeasurement,

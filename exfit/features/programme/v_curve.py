@@ -18,7 +18,7 @@ from exfit.features.programme.point_fit import (
     descended,
     fit_points,
 )
-from exfit.features.programme.results_at_rest import (
+from exfit.features.programme.result import (
     LARGEST_SHARE,
     FieldReading,
     PowerLevel,

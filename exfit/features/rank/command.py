@@ -75,7 +75,6 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
             console.print()
             terminal.written(console, folder)
     output.draw(of_all)
-    if output.figures:
-        draw_each(figures, output)
+    draw_each(figures, output)
     if not ranking.complete:
         raise SystemExit(NOT_CONVERGED)

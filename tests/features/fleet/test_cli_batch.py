@@ -108,7 +108,7 @@ def test_what_does_not_exist_is_refused(run):
 
 @pytest.mark.long
 def test_a_cluster_that_cannot_be_reached_is_a_line_and_the_table_is_there(run, monkeypatch):
-    monkeypatch.setattr("exfit.features.fleet.cluster.CONNECTED_WITHIN", 0.2)
+    monkeypatch.setattr("exfit.features.fleet.dispatch.CONNECTED_WITHIN", 0.2)
     done = run("batch", "cases", "--scheduler", "127.0.0.1:1", "-q")
     assert done.code == 1
     # a busy machine may not even come to the refusal in so short a time

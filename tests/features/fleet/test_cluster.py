@@ -17,8 +17,8 @@ from clusters import HERE, kill_group, running_cluster, waited, without_times
 from ended_commands import heeding_interrupts
 
 import exfit
-from exfit.features.fleet import cluster, remote
-from exfit.features.fleet.cluster import ClusterError, connected
+from exfit.features.fleet import dispatch, remote
+from exfit.features.fleet.dispatch import ClusterError, connected
 from exfit.models.exciters import first_order
 
 CODE = Path(first_order.__file__).read_text()
@@ -62,7 +62,7 @@ def test_a_cluster_leaves_the_files_that_this_computer_leaves(user):
         limits = {"time_limit": 15.0, "trust": True}
         fleet = exfit.batch(folder, "there", scheduler=there.address, observer=events, **limits)
         with connected(there.address) as client:
-            worker = next(iter(cluster.threads_of(client)))
+            worker = next(iter(dispatch.threads_of(client)))
         with pytest.raises(ClusterError, match="a Worker of Dask, not a scheduler"):
             exfit.batch(folder, "there", scheduler=worker, retry_failed=True)
     rows = {case.name: case for case in fleet.cases}
@@ -127,7 +127,7 @@ def test_workers_that_are_killed_lose_nothing_and_blame_no_case(user):
         waited(lambda: none_runs(killer.processes), "the end of the processes beside")
         there.add_worker(hidden=True)
         with connected(there.address) as client:
-            waited(lambda: len(cluster.threads_of(client)) == 3, "a worker without exfit")
+            waited(lambda: len(dispatch.threads_of(client)) == 3, "a worker without exfit")
         with pytest.raises(ClusterError, match=r"exfit is missing there, .*No module named"):
             exfit.batch(folder, "again", scheduler=there.address)
     assert {case.status for case in exfit.read_fleet("again").cases} == {"not run"}
@@ -179,7 +179,7 @@ def refusal(address):
 
 @pytest.mark.long
 def test_an_address_without_a_scheduler_is_refused_in_a_line(monkeypatch, capfd):
-    monkeypatch.setattr(cluster, "CONNECTED_WITHIN", 0.3)
+    monkeypatch.setattr(dispatch, "CONNECTED_WITHIN", 0.3)
     free = f"127.0.0.1:{free_port()}"
     # a busy machine may not even come to the refusal in so short a time
     assert re.fullmatch(f"{free}: no connection: (Connection refused|Timed out .*)", refusal(free))
@@ -194,7 +194,7 @@ def test_an_address_without_a_scheduler_is_refused_in_a_line(monkeypatch, capfd)
 
 @pytest.mark.long
 def test_another_program_at_the_address_is_no_scheduler(monkeypatch, capfd):
-    monkeypatch.setattr(cluster, "CONNECTED_WITHIN", 0.5)
+    monkeypatch.setattr(dispatch, "CONNECTED_WITHIN", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def answer():
@@ -225,16 +225,16 @@ def test_versions_that_differ_are_named():
     }.items():
         answer = Future()
         answer.set_result({"w": {**here, **dict(there)}})
-        assert words in cluster.answered("w", answer)
-        assert bool(words) == bool(cluster.answered("w", answer))
+        assert words in dispatch.answered("w", answer)
+        assert bool(words) == bool(dispatch.answered("w", answer))
     for fault, words in {
         ModuleNotFoundError("No module named 'exfit'"): "exfit is missing there, or is an earlier",
         RuntimeError("odd"): "RuntimeError: odd",
     }.items():
         answer = Future()
         answer.set_result({"w": fault})
-        assert words in cluster.answered("w", answer)
+        assert words in dispatch.answered("w", answer)
     for lost in (OSError("gone"), KeyError("w")):
         answer = Future()
         answer.set_exception(lost)
-        assert cluster.answered("w", answer) is None
+        assert dispatch.answered("w", answer) is None

@@ -13,8 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from exfit.features.fleet import dispatch, remote
-from exfit.features.fleet.cluster import ClusterError
-from exfit.features.fleet.dispatch import AHEAD, MOST_DEATHS, MOST_LOSSES, Dispatch
+from exfit.features.fleet.dispatch import AHEAD, MOST_DEATHS, MOST_LOSSES, ClusterError, Dispatch
 from exfit.features.fleet.folder import CaseOutcome, Failure, IndexEntry
 from exfit.features.fleet.local import Waiting
 from exfit.features.fleet.plan import PlannedCase

@@ -10,18 +10,21 @@ from cases import FIRST_ORDER, TIME, TRUTH
 import exfit
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import (
+    MOST_POINTS,
+    CaseFacts,
     CaseOutcome,
     Failure,
     IndexEntry,
     case_name,
     entries_of,
+    facts_of,
     prepare_folder,
     read_fleet,
     state_of,
+    summary_of,
     write_entry,
     write_outcome,
 )
-from exfit.features.fleet.summary import MOST_POINTS, CaseFacts, facts_of, summary_of
 from exfit.results.intervals.determination import NEEDS_PROFILE
 from exfit.results.io import result_text
 from exfit.util.typed import plain

@@ -10,7 +10,7 @@ from fleets import MODELS, curve, fleet, parameter, row
 from pages import Page
 from payloads import HARMLESS, HOSTILE, Structure
 
-from exfit.features.fleet.folder import Fleet
+from exfit.features.fleet.folder import Fleet, SummaryCurve
 from exfit.features.fleet.page import (
     HEIGHT,
     MARGIN,
@@ -21,7 +21,6 @@ from exfit.features.fleet.page import (
     picture,
 )
 from exfit.features.fleet.sisters import sisters
-from exfit.features.fleet.summary import SummaryCurve
 
 MOST_BYTES = 2000  # of a case: 5,000 of them are a page of 10 MB
 

@@ -8,7 +8,7 @@ from tiers import few_of
 
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import IndexEntry
-from exfit.features.fleet.plan import BatchSettings, Share, case_files, planned_case, share_of
+from exfit.features.fleet.plan import BatchSettings, case_files, planned_case, share_of
 from exfit.runs.runner import FitSettings
 
 SETTINGS = BatchSettings(FitSettings(search="local"))
@@ -45,19 +45,17 @@ def test_what_does_not_exist_is_refused_with_all_of_it(tmp_path):
 @pytest.mark.parametrize("parts", few_of([3, 1, 40], 1))
 def test_parts_have_every_case_once_and_are_equally_large(tmp_path, parts):
     cases = [tmp_path / f"{number}.yaml" for number in range(100)]
-    shares = [share_of(cases, Share(number + 1, parts), tmp_path) for number in range(parts)]
+    shares = [share_of(cases, (number + 1, parts), tmp_path) for number in range(parts)]
     assert sorted(case for share in shares for case in share) == sorted(cases)
     sizes = {len(share) for share in shares}
     assert max(sizes) - min(sizes) <= 1
-    assert shares == [
-        share_of(cases[::-1], Share(k + 1, parts), tmp_path)[::-1] for k in range(parts)
-    ]
+    assert shares == [share_of(cases[::-1], (k + 1, parts), tmp_path)[::-1] for k in range(parts)]
 
 
 def test_parts_are_balanced_where_models_alternate(tmp_path):
     """By position every second case of two models would be of one; binomial: 3.5 deviations."""
     cases = [tmp_path / f"{number:04}.yaml" for number in range(1000)]
-    first = share_of(cases, Share(1, 2), tmp_path)
+    first = share_of(cases, (1, 2), tmp_path)
     even = sum(int(case.stem) % 2 == 0 for case in first)
     assert abs(even - 250) < 3.5 * (500 * 0.25) ** 0.5
 

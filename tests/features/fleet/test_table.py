@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from fleets import fleet, parameter, row
 
+from exfit.features.fleet.folder import SummaryValidation
 from exfit.features.fleet.sisters import sisters
-from exfit.features.fleet.summary import SummaryValidation
 from exfit.features.fleet.table import (
     BYTE_ORDER_MARK,
     fleet_table,

@@ -17,10 +17,10 @@ from exfit.features.fleet.folder import (
     IndexEntry,
     case_name,
     prepare_folder,
+    summary_of,
     write_entry,
     write_outcome,
 )
-from exfit.features.fleet.summary import summary_of
 from exfit.results.io import result_text
 
 BUSES = (101, 102, 103)

@@ -66,14 +66,14 @@ def faults_of(load, content):
 
 
 def test_the_bump_tests_are_the_records_and_the_validations_of_one_case(loaded):
-    case = loaded(PROGRAMME).bump_case()
+    case = loaded(PROGRAMME).case_of("fit")
     assert [recording.name for recording in case.recordings] == ["up", "on-load"]
     assert [recording.name for recording in case.validations] == ["down"]
     assert [*case.free()] == ["K"]
 
 
 def test_a_test_of_the_machine_is_fitted_for_its_own_data_alone(loaded):
-    case = loaded(PROGRAMME).rejection_case("off")
+    case = loaded(PROGRAMME).case_of("off")
     assert [recording.name for recording in case.recordings] == ["off"]
     assert [*case.free()] == ["machine.Tpd0"]
     assert case.values()["K"] == KA["start"]
@@ -85,7 +85,7 @@ def test_a_programme_of_bump_tests_is_the_case_that_has_them_as_records(loaded, 
     records = [{key: test[key] for key in test if key != "kind"} for test in tests]
     path = tmp_path / "case.yaml"
     path.write_text(json.dumps({**content, "records": records}), encoding="utf-8")
-    case, of_programme = load_case(path), loaded({**content, "tests": tests}).bump_case()
+    case, of_programme = load_case(path), loaded({**content, "tests": tests}).case_of("fit")
     assert case.values() == of_programme.values()
     assert case.recordings == of_programme.recordings
 
@@ -94,7 +94,7 @@ def test_a_case_is_the_programme_of_one_test(loaded):
     content = {key: value for key, value in PROGRAMME.items() if key != "tests"}
     programme = loaded({**content, "test": TEST, "record": RECORD})
     assert programme.tests == ()
-    assert programme.bump_case().recordings[0].record.file == "up.csv"
+    assert programme.case_of("fit").recordings[0].record.file == "up.csv"
 
 
 @pytest.mark.parametrize(

@@ -111,8 +111,8 @@ def test_a_standard_error_of_the_file_is_not_that_of_what_a_test_fits(folder):
     content = programme_content()
     content["plant"]["std_errors"] = {"Tpd0": 0.2, "Xq": 0.1}
     programme = load_programme(written(content, folder, "errors.yaml"))
-    assert programme.rejection_case(OF_MACHINE).std_errors() == {"machine.Xq": 0.1}
-    assert programme.bump_case().std_errors() == {"machine.Tpd0": 0.2, "machine.Xq": 0.1}
+    assert programme.case_of(OF_MACHINE).std_errors() == {"machine.Xq": 0.1}
+    assert programme.case_of("fit").std_errors() == {"machine.Tpd0": 0.2, "machine.Xq": 0.1}
 
 
 def test_the_bump_tests_are_one_fit_with_its_validation(whole):

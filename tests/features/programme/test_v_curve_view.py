@@ -8,7 +8,7 @@ from rich.console import Console
 
 from exfit.features.programme import programme_figures
 from exfit.features.programme.programme_blocks import v_curve as blocks_of
-from exfit.features.programme.results_at_rest import VCurve
+from exfit.features.programme.result import VCurve
 from exfit.features.programme.v_curve import (
     FieldMeasurement,
     PointsOnLoad,

@@ -6,9 +6,8 @@ from saturation_curves import drawn_curve, hits_of, shares
 from tiers import few_of
 
 from exfit.errors import ExfitError
-from exfit.features.programme.results_at_rest import SaturationResult
-from exfit.features.programme.saturation import FieldWinding, directions, saturation_curve
-from exfit.features.programme.saturation_forms import EXCESS
+from exfit.features.programme.result import SaturationResult
+from exfit.features.programme.saturation import EXCESS, FieldWinding, directions, saturation_curve
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH
 from exfit.util.typed import plain
 from exfit.util.typed_reading import read
