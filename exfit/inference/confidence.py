@@ -179,7 +179,7 @@ def _variance_ratios(factors: Factors, noise: tuple[Noise, ...]) -> Array:
     """Return the variances (N,) over those by the cost alone, nan where there are none."""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = np.diag(factors.covariance(noise)) / np.diag(factors.inverse)
-    return np.asarray(ratios)
+    return ratios
 
 
 def partners_on_bounds(

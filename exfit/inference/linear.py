@@ -154,7 +154,7 @@ class Linearisation:
         """
         value = np.abs(self.values)
         linear = np.where(self.nuisances, self.width, np.maximum(value, SMALL * self.width))
-        return np.asarray(np.where(self.logarithmic, value, linear))
+        return np.where(self.logarithmic, value, linear)
 
     @cached_property
     def own_size(self) -> Array:
@@ -164,7 +164,7 @@ class Linearisation:
         """
         value = np.abs(self.values)
         kept_from_zero = ~(np.array(self.through_zero) | np.array(self.nuisances)) & (value > 0.0)
-        return np.asarray(np.where(kept_from_zero, value, self.size))
+        return np.where(kept_from_zero, value, self.size)
 
     @cached_property
     def ranked_size(self) -> Array:
@@ -173,7 +173,7 @@ class Linearisation:
         It is the value and, of a value of 0, the interval between the bounds.
         """
         value = np.abs(self.values)
-        return np.asarray(np.where(value > 0.0, value, self.width))
+        return np.where(value > 0.0, value, self.width)
 
     @property
     def free(self) -> Mask:
@@ -183,7 +183,7 @@ class Linearisation:
     @cached_property
     def relative(self) -> Array:
         """The derivative of the errors to relative changes, (R, N)."""
-        return np.asarray(self.jacobian * self.size)
+        return self.jacobian * self.size
 
     def mean_curvature(self, channel: ResidualBlock) -> float:
         """Return psi' of the loss over a channel, on average: 1 for least squares."""
@@ -364,7 +364,7 @@ def sparse(basis: Array) -> Array:
     own = pivots(basis)
     reduced = np.linalg.solve(basis[:, own], basis)
     largest = np.take_along_axis(reduced, np.abs(reduced).argmax(axis=1)[:, None], axis=1)
-    return np.asarray(reduced / largest)
+    return reduced / largest
 
 
 def pivots(rows: Array) -> list[int]:

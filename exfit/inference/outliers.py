@@ -117,7 +117,7 @@ def _deleted(estimates: Estimates) -> _Deleted:
     weight = _weights(shifted, own)
 
     def others(column: Array) -> Array:
-        return np.asarray(np.sum(column) - column)
+        return np.sum(column) - column
 
     w1, w2, w3 = (others(weight**power) for power in (1, 2, 3))
     wv, wwv, wwwv = (others(weight**power * own) for power in (1, 2, 3))
@@ -160,7 +160,7 @@ def _weights(shifted: Array, own: Array) -> Array:
     deviation = float(np.median(np.abs(shifted - np.median(shifted)))) / NORMAL_MEDIAN
     tau2 = max(deviation**2 - float(np.median(own)), 0.0)
     weight = 1.0 / (own + tau2)
-    return np.asarray(weight / np.mean(weight))
+    return weight / np.mean(weight)
 
 
 def _mean_variance(estimates: Estimates) -> Array:
@@ -170,4 +170,4 @@ def _mean_variance(estimates: Estimates) -> Array:
 
 def _at_least_rounding(errors: Array, values: Array) -> Array:
     least = ROUNDING * max(float(np.max(np.abs(values))), np.finfo(float).tiny ** 0.25)
-    return np.asarray(np.maximum(errors, least))
+    return np.maximum(errors, least)

@@ -146,7 +146,7 @@ class Interpolation:
         for k in range(1, NEIGHBOURS):
             np.multiply(powers[:, k - 1], away, out=powers[:, k])
         if len(self._kinds) == 1:
-            return np.asarray(powers @ lagrange(*self._kinds)[rows].T)
+            return powers @ lagrange(*self._kinds)[rows].T
         weights = np.zeros((len(away), NEIGHBOURS))
         for n in self._kinds:
             weights += (powers * (points == n)[:, None]) @ lagrange(n)[rows].T

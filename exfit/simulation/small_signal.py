@@ -266,7 +266,7 @@ def spanning(rates: Sequence[complex], points: int = POINTS) -> Array:
         if rate.imag > 0.0 and abs(rate.real) < LIGHTLY * abs(rate)
     ]
     every = np.concatenate([np.geomspace(low / DECADE, high * DECADE, points), *peaks])
-    return np.asarray(distinct(every[every >= low / DECADE]) / (2.0 * pi))
+    return distinct(every[every >= low / DECADE]) / (2.0 * pi)
 
 
 def margins(loop: StateSpace, frequency: Array) -> Margins:

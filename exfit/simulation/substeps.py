@@ -156,7 +156,7 @@ def _parts(step: float, rates: Array) -> NDArray[np.int64]:
 def _needed(step: float, rates: Array | float) -> Array:
     """Return ceil(step * rate), at least one, inf where that is no number any more."""
     with np.errstate(over="ignore"):
-        return np.asarray(np.maximum(np.ceil(np.multiply(step, rates) - ON_GRID), 1.0))
+        return np.maximum(np.ceil(np.multiply(step, rates) - ON_GRID), 1.0)
 
 
 def _moving(rest: AtRest, radius: Array) -> Mask:
@@ -178,4 +178,4 @@ def _radius_bounds(jacobians: Array) -> Array:
         power = power @ power
     norm = np.abs(power).sum(axis=2).max(axis=1)
     bound = size * norm ** (0.5**SQUARINGS)
-    return np.asarray(np.where(norm > UNDERFLOW, bound, np.inf))
+    return np.where(norm > UNDERFLOW, bound, np.inf)

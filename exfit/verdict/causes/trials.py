@@ -170,7 +170,7 @@ def linear_fit(evidence: Evidence) -> LinearFit | None:
 def moving(evidence: Evidence) -> Mask:
     """Mask of the free parameters that are not on a bound."""
     low, high = evidence.residuals.bounds
-    return np.asarray((evidence.solution.x > low) & (evidence.solution.x < high))
+    return (evidence.solution.x > low) & (evidence.solution.x < high)
 
 
 def linear_model(errors: Array, slopes: Array) -> LinearFit:
