@@ -15,7 +15,7 @@ from exfit.fitting.system import values_of
 from exfit.plants import VT0
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.intervals import determination
-from exfit.workflows import fit, simulate, solution, validate
+from exfit.workflows import fit, fit_run, simulate, validate
 
 REFERENCE = ROOT / "tests" / "reference"
 AC1A = ("ac1a_typical", "ac1a_good", "ac1a_low", "ac1a_high")
@@ -207,7 +207,7 @@ def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("module", "step"), [(determination, "uncertainty_of_solution"), (solution, "validation_of")]
+    ("module", "step"), [(determination, "uncertainty_of_solution"), (fit_run, "validation_of")]
 )
 def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, module, step):
     def interrupt(*_):
@@ -220,8 +220,8 @@ def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, m
     assert result.success
     assert result.values == whole.values
     assert (result.knowledge is None) == (module is determination)
-    assert (result.validation == ()) == (module is solution)
-    assert solution.INTERRUPTED_AFTERWARDS in result.notes
+    assert (result.validation == ()) == (module is fit_run)
+    assert fit_run.INTERRUPTED_AFTERWARDS in result.notes
 
 
 def test_an_interruption_before_the_second_jacobian_is_reported_without_a_note_on_redundance():
