@@ -178,8 +178,7 @@ def quantiles_of(factors: Factors, noise: tuple[Noise, ...], dof: float) -> Arra
 def _variance_ratios(factors: Factors, noise: tuple[Noise, ...]) -> Array:
     """Return the variances (N,) over those by the cost alone, nan where there are none."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = np.diag(factors.covariance(noise)) / np.diag(factors.inverse)
-    return ratios
+        return np.diag(factors.covariance(noise)) / np.diag(factors.inverse)
 
 
 def partners_on_bounds(
