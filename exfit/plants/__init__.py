@@ -58,7 +58,7 @@ class Attached(NamedTuple):
     @property
     def kind(self) -> str:
         """Kind of limiter, as its name begins: oel, uel, scl."""
-        return kind_of_limiter(self.model.name)
+        return self.model.name[:3].lower()
 
     @property
     def prefix(self) -> str:
@@ -72,11 +72,6 @@ class Attached(NamedTuple):
         if self.kind == STATOR_CURRENT:
             return {side: f"{name}.{side}" for side in ("oel", "uel")}
         return {self.kind: name}
-
-
-def kind_of_limiter(name: str) -> str:
-    """Kind of a limiter of the catalogue, as its name begins: oel, uel, scl."""
-    return name[:3].lower()
 
 
 def acts_without_load(limiter: Attached) -> bool:

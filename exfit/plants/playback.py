@@ -84,9 +84,9 @@ def playback(
             efd = held_by(
                 p[VREF0], efd, lambda efd: rest_of(model, efd, u, values).setpoints["vref"]
             )
-        exciter, setpoints = rest_of(model, efd, u, values)
+        exciter, held = rest_of(model, efd, u, values)
         known = {"vref": p[VREF0]} if vref_known else {}
-        return Rest({**exciter, **limiters_rest(limiters, u, p)}, {**setpoints, **known})
+        return Rest({**exciter, **limiters_rest(limiters, u, p)}, {**held, **known})
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         recorded = {signal: p[initial(signal)] + u[signal] for signal in driving}

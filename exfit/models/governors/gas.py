@@ -1,9 +1,6 @@
 """Governors of gas turbines: GAST and GGOV1."""
 
-from typing import NamedTuple
-
 from exfit.models.blocks import (
-    Limited,
     Signal,
     clip,
     exp,
@@ -87,29 +84,18 @@ STEP = 0.01  # s, in which fsra follows fsr
 NEVER = 9999.0  # pu, of a limiter that is left out
 
 
-class LoadLimiter(NamedTuple):
-    """The limiter's demand for fuel, and how far the load is below its reference."""
-
-    fsrt: Signal
-    error: Signal
-
-
-class Demand(NamedTuple):
-    """The demand for fuel, that of the PID alone, and the error that the PID sees."""
-
-    fsr: Signal
-    fsrn: Signal
-    error: Signal
-
-
 def droop(pe: Signal, valve: Signal, p: Signal) -> Signal:
     """Return the signal of the droop, 0 where that is fsr: ``fuel_demand`` closes its loop."""
     of_valve = where((p.Rselect < -0.5) & (p.Rselect > -1.5), valve, 0.0)
     return where(p.Rselect > 0.5, pe, of_valve)
 
 
-def fuel_demand(error: Signal, least: Signal, s: Signal, p: Signal) -> Demand:
-    """Compute the PID's demand, at most ``least``; ``error`` is that before its dead band.
+def fuel_demand(
+    error: Signal, least: Signal, s: Signal, p: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """Return the demand for fuel, at most ``least``, that of the PID alone, and its error.
+
+    ``error`` is that before its dead band.
 
     With Rselect = -2 demand and error wait for each other; that loop is solved here: it is
     monotonous, so that a limit holds there as it does here.
@@ -121,28 +107,12 @@ def fuel_demand(error: Signal, least: Signal, s: Signal, p: Signal) -> Demand:
     free = held + gain * clip(alone, p.minerr, p.maxerr)
     fsr = clip(smaller(free, least), p.VMIN, p.VMAX)
     seen = clip(dead_band(error - loop * fsr, p), p.minerr, p.maxerr)
-    return Demand(fsr, held + gain * seen, seen)
+    return fsr, held + gain * seen, seen
 
 
 def dead_band(error: Signal, p: Signal) -> Signal:
     """Take the dead band off an error."""
     return error - clip(error, -p.db, p.db)
-
-
-def load_limiter(wf: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> LoadLimiter:
-    """Return the demand that keeps the exhaust temperature, fuel through two lags, at its limit."""
-    falling = exp(smaller(p.Dm, 0.0) * log(1.0 + u.dw))
-    temperature, d.TEMP = lead_lag(wf * falling, s.TEMP, p.Tsa, p.Tsb)
-    measured, d.TEMPM = lag(temperature, s.TEMPM, 1.0, p.Tfload)
-    error = p.Ldref / p.Kturb + p.Wfnl - measured
-    return LoadLimiter(p.Kpload * error + s.LOAD, error)
-
-
-def load_integral(fsr: Signal, load: LoadLimiter, s: Signal, p: Signal) -> Limited:
-    """Return the slope of the load limiter's integral; without Kpload it stops at 1."""
-    follows = p.Kpload > 0.0
-    back = where(follows, (fsr - load.fsrt) / where(follows, p.Kpload, 1.0), 0.0)
-    return limited(p.Kiload * (load.error + back), s.LOAD, -NEVER, where(follows, NEVER, 1.0))
 
 
 def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -210,15 +180,22 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     acceleration, d.ACC = washout(u.dw, s.ACC, 1.0, p.Ta)
     valve = clip(s.VALVE, p.VMIN, p.VMAX)
     wf = valve * where(p.Flag > 0.5, 1.0 + u.dw, 1.0)
-    load = load_limiter(wf, s, u, p, d)
+    falling = exp(smaller(p.Dm, 0.0) * log(1.0 + u.dw))
+    temperature, d.TEMP = lead_lag(wf * falling, s.TEMP, p.Tsa, p.Tsb)
+    measured, d.TEMPM = lag(temperature, s.TEMPM, 1.0, p.Tfload)
+    load = p.Ldref / p.Kturb + p.Wfnl - measured
+    fsrt = p.Kpload * load + s.LOAD
     fsra = where(p.Ka > 0.0, s.FSRA, NEVER)
-    least = smaller(smaller(load.fsrt, 1.0), fsra)
-    demand = fuel_demand(u.pref + mw - u.dw - p.R * droop(pe, valve, p), least, s, p)
-    _, d.DERIV = washout(demand.error, s.DERIV, 1.0, p.Tdgov)
-    d.INTEG = p.Kigov * (demand.error + (demand.fsr - demand.fsrn) / p.Kpgov)
-    d.LOAD = load_integral(demand.fsr, load, s, p)
-    d.FSRA = (demand.fsr - s.FSRA) / STEP + p.Ka * (p.Aset - acceleration)
-    velocity = clip((demand.fsr - valve) / p.Tact, p.Rclose, p.Ropen)
+    least = smaller(smaller(fsrt, 1.0), fsra)
+    fsr, fsrn, error = fuel_demand(u.pref + mw - u.dw - p.R * droop(pe, valve, p), least, s, p)
+    _, d.DERIV = washout(error, s.DERIV, 1.0, p.Tdgov)
+    d.INTEG = p.Kigov * (error + (fsr - fsrn) / p.Kpgov)
+    # without Kpload the load limiter's integral does not follow: it stops at 1
+    follows = p.Kpload > 0.0
+    back = where(follows, (fsr - fsrt) / where(follows, p.Kpload, 1.0), 0.0)
+    d.LOAD = limited(p.Kiload * (load + back), s.LOAD, -NEVER, where(follows, NEVER, 1.0))
+    d.FSRA = (fsr - s.FSRA) / STEP + p.Ka * (p.Aset - acceleration)
+    velocity = clip((fsr - valve) / p.Tact, p.Rclose, p.Ropen)
     d.VALVE = limited(velocity, s.VALVE, p.VMIN, p.VMAX)
     power, d.TURB = lead_lag(p.Kturb * (wf - p.Wfnl), s.TURB, p.Tc, p.Tb)
     return p.Trate_Mbase * (power - larger(p.Dm, 0.0) * (1.0 + u.dw))

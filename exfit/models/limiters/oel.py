@@ -1,7 +1,6 @@
 """Overexcitation limiters: OEL2C, OEL3C and OEL5C."""
 
 from exfit.models.blocks import (
-    Limited,
     Signal,
     clip,
     lag,
@@ -40,11 +39,6 @@ from exfit.models.sheet import (
     record,
     sheet,
 )
-
-
-def activity(s: Signal, t: Signal, iref: Signal, p: Signal) -> Limited:
-    """Return the slope of the state that is 1 while the limiter is active."""
-    return latch((t >= p.TFCL) | (s.OVER >= p.TEN), (iref >= p.IINST) & (s.BELOW > p.TOFF))
 
 
 def oel2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -95,7 +89,8 @@ def oel2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     t, iref = timed_reference(current, s, p, d, p.TFCL)
     filtered, d.IF = lag(iref, s.IF, 1.0, p.TAOEL)
     d.OVER, d.BELOW = timers(s.OVER, s.BELOW, actual, iref, p.TEN, p)
-    d.ACTIVE = activity(s, t, iref, p)
+    on, off = (t >= p.TFCL) | (s.OVER >= p.TEN), (iref >= p.IINST) & (s.BELOW > p.TOFF)
+    d.ACTIVE = latch(on, off)
     error = filtered - actual + where(s.ACTIVE > 0.5, 0.0, p.IRESET)
     return regulator(error, s, p, d, "OEL")
 

@@ -101,17 +101,12 @@ def faults(order: Callable[..., Faults], values: Mapping[str, float]) -> Faults:
     """Find contradictions in a data sheet of a round-rotor machine."""
     yield from d_axis_order(values)
     yield from not_rising(values, "Xq", "Xpq")
-    yield from winding_time(values)
+    if values["Tpq0"] < LEAST_TIME and values["Xq"] > values["Xpq"]:  # Xq = X'q is no winding
+        text = f"{values['Tpq0']:g} is below {LEAST_TIME:g} s; without a winding Xq equals Xpq"
+        yield "Tpq0", text
     yield from not_rising(values, "Xpq", "Xppd")
     yield from descending(values, "Xpq", "Xl")
     yield from order(values)
-
-
-def winding_time(values: Mapping[str, float]) -> Faults:
-    """Yield a fault for a winding without a time constant; Xq = X'q is no winding."""
-    if values["Tpq0"] < LEAST_TIME and values["Xq"] > values["Xpq"]:
-        text = f"{values['Tpq0']:g} is below {LEAST_TIME:g} s; without a winding Xq equals Xpq"
-        yield "Tpq0", text
 
 
 def machine(
