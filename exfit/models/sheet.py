@@ -1,6 +1,6 @@
 """A model as data: its data sheet, its states and its functions."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import cleandoc
@@ -402,11 +402,11 @@ def documented(
     *,
     text: str | None = None,
     setpoints: str = "",
-    aliases: Sequence[str] = (),
+    aliases: str = "",
     records: Records = (),
     pslf_records: Records = (),
-    inputs: Sequence[str] = (),
-    places: Sequence[str] = (),
+    inputs: str = "",
+    places: str = "",
     doubt: str = "",
 ) -> Model:
     """Return the model that the docstring of its equations names and draws, or a ``text``.
@@ -419,16 +419,16 @@ def documented(
         name=name,
         title=title.rstrip("."),
         drawing=drawing.strip("\n"),
-        aliases=tuple(aliases),
+        aliases=tuple(aliases.split()),
         sheet=tuple(rows),
         states=tuple(states.split()),
         setpoints=tuple(setpoints.split()),
         records=records,
-        inputs=tuple(inputs),
+        inputs=tuple(inputs.split()),
         equations=equations,
         rest=rest,
         pslf_records=pslf_records,
-        places=tuple(places),
+        places=tuple(places.split()),
         doubt=doubt,
     )
 

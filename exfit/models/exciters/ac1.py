@@ -64,7 +64,7 @@ AC1A = documented(
         *shared(KC_FREE=0.2, KD=0.38, KE=1.0, E1=4.18, SE1=0.10, E2=3.14, SE2=0.03),
     ),
     "VC VL VA VE VF",
-    aliases=("ESAC1A",),
+    aliases="ESAC1A",
     records=record(
         "ESAC1A", "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN"
     ),
@@ -108,7 +108,7 @@ AC1C = documented(
     ac1a_rest,
     (*renamed(AC1A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VL VA VE VF",
-    aliases=("ESAC1C",),
+    aliases="ESAC1C",
     records=record_of_2016(
         "AC1C",
         "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 EFEMAX EFEMIN VFEMAX VEMIN",

@@ -66,7 +66,7 @@ AC2A = documented(
         *shared(SE2=0.012),
     ),
     "VC VL VA VE VF",
-    aliases=("ESAC2A",),
+    aliases="ESAC2A",
     records=record(
         "ESAC2A",
         "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2",
@@ -120,7 +120,7 @@ AC2C = documented(
     ac2a_rest,
     (*renamed(AC2A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VEMIN=0.0)),
     "VC VL VA VE VF",
-    aliases=("ESAC2C",),
+    aliases="ESAC2C",
     records=record_of_2016(
         "AC2C",
         "TR TB TC KA TA VAMAX VAMIN KB EFEMAX EFEMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2 "

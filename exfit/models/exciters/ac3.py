@@ -90,7 +90,7 @@ AC3A = documented(
         *shared(KD=0.499, KE=1.0, VFEMAX=16.0, E1=6.24, SE1=1.143, E2=4.68, SE2=0.1),
     ),
     "VC VL VA VE VF",
-    aliases=("ESAC3A",),
+    aliases="ESAC3A",
     records=record(
         "ESAC3A",
         "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2",
@@ -168,7 +168,7 @@ AC3C = documented(
         *shared(TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0),
     ),
     "VC VL VA VE VF VI VD",
-    aliases=("ESAC3C",),
+    aliases="ESAC3C",
     records=record_of_2016(
         "AC3C",
         "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 KPR "

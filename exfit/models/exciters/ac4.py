@@ -58,7 +58,7 @@ AC4A = documented(
         *shared(VRMAX_OF_EFD=5.64, VRMIN_OF_EFD=-4.53, KC=0.0),
     ),
     "VC VL VR",
-    aliases=("ESAC4A",),
+    aliases="ESAC4A",
     records=record("ESAC4A", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),
     pslf_records=record("esac4a", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC", doubt=AS_IN_PSSE),
 )
@@ -94,7 +94,7 @@ AC4C = documented(
     ac4a_rest,
     AC4A.sheet,
     "VC VL VR",
-    aliases=("ESAC4C",),
+    aliases="ESAC4C",
     records=record_of_2016(
         "AC4C", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC", places=ONE_GATE, doubt=OF_TWO_PROGRAMS
     ),

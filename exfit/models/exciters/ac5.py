@@ -79,7 +79,7 @@ AC5A = documented(
         *shared(E1=5.6, SE1=0.86, E2=4.2, SE2=0.5),
     ),
     "VC VR VE VL VF",
-    aliases=("ESAC5A",),
+    aliases="ESAC5A",
     records=record("ESAC5A", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2"),
     pslf_records=record(
         "esac5a",
@@ -141,7 +141,7 @@ AC5C = documented(
         *shared(KC_FREE=0.2, KD=0.38, VFEMAX=99.0, VEMIN=0.0),
     ),
     "VC VA VE VL VF",
-    aliases=("ESAC5C",),
+    aliases="ESAC5C",
     records=record_of_2016(
         "AC5C",
         "TR KA TA VAMAX VAMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 KC KD VFEMAX VEMIN",

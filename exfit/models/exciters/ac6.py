@@ -92,7 +92,7 @@ AC6A = documented(
         *shared(KC_FREE=0.173, KD=1.91, KE=1.6, E1=7.4, SE1=0.214, E2=5.55, SE2=0.044),
     ),
     "VC VK VA VE VH",
-    aliases=("ESAC6A",),
+    aliases="ESAC6A",
     records=record(
         "ESAC6A",
         "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 SE2",
@@ -148,7 +148,7 @@ AC6C = documented(
     ac6a_rest,
     (*renamed(AC6A.sheet, VRMAX="EFEMAX", VRMIN="EFEMIN"), *shared(VFEMAX=99.0, VEMIN=0.0)),
     "VC VK VA VE VH",
-    aliases=("ESAC6C",),
+    aliases="ESAC6C",
     records=record_of_2016(
         "AC6C",
         "TR KA TA TK TB TC VAMAX VAMIN EFEMAX EFEMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 "

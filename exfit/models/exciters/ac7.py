@@ -196,7 +196,7 @@ AC7C = documented(
         *shared(KR=4.0),
     ),
     "VC VI VD VF VA VE",
-    aliases=("ESAC7C",),
+    aliases="ESAC7C",
     records=record_of_2016(
         "AC7C",
         "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "

@@ -162,7 +162,7 @@ AC8C = documented(
     ac8c_rest,
     (*AC8B.sheet, *ALTERNATOR_SUPPLY),
     "VC VI VD VR VE",
-    aliases=("ESAC8C",),
+    aliases="ESAC8C",
     records=record_of_2016(
         "AC8C",
         "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN E1 SE1 E2 "

@@ -42,7 +42,7 @@ from exfit.models.sheet import (
     sheet,
 )
 
-ALIASES = ("EXAC1M",)
+ALIASES = "EXAC1M"
 
 SHEET = sheet(
     *shared(TR=0.016668),

@@ -63,7 +63,7 @@ from exfit.models.sheet import (
     sheet,
 )
 
-ALIASES = ("REXSYS",)
+ALIASES = "REXSYS"
 
 SHEET = sheet(
     *shared(TR=0.01),

@@ -137,7 +137,7 @@ ST1A = documented(
         ("ILR", 4.4, *LIMIT, "field current limit"),
     ),
     "VC VL VL1 VA VF",
-    aliases=("ESST1A",),
+    aliases="ESST1A",
     records=record(
         "ESST1A",
         "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
@@ -212,7 +212,7 @@ ST1C = documented(
         ("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 VA"),
     ),
     "VC VL VL1 VA VF",
-    aliases=("ESST1C",),
+    aliases="ESST1C",
     records=record(
         "ST1C",
         "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",

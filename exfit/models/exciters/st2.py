@@ -70,7 +70,7 @@ ST2A = documented(
         *shared(TF=1.0, KP_OR_0=4.88, KI=8.0, KC=1.82, EFDMAX=4.5),
     ),
     "VC VR EFD VF",
-    aliases=("ESST2A", "EXST2A"),
+    aliases="ESST2A EXST2A",
     records=(
         record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX")
         + record("EXST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX")
@@ -138,7 +138,7 @@ ST2C = documented(
     st2c_rest,
     (*not_searched(ST2A.sheet, "KA"), *PID, *shared(XL=0.081, THETAP=0.0, VBMAX=9.0)),
     "VC VI VD VR EFD VF",
-    aliases=("ESST2C",),
+    aliases="ESST2C",
     records=record_of_2016(
         "ST2C",
         "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN TE EFDMAX KE KF TF KP KI XL THETAP "

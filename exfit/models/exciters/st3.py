@@ -86,7 +86,7 @@ ST3A = documented(
         *shared(VMMAX=1.0, VMMIN=0.0),
     ),
     "VC VL VR VM",
-    aliases=("ESST3A",),
+    aliases="ESST3A",
     records=record(
         "ESST3A",
         "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM VMMAX "
@@ -154,7 +154,7 @@ ST3C = documented(
     st3c_rest,
     (*not_searched(ST3A.sheet, "KA"), *PID, *shared(SW1=1.0)),
     "VC VI VD VL VR VM",
-    aliases=("ESST3C",),
+    aliases="ESST3C",
     records=record(
         "ST3C",
         "TR VIMAX VIMIN KPR KIR KDR TDR VPIDMAX VPIDMIN TC TB KA TA VRMAX VRMIN KM TM VMMAX VMMIN "

@@ -77,7 +77,7 @@ ST4B = documented(
         *shared(THETAP=0.0),
     ),
     "VC VR VA VM",
-    aliases=("ESST4B",),
+    aliases="ESST4B",
     records=record(
         "ESST4B", "TR KPR KIR VRMAX VRMIN TA KPM KIM VMMAX VMMIN KG KP KI VBMAX KC XL THETAP"
     ),
@@ -171,7 +171,7 @@ ST4C = documented(
         *shared(VGMAX=5.8, SW1=1.0),
     ),
     "VC VR VM VA VG",
-    aliases=("ESST4C",),
+    aliases="ESST4C",
     records=record(
         "ST4C",
         "TR KPR KIR VRMAX VRMIN KPM KIM VMMAX VMMIN TA VAMAX VAMIN KG TG VGMAX KP KI XL THETAP KC "

@@ -169,7 +169,7 @@ ST5C = documented(
         ("TOB2", 0.08, *TIME, "second regulator lag while OEL has the gate"),
     ),
     "VC VL1 VL2 VE VU1 VU2 VO1 VO2",
-    aliases=("ESST5C",),
+    aliases="ESST5C",
     records=record_of_2016(
         "ST5C", "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2"
     ),

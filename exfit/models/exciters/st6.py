@@ -147,7 +147,7 @@ ST6C = documented(
         *STATIC_SUPPLY,
     ),
     "VC VI VD VM VG",
-    aliases=("ESST6C",),
+    aliases="ESST6C",
     records=record_of_2016(
         "ST6C",
         "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG VMMAX VMMIN TA KP KI "

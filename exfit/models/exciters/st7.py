@@ -148,7 +148,7 @@ ST7C = documented(
     st7c_rest,
     (*ST7B.sheet, *shared(TA_OF_FIRING=0.01)),
     "VC VG VL VF VE",
-    aliases=("ESST7C",),
+    aliases="ESST7C",
     records=record(
         "ST7C",
         "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA TA",

@@ -54,7 +54,7 @@ from exfit.models.sheet import (
     sheet,
 )
 
-ALIASES = ("ESST8C",)
+ALIASES = "ESST8C"
 
 SHEET = sheet(
     *shared(TR=0.012, KPR_OF_REGULATOR=20.0, KIR_OF_REGULATOR=10.0),

@@ -39,7 +39,7 @@ from exfit.models.sheet import (
     sheet,
 )
 
-ALIASES = ("ESST9C",)
+ALIASES = "ESST9C"
 
 SHEET = sheet(
     *shared(TR=0.02),

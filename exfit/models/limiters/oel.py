@@ -139,8 +139,8 @@ OEL2C = documented(
         *RATE_SWITCH,
     ),
     "I T IREF IF OVER BELOW ACTIVE INTEG DERIV V2 V1",
-    places=("takeover", "takeover-output", "summing"),
-    inputs=("ifd",),
+    places="takeover takeover-output summing",
+    inputs="ifd",
     records=record(
         "OEL2C",
         "TC1OEL TB1OEL TC2OEL TB2OEL KPOEL KIOEL KDOEL TDOEL VOELMAX3 VOELMIN3 VOELMAX2 VOELMIN2 "
@@ -203,8 +203,8 @@ OEL3C = documented(
     ),
     "I V",
     doubt="rests on one public diagram, that of Dynawo, which CoLib describes",
-    places=("summing",),
-    inputs=("ifd",),
+    places="summing",
+    inputs="ifd",
     records=record(
         "OEL3C",
         "ITFPU KSCALE TF K1 KOEL TOEL KPOEL VOELMAX1 VOELMIN1 VOELMAX2 VOELMIN2",
@@ -291,6 +291,6 @@ OEL5C = documented(
     ),
     "I IC T LATCH OVER INTEG",
     doubt="rests on one public diagram, that of Dynawo, which CoLib describes",
-    places=("takeover", "takeover-output"),
-    inputs=("ifd",),
+    places="takeover takeover-output",
+    inputs="ifd",
 )

@@ -123,8 +123,8 @@ SCL1C = documented(
     ),
     "I LATE IQ OVER OEX UEX",
     doubt="rests on one public diagram, that of Dynawo",
-    places=("summing",),
-    inputs=("vt", *POWERS),
+    places="summing",
+    inputs="vt p q",
 )
 
 
@@ -307,6 +307,6 @@ SCL2C = documented(
     IPOEL IQOEL OVEROEL BELOWOEL ACTIVEOEL INTEGOEL DERIVOEL V2OEL V1OEL
     IPUEL IQUEL OVERUEL BELOWUEL ACTIVEUEL INTEGUEL DERIVUEL V2UEL V1UEL""",
     doubt="rests on one public diagram, that of Dynawo",
-    places=("takeover", "takeover-output", "summing"),
-    inputs=("vt", *POWERS),
+    places="takeover takeover-output summing",
+    inputs="vt p q",
 )

@@ -15,7 +15,7 @@ from exfit.models.blocks import (
     smaller,
     where,
 )
-from exfit.models.limiter_blocks import POWERS, power, waiting_integral
+from exfit.models.limiter_blocks import power, waiting_integral
 from exfit.models.sheet import (
     LONG_TIME,
     TIME,
@@ -93,8 +93,8 @@ UEL1 = documented(
         *limits("VULMAX", 18.0, -18.0, "the output", WITHIN_1000),
     ),
     "V V1 V3",
-    places=("takeover", "takeover-output", "summing"),
-    inputs=("vt", *POWERS),
+    places="takeover takeover-output summing",
+    inputs="vt p q",
     records=record(
         "UEL1",
         "KUR KUC KUF VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN",
@@ -214,8 +214,8 @@ UEL2C = documented(
         ),
     ),
     "VT P QREF Q KADJ V V1 V3",
-    places=("summing", "takeover", "takeover-output"),
-    inputs=("vt", *POWERS),
+    places="summing takeover takeover-output",
+    inputs="vt p q",
     records=record(
         "UEL2C",
         "TUP TUQ TUV VBIAS K1 K2 KUF TQREF KFIX TADJ SW1 KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 "

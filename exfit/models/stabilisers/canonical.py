@@ -127,7 +127,7 @@ PSS6C = documented(
         *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
     ),
     "V1 V3 V2 W4 WD X1 X2 X3 X4 ON",
-    inputs=("p", "speed"),
+    inputs="p speed",
     records=record(
         "PSS6C",
         "T1 KS2 T2 KS1 T3 MACC T4 TD K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 KS VSI1MAX VSI1MIN "
@@ -200,7 +200,7 @@ PSS7C = documented(
         *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 X1 X2 X3 X4 ON",
-    inputs=("speed", "p"),
+    inputs="speed p",
     records=record(
         "PSS7C",
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 VSI1MAX "

@@ -83,7 +83,7 @@ IEEEST = documented(
         *of_stabiliser(LSMAX=0.1, LSMIN=-0.1),
     ),
     "V1 DV1 V2 DV2 V3 V4 V5",
-    inputs=("speed",),
+    inputs="speed",
     records=record(
         "IEEEST",
         "A1 A2 A3 A4 A5 A6 T1 T2 T3 T4 T5 T6 KS LSMAX LSMIN VCU VCL",
@@ -150,7 +150,7 @@ ST2CUT = documented(
         *of_stabiliser(LSMAX=0.1, LSMIN=-0.1),
     ),
     "V1 V2 V3 V4 V5 V6",
-    inputs=("speed", "p"),
+    inputs="speed p",
     records=record(
         "ST2CUT",
         "K1 K2 T1 T2 T3 T4 T5 T6 T7 T8 T9 T10 LSMAX LSMIN VCU VCL",
@@ -193,7 +193,7 @@ STAB1 = documented(
         *of_stabiliser(T4=0.05, HLIM=0.05),
     ),
     "V1 V2 V3",
-    inputs=("speed",),
+    inputs="speed",
     records=record("STAB1", "K_T T T1_T3 T3 T2_T4 T4 HLIM"),
 )
 
@@ -240,7 +240,7 @@ STAB2A = documented(
         *of_stabiliser(HLIM=0.05),
     ),
     "W1 W2 W3 V3 V5 V6",
-    inputs=("p",),
+    inputs="p",
     records=record(
         "STAB2A", "K2 T2 K3 T3 K4 K5 T5 HLIM", doubt="its order is from one public source"
     ),

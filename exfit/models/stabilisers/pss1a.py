@@ -14,7 +14,7 @@ from exfit.models.blocks import Signal, clip, lag, lead_lag, second_order, washo
 from exfit.models.sheet import SHORT_TIME, WASHOUT_TIME, WITHIN_10000, record, sheet
 from exfit.models.stabiliser_parts import of_stabiliser
 
-INPUTS = ("speed",)
+INPUTS = "speed"
 
 SHEET = sheet(
     ("A1", 0.061, *SHORT_TIME, "first coefficient of the filter"),

@@ -78,8 +78,8 @@ PSS2B = documented(
         *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 V1 V3 V10",
-    inputs=("speed", "p"),
-    aliases=("PSS2A",),
+    inputs="speed p",
+    aliases="PSS2A",
     records=(
         record(
             "PSS2B",
@@ -171,7 +171,7 @@ PSS2C = documented(
         *SWITCH,
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 V1 V3 V10 V12 ON",
-    inputs=("speed", "p"),
+    inputs="speed p",
     records=record(
         "PSS2C",
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "

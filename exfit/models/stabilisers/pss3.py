@@ -75,7 +75,7 @@ PSS3B = documented(
         *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
     ),
     "V1 W1 V2 W2 W3 V3 DV3 V4 DV4",
-    inputs=("p", "speed"),
+    inputs="p speed",
     records=record(
         "PSS3B",
         "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN",
@@ -123,7 +123,7 @@ PSS3C = documented(
     pss3c_rest,
     (*PSS3B.sheet, *SWITCH),
     "V1 W1 V2 W2 W3 V3 DV3 V4 DV4 ON",
-    inputs=PSS3B.inputs,
+    inputs="p speed",
     records=record(
         "PSS3C",
         "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN PPSSON PPSSOFF XCOMP "

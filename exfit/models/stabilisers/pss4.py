@@ -181,7 +181,7 @@ PSS4B = documented(
     ),
     "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
     "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6",
-    inputs=("speed", "p"),
+    inputs="speed p",
     records=record(
         "PSS4B",
         "CLI DLI ALI BLI BWLI1 WLI1 BWLI2 WLI2 TH AH BH M BWH1 WH1 BWH2 WH2 KL1 KL11 TL1 TL2 TL3 "
@@ -260,7 +260,7 @@ PSS4C = documented(
     "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
     "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6 VL1 VL2 VL3 VL4 VL5 VL6",
     doubt="rests on one public diagram, that of InterPSS",
-    inputs=PSS4B.inputs,
+    inputs="speed p",
     records=record(
         "PSS4C",
         " ".join((*PSS4B.records[0].cons, *(row.symbol for row in VERY_LOW))),

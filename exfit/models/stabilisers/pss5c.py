@@ -34,7 +34,7 @@ from exfit.models.blocks import Signal, clip, lag, lead_lag, second_order, secon
 from exfit.models.sheet import WITHIN_10000, Sheet, limits, record, sheet
 from exfit.models.stabiliser_parts import of_stabiliser
 
-INPUTS = ("speed",)
+INPUTS = "speed"
 
 
 def band_rows(letter: str, name: str, gain: float, frequency: float, most: float) -> Sheet:
