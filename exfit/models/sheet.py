@@ -135,8 +135,8 @@ def sheet(*rows: Row | Parameter) -> Sheet:
     made: list[Parameter] = []
     for row in rows:
         if not isinstance(row, Parameter):
-            symbol, typical, unit, limits, *described = row
-            row = Parameter(symbol, typical, unit, *limits, *described)
+            symbol, typical, unit, bounds, *described = row
+            row = Parameter(symbol, typical, unit, *bounds, *described)
         made.append(row)
     return tuple(made)
 
@@ -150,107 +150,103 @@ def limits(ceiling: str, high: float, low: float, of: str, kind: Kind = LIMIT) -
 def table(*rows: SharedRow) -> Sheet:
     """Make rows that models share, of (name, unit, (low, high), meaning): see ``chosen``."""
     return tuple(
-        Parameter(name, 0.0, unit, *limits, meaning, *search)
-        for name, unit, limits, meaning, *search in rows
+        Parameter(name, 0.0, unit, *bounds, meaning, *search)
+        for name, unit, bounds, meaning, *search in rows
     )
 
 
-def chosen(table: Sheet, **typical: float) -> Sheet:
+def chosen(rows: Sheet, **typical: float) -> Sheet:
     """Take rows of a table by their names, each with the typical value of this model, ``KA=46.0``.
 
     A name is a symbol, followed by _ and a word where the symbol has several meanings.
 
     Raises KeyError for a name that is not in the table.
     """
-    rows = {row.symbol: row for row in table}
+    known = {row.symbol: row for row in rows}
     return tuple(
-        rows[name]._replace(symbol=name.partition("_")[0], typical=value)
+        known[name]._replace(symbol=name.partition("_")[0], typical=value)
         for name, value in typical.items()
     )
 
 
 # rows that exciters share by name: the unit, the range and the meaning of each
-SHARED = table(
-    ("TR", "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", *GAIN, "regulator gain", FREE),
-    ("TA", *SHORT_TIME, "regulator time constant", REGULATOR_LAG),
-    ("TB", *TIME, "regulator lag"),
-    ("TC", *TIME, "regulator lead"),
-    ("VRMAX", *LIMIT, "regulator ceiling"),
-    ("VRMIN", *LIMIT, "regulator floor"),
-    ("KE", *UP_TO_10, "exciter constant"),
-    ("TE", *POSITIVE_TIME, "exciter time constant", EXCITER_LAG),
-    ("KF", *UP_TO_10, "stabilising feedback gain", FEEDBACK),
-    ("TF", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", *UP_TO_100, "first voltage of the saturation curve"),
-    ("SE1", *UP_TO_100, "saturation at E1"),
-    ("E2", *UP_TO_100, "second voltage of the saturation curve"),
-    ("SE2", *UP_TO_100, "saturation at E2"),
-    ("KC", *UP_TO_100, "rectifier loading factor"),
-    ("KD", *UP_TO_100, "demagnetising factor", DEMAGNETISING),
-    ("VEMIN", *LIMIT, "floor of the exciter voltage"),
-    ("KP", "pu", (0.01, 100.0), "potential source gain"),
-    ("KI", *UP_TO_100, "current source gain, on load"),
-    ("XL", *UP_TO_10, "reactance of the potential source, on load"),
-    ("THETAP", "deg", (-360.0, 360.0), "angle of the potential source, on load"),
-    ("VBMAX", "pu", (0.01, 9999.0), "ceiling of the source voltage"),
-    ("VFEMAX", *LIMIT, "ceiling of the exciter's field current"),
-    ("VAMAX", *LIMIT, "regulator ceiling"),
-    ("VAMIN", *LIMIT, "regulator floor"),
-    ("KIR", *INTEGRAL_GAIN, "integral gain", FREE),
-    ("TDR", *SHORT_TIME, "lag of the derivative", SearchRange(needs="KDR")),
-    ("VIMAX", *LIMIT, "ceiling of the voltage error"),
-    ("VIMIN", *LIMIT, "floor of the voltage error"),
-    ("TF1", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
-    ("KG", *UP_TO_100, "feedback gain of the field voltage loop"),
-    ("EFDMAX", "pu", (0.01, 9999.0), "ceiling of the field voltage"),
-    ("EFDN", *UP_TO_100, "field voltage where the feedback gain changes"),
-    ("K", *GAIN, "regulator gain", FREE),
-    ("KA_FIXED", "pu", (0.0001, 100000.0), "regulator gain"),
-    ("KB", "pu", (0.01, 10000.0), "second stage gain", FREE),
-    ("KC_FREE", *UP_TO_100, "rectifier loading factor", LOADING),
-    ("KDR", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    ("KD_OF_PID", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
-    ("KE_ABOVE_0", "pu", (0.01, 10.0), "exciter constant"),
-    ("KE_OR_0", *WITHIN_10, "exciter constant, or 0"),
-    ("KE_SIGNED", *WITHIN_10, "exciter constant"),
-    ("KF_FIXED", *UP_TO_10, "stabilising feedback gain"),
-    ("KF_TO_EFDN", *UP_TO_10, "stabilising feedback gain up to EFDN", FEEDBACK),
-    ("KH", *UP_TO_100, "feedback gain of the exciter's field current", FREE),
-    ("KIR_OF_REGULATOR", *INTEGRAL_GAIN, "integral gain of the regulator", FREE),
-    ("KI_OF_PID", *INTEGRAL_GAIN, "integral gain", FREE),
-    ("KLR", *UP_TO_1000, "field current limiter gain"),
-    ("KN", *UP_TO_10, "stabilising feedback gain beyond EFDN"),
-    ("KPR", *PID_GAIN, "proportional gain", FREE),
-    ("KPR_OF_REGULATOR", *PID_GAIN, "proportional gain of the regulator", FREE),
-    ("KP_OF_PID", *PID_GAIN, "proportional gain", FREE),
-    ("KP_OR_0", *UP_TO_100, "potential source gain"),
-    ("KR", "pu", (0.01, 1000.0), "gain of the regulator's supply"),
-    ("SW1", "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
-    ("TATB", "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
-    ("TA_FIXED", *SHORT_TIME, "regulator time constant"),
-    ("TA_OF_FIRING", *SHORT_TIME, "firing circuit time constant", FREE),
-    ("TB_ALONE", *TIME, "regulator lag", FREE),
-    ("TB_FREE", *TIME, "regulator lag", LAG_OF_TC),
-    ("TC_FREE", *TIME, "regulator lead", LEAD_OF_TB),
-    ("TD", *SHORT_TIME, "lag of the derivative", SearchRange(needs="KD")),
-    ("TE_OR_0", *SHORT_TIME, "exciter time constant", EXCITER_LAG),
-    ("TF2", *TIME, "stabilising feedback lag"),
-    ("VEMAX", *LIMIT, "ceiling of the exciter voltage"),
-    ("VGMAX", "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
-    ("VMMAX", *LIMIT, "ceiling of the field voltage loop"),
-    ("VMMIN", *LIMIT, "floor of the field voltage loop"),
-    ("VPIDMAX", *LIMIT, "ceiling of the PID"),
-    ("VPIDMIN", *LIMIT, "floor of the PID"),
-    ("VRMAX_AT_VT_OR_0", *LIMIT, "regulator ceiling at rated voltage, or 0"),
-    ("VRMAX_OF_EFD", *LIMIT, "ceiling of the field voltage"),
-    ("VRMAX_OF_EFD_AT_VT", *LIMIT, "ceiling of the field voltage at rated voltage"),
-    ("VRMAX_OF_EXCITER", *LIMIT, "ceiling of the exciter's field voltage"),
-    ("VRMAX_OR_0", *LIMIT, "regulator ceiling, or 0"),
-    ("VRMIN_AT_VT", *LIMIT, "regulator floor at rated voltage"),
-    ("VRMIN_OF_EFD", *LIMIT, "floor of the field voltage"),
-    ("VRMIN_OF_EFD_AT_VT", *LIMIT, "floor of the field voltage at rated voltage"),
-    ("VRMIN_OF_EXCITER", *LIMIT, "floor of the exciter's field voltage"),
+SHARED = (
+    *table(
+        ("TR", "s", (0.0, 1.0), "voltage transducer lag"),
+        ("KA", *GAIN, "regulator gain", FREE),
+        ("TA", *SHORT_TIME, "regulator time constant", REGULATOR_LAG),
+        ("TB", *TIME, "regulator lag"),
+        ("TC", *TIME, "regulator lead"),
+        ("VRMAX", *LIMIT, "regulator ceiling"),
+        ("VRMIN", *LIMIT, "regulator floor"),
+        ("KE", *UP_TO_10, "exciter constant"),
+        ("TE", *POSITIVE_TIME, "exciter time constant", EXCITER_LAG),
+        ("KF", *UP_TO_10, "stabilising feedback gain", FEEDBACK),
+        ("TF", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
+        ("E1", *UP_TO_100, "first voltage of the saturation curve"),
+        ("SE1", *UP_TO_100, "saturation at E1"),
+        ("E2", *UP_TO_100, "second voltage of the saturation curve"),
+        ("SE2", *UP_TO_100, "saturation at E2"),
+        ("KC", *UP_TO_100, "rectifier loading factor"),
+        ("KD", *UP_TO_100, "demagnetising factor", DEMAGNETISING),
+        ("VEMIN", *LIMIT, "floor of the exciter voltage"),
+        ("KP", "pu", (0.01, 100.0), "potential source gain"),
+        ("KI", *UP_TO_100, "current source gain, on load"),
+        ("XL", *UP_TO_10, "reactance of the potential source, on load"),
+        ("THETAP", "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+        ("VBMAX", "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        ("VFEMAX", *LIMIT, "ceiling of the exciter's field current"),
+        ("VAMAX", *LIMIT, "regulator ceiling"),
+        ("VAMIN", *LIMIT, "regulator floor"),
+        ("KIR", *INTEGRAL_GAIN, "integral gain", FREE),
+        ("TDR", *SHORT_TIME, "lag of the derivative", SearchRange(needs="KDR")),
+        ("TF1", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
+        ("KG", *UP_TO_100, "feedback gain of the field voltage loop"),
+        ("EFDMAX", "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+        ("EFDN", *UP_TO_100, "field voltage where the feedback gain changes"),
+        ("K", *GAIN, "regulator gain", FREE),
+        ("KA_FIXED", "pu", (0.0001, 100000.0), "regulator gain"),
+        ("KB", "pu", (0.01, 10000.0), "second stage gain", FREE),
+        ("KC_FREE", *UP_TO_100, "rectifier loading factor", LOADING),
+        ("KDR", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
+        ("KD_OF_PID", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),
+        ("KE_ABOVE_0", "pu", (0.01, 10.0), "exciter constant"),
+        ("KE_OR_0", *WITHIN_10, "exciter constant, or 0"),
+        ("KE_SIGNED", *WITHIN_10, "exciter constant"),
+        ("KF_FIXED", *UP_TO_10, "stabilising feedback gain"),
+        ("KF_TO_EFDN", *UP_TO_10, "stabilising feedback gain up to EFDN", FEEDBACK),
+        ("KH", *UP_TO_100, "feedback gain of the exciter's field current", FREE),
+        ("KIR_OF_REGULATOR", *INTEGRAL_GAIN, "integral gain of the regulator", FREE),
+        ("KI_OF_PID", *INTEGRAL_GAIN, "integral gain", FREE),
+        ("KLR", *UP_TO_1000, "field current limiter gain"),
+        ("KN", *UP_TO_10, "stabilising feedback gain beyond EFDN"),
+        ("KPR", *PID_GAIN, "proportional gain", FREE),
+        ("KPR_OF_REGULATOR", *PID_GAIN, "proportional gain of the regulator", FREE),
+        ("KP_OF_PID", *PID_GAIN, "proportional gain", FREE),
+        ("KP_OR_0", *UP_TO_100, "potential source gain"),
+        ("KR", "pu", (0.01, 1000.0), "gain of the regulator's supply"),
+        ("SW1", "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
+        ("TATB", "1", (0.0, 100.0), "regulator lead, as a share of its lag", FREE),
+        ("TA_FIXED", *SHORT_TIME, "regulator time constant"),
+        ("TA_OF_FIRING", *SHORT_TIME, "firing circuit time constant", FREE),
+        ("TB_ALONE", *TIME, "regulator lag", FREE),
+        ("TB_FREE", *TIME, "regulator lag", LAG_OF_TC),
+        ("TC_FREE", *TIME, "regulator lead", LEAD_OF_TB),
+        ("TD", *SHORT_TIME, "lag of the derivative", SearchRange(needs="KD")),
+        ("TE_OR_0", *SHORT_TIME, "exciter time constant", EXCITER_LAG),
+        ("TF2", *TIME, "stabilising feedback lag"),
+        ("VEMAX", *LIMIT, "ceiling of the exciter voltage"),
+        ("VGMAX", "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
+        ("VRMAX_AT_VT_OR_0", *LIMIT, "regulator ceiling at rated voltage, or 0"),
+        ("VRMAX_OR_0", *LIMIT, "regulator ceiling, or 0"),
+        ("VRMIN_AT_VT", *LIMIT, "regulator floor at rated voltage"),
+    ),
+    *limits("VIMAX", 0.0, 0.0, "the voltage error"),
+    *limits("VPIDMAX", 0.0, 0.0, "the PID"),
+    *limits("VMMAX", 0.0, 0.0, "the field voltage loop"),
+    *limits("VRMAX_OF_EFD", 0.0, 0.0, "the field voltage"),
+    *limits("VRMAX_OF_EFD_AT_VT", 0.0, 0.0, "the field voltage at rated voltage"),
+    *limits("VRMAX_OF_EXCITER", 0.0, 0.0, "the exciter's field voltage"),
 )
 shared = partial(chosen, SHARED)
 

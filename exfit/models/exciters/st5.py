@@ -25,18 +25,16 @@ from exfit.models.sheet import (
     sheet,
 )
 
-Times = tuple[Signal, Signal, Signal, Signal]  # TC1 TB1 TC2 TB2
 
-
-def lead_lags(
-    error: Signal, states: tuple[Signal, Signal], times: Times, p: Signal
-) -> tuple[Signal, Limited, Limited]:
-    """Return the output of two limited lead-lags in series, and the slopes of their states."""
+def lead_lags(u: Signal, gate: str, s: Signal, p: Signal, d: Signal) -> Signal:
+    """Pass a signal through two limited lead-lags: while a ``gate``, U or O, is had, by its own."""
     low, high = p.VRMIN / p.KR, p.VRMAX / p.KR
-    TC1, TB1, TC2, TB2 = times
-    vl1, first = limited_lead_lag(error, states[0], TC1, TB1, low, high)
-    vl2, second = limited_lead_lag(vl1, states[1], TC2, TB2, low, high)
-    return vl2, first, second
+    for k in (1, 2):
+        lead, slow, state = (f"T{gate}C{k}", f"T{gate}B{k}", f"V{gate or 'L'}{k}")
+        times = getattr(p, lead), getattr(p, slow)
+        u, slope = limited_lead_lag(u, getattr(s, state), *times, low, high)
+        setattr(d, state, slope)
+    return u
 
 
 def fired(vl: Signal, s: Signal, u: Signal, p: Signal) -> tuple[Signal, Limited]:
@@ -70,9 +68,7 @@ def st5b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = clip(u.vref - vc, u.vuel, u.voel) + u.vs
-    times = p.TC1, p.TB1, p.TC2, p.TB2
-    vl, d.VL1, d.VL2 = lead_lags(error, (s.VL1, s.VL2), times, p)
-    efd, d.VE = fired(vl, s, u, p)
+    efd, d.VE = fired(lead_lags(error, "", s, p, d), s, u, p)
     return efd
 
 
@@ -137,11 +133,7 @@ def st5c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     error = u.vref + u.vsum - vc
     raised = larger(error, u.vuel)
     signal = smaller(raised, u.voel) + u.vs
-    own, under = (p.TC1, p.TB1, p.TC2, p.TB2), (p.TUC1, p.TUB1, p.TUC2, p.TUB2)
-    over = p.TOC1, p.TOB1, p.TOC2, p.TOB2
-    vl, d.VL1, d.VL2 = lead_lags(signal, (s.VL1, s.VL2), own, p)
-    vu, d.VU1, d.VU2 = lead_lags(signal, (s.VU1, s.VU2), under, p)
-    vo, d.VO1, d.VO2 = lead_lags(signal, (s.VO1, s.VO2), over, p)
+    vl, vu, vo = (lead_lags(signal, gate, s, p, d) for gate in ("", "U", "O"))
     chosen = where(u.voel < raised, vo, where(u.vuel > error, vu, vl))
     efd, d.VE = fired(chosen, s, u, p)
     return efd
@@ -196,9 +188,7 @@ def urst5t(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = clip(u.vref + u.vsum - vc, u.vuel, u.voel) + u.vs
-    times = p.TC1, p.TB1, p.TC2, p.TB2
-    vl, d.VL1, d.VL2 = lead_lags(error, (s.VL1, s.VL2), times, p)
-    vr = clip(p.KR * vl, p.VRMIN, p.VRMAX)
+    vr = clip(p.KR * lead_lags(error, "", s, p, d), p.VRMIN, p.VRMAX)
     ve, d.VE = limited_lag(vr, s.VE, 1.0, p.T1, u.vt * p.VRMIN, u.vt * p.VRMAX)
     return ve - p.KC * u.ifd
 
