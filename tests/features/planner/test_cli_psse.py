@@ -185,7 +185,7 @@ def test_a_file_that_exists_is_kept_unless_forced(run, fitted, command):
 # ---- a stabiliser
 
 STABILISER = replace(
-    MODELS["FIRST_ORDER"], name="PSSX", records=(record("PSSX", "a k", icons={"MODE": 1}),)
+    MODELS["FIRST_ORDER"], name="PSSX", records=record("PSSX", "a k", icons={"MODE": 1})
 )
 
 

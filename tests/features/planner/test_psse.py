@@ -34,7 +34,7 @@ DEFINITIONS = {(one.model.name, one.record.name): one for one in definitions()}
 DEFINITIONS["AC1A", "MADEUP"] = Definition(
     "exciter",
     MODELS["AC1A"],
-    record(
+    *record(
         "MADEUP",
         "TR KA Switch TA E1 SE1 E2 SE2 TE Spare TUC",
         icons={"UEL": 1, "VOS": 2},
