@@ -35,7 +35,8 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
     equations exclude, or values that contradict each other.
     """
     rows, faults = case.rows(), list[str]()
-    names = [*rows, *(name for name in case.values() if name not in rows), *_of_records(case)]
+    names = [*rows, *(name for name in case.values() if name not in rows)]
+    names += _of_records(case) if given else []
     for name, value in given.items():
         if name not in names:
             faults.append(f"{name}: not a parameter; {near(name, names)}")
