@@ -61,15 +61,6 @@ def worth_trying(linear: LinearModel, promise: float, rejections: int) -> bool:
     return promise > EPS * cost
 
 
-def held_back(linear: LinearModel, step: DampedStep, reach: float) -> bool:
-    """Tell whether a step, the best within reach, is another than the full Gauss-Newton step."""
-    farthest = np.max(abs(step.target - linear.point.x) / linear.box.unit)
-    if linear.rank == len(linear.scale) and farthest < reach * (1.0 - SAME):
-        return False
-    apart = abs(step.target - linear.full.target)
-    return bool(np.any(apart > SAME * linear.box.unit))
-
-
 def to_parabola(rise: float, slope: float) -> float:
     """Shorten a trial to the minimum of the parabola, by 0.2 ... 0.5.
 
@@ -100,7 +91,10 @@ def shorten(
     Source: Armijo 1966.
     """
     cost, length, reductions = linear.point.cost, 1.0, 0
-    capped = held_back(linear, step, reach)
+    capped, unit = False, linear.box.unit  # whether it is another than the full step
+    farthest = np.max(abs(step.target - linear.point.x) / unit)
+    if linear.rank < len(linear.scale) or farthest >= reach * (1.0 - SAME):
+        capped = bool(np.any(abs(step.target - linear.full.target) > SAME * unit))
     while reductions < trials and worth_trying(linear, -length * step.slope, reductions):
         trial = yield from problem.evaluate(step.at(length))
         if trial.cost < cost and trial.cost <= cost + armijo * length * step.slope:
@@ -296,7 +290,13 @@ def damping(linear: LinearModel, radius: float) -> float:
 
     Source: Moré 1978, section 5 (Newton's iteration on 1/|y|, safeguarded).
     """
-    s, b = free_part(linear)
+    free, k = linear.projected != 0.0, linear.rank
+    s, b = linear.singular[:k], linear.amounts[:k]
+    if not free.all():  # of the variables that no bound holds
+        A = s[:, None] * linear.directions[:k, free]
+        left, s, _ = np.linalg.svd(A, full_matrices=False)
+        determined = s > linear.unseen * max(np.max(s, initial=0.0), TINY)
+        s, b = s[determined], (left.T @ b)[determined]
     if norm(b / s) <= (1.0 + SLACK) * radius:
         return 0.0
     low, high = 0.0, norm(s * b) / radius
@@ -311,17 +311,6 @@ def damping(linear: LinearModel, radius: float) -> float:
         if not low < nu < high:
             nu = max(1e-3 * high, sqrt(low * high))
     return nu
-
-
-def free_part(linear: LinearModel) -> tuple[Array, Array]:
-    """Return singular values and amounts of the variables that no bound holds; both (K,)."""
-    free, k = linear.projected != 0.0, linear.rank
-    if free.all():
-        return linear.singular[:k], linear.amounts[:k]
-    A = linear.singular[:k, None] * linear.directions[:k, free]
-    left, s, _ = np.linalg.svd(A, full_matrices=False)
-    determined = s > linear.unseen * max(np.max(s, initial=0.0), TINY)
-    return s[determined], (left.T @ linear.amounts[:k])[determined]
 
 
 LOW, HIGH = 0.25, 0.75  # gain ratios: nu is raised below the first, lowered above the second
