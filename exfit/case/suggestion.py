@@ -45,12 +45,12 @@ class Base:
         return float(f"{self.value * scale:.12g}")
 
 
-def base_of(text: str, place: str) -> Base:
-    """Return the base that a text is, as 15.75kV; raises ExfitError, which begins with a place."""
+def base_of(text: str) -> Base:
+    """Return the base that a text is, as 15.75kV; raises ExfitError."""
     parts = BASE.fullmatch(text.strip())
     unit = parts["unit"].strip() if parts is not None and parts["unit"] else None
     if parts is None or float(parts["value"]) <= 0.0 or (unit and unit_of(unit) is None):
-        raise ExfitError(f"{place}: {text!r} is not a positive number with a unit, as 15.75kV")
+        raise ExfitError(f"{text!r} is not a positive number with a unit, as 15.75kV")
     return Base(float(parts["value"]), None if unit is None else usual(unit))
 
 
@@ -62,7 +62,10 @@ def bases_of(texts: tuple[str, ...]) -> dict[str, Base]:
         if not equals or signal not in RECORDED:
             hint = near(signal, RECORDED) if equals else "give it as vt=15.75kV"
             raise ExfitError(f"--base {text}: not a signal and its base; {hint}")
-        bases[signal] = base_of(value, f"--base {text}")
+        try:
+            bases[signal] = base_of(value)
+        except ExfitError as fault:
+            raise ExfitError(f"--base {text}: {fault}") from None
     return bases
 
 

@@ -1,7 +1,7 @@
 """The command new: from a recorder's file to a case."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,18 +31,6 @@ if TYPE_CHECKING:
 
 
 RATING = click.FloatRange(min=0.0, min_open=True)
-
-
-@dataclass(frozen=True)
-class UnitSources:
-    """Where the data of a unit come from, as the options say."""
-
-    model: str | None
-    machine: str | None
-    dyr: Path | None
-    bus: int | None
-    machine_id: str | None
-    machine_from: Path | None
 
 
 @click.command(short_help="Make a case from a record and a model or a planner's file.")
@@ -142,8 +130,7 @@ def new(
     if output is not None:
         refuse_existing(output, force)
     folder = Path() if output is None else output.parent
-    sources = UnitSources(model, machine, dyr, bus, machine_id, machine_from)
-    data = _unit(sources, folder)
+    data = _unit(model, machine, dyr, bus, machine_id, machine_from, folder)
     reading = RecordSettings(clock, unit, sheet, memory=memory)
     tests = _tests(file, table, sizes, rated_bases(bases_of(bases), kv, mva), reading)
     warn(doubtful_bases(tests))
@@ -188,41 +175,34 @@ def _tests(
     return tests_of_table(rows, {path: reading.inspect(path) for path in files}, bases)
 
 
-def _unit(given: UnitSources, folder: Path) -> "UnitData":
+def _unit(
+    model: str | None,
+    machine: str | None,
+    dyr: Path | None,
+    bus: int | None,
+    machine_id: str | None,
+    machine_from: Path | None,
+    folder: Path,
+) -> "UnitData":
     """Return the data of the unit: typical, a planner's, with the machine of another case."""
-    from dataclasses import replace
-
-    from exfit.features.start.starting_case import machine_of_case, unit_with
-
-    _refuse_unused(given)
-    planner = None
-    if given.dyr is not None:
-        planner = _planner(given.dyr, given.bus, given.machine_id, folder)
-    data = unit_with(given.model, given.machine, planner, folder)
-    if given.machine_from is not None:
-        data = replace(data, machine=machine_of_case(given.machine_from))
-    return data
-
-
-def _refuse_unused(given: UnitSources) -> None:
-    """Raise UsageError for options that lack another, or contradict one."""
-    if given.model is None and given.dyr is None:
-        raise click.UsageError("Missing option '--model', or '--dyr'.")
-    if given.machine is not None and (given.dyr or given.machine_from):
-        raise click.UsageError("--machine: not allowed with --dyr or --machine-from.")
-    if given.dyr is None and (given.bus is not None or given.machine_id is not None):
-        raise click.UsageError("--bus and --id: only with --dyr.")
-
-
-def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -> "UnitData":
-    """Return the data of a unit of a planner's file; what of it is left out is reported."""
     from exfit.case.suggestion import relative
     from exfit.features.planner.fields import located
     from exfit.features.planner.import_case import import_unit, unit_data
+    from exfit.features.start.starting_case import machine_of_case, unit_with
 
-    unit = import_unit(dyr, bus, machine_id)
-    warn(located(unit.warnings, str(dyr)))
-    return unit_data(unit, relative(dyr, folder))
+    if model is None and dyr is None:
+        raise click.UsageError("Missing option '--model', or '--dyr'.")
+    if machine is not None and (dyr or machine_from):
+        raise click.UsageError("--machine: not allowed with --dyr or --machine-from.")
+    planner = None
+    if dyr is not None:
+        unit = import_unit(dyr, bus, machine_id)
+        warn(located(unit.warnings, str(dyr)))
+        planner = unit_data(unit, relative(dyr, folder))
+    elif bus is not None or machine_id is not None:
+        raise click.UsageError("--bus and --id: only with --dyr.")
+    data = unit_with(model, machine, planner, folder)
+    return replace(data, machine=machine_of_case(machine_from)) if machine_from else data
 
 
 def _facts(texts: tuple[str, ...]) -> dict[str, str]:
@@ -238,23 +218,19 @@ def _facts(texts: tuple[str, ...]) -> dict[str, str]:
 
 def _asked(draft: "CaseDraft") -> "CaseDraft":
     """Fill in what the user gives for the open values of a case; Enter leaves one open."""
-    given = {}
+    given: dict[OpenValue, str | float] = {}
     for value in draft.open_values():
-        answer = click.prompt(printable(_question(value)), default="", show_default=False, err=True)
-        if answer.strip():
-            given[value] = _answer(answer.strip(), value)
+        text = click.prompt(printable(_question(value)), default="", show_default=False, err=True)
+        answer = text.strip()
+        if not answer:
+            continue
+        try:
+            given[value] = answer if value.place[-1] in ("column", "unit") else float(answer)
+        except ValueError:
+            place = dotted(value.place)
+            raise ExfitError(f"{place}: {answer!r} is not a number") from None
     return draft.filled(given)
 
 
 def _question(value: "OpenValue") -> str:
     return f"{dotted(value.place)} ({value.hint})" if value.hint else dotted(value.place)
-
-
-def _answer(answer: str, value: "OpenValue") -> str | float:
-    """Read an answer: a name, or a number; raises ExfitError where it is none."""
-    if value.place[-1] in ("column", "unit"):
-        return answer
-    try:
-        return float(answer)
-    except ValueError:
-        raise ExfitError(f"{dotted(value.place)}: {answer!r} is not a number") from None

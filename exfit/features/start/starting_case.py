@@ -156,7 +156,7 @@ def starting_case(
         **({"about": about} if about else {FACTS_TO_COME: None}),
         "model": unit.name,
         **({"efd_times_speed": True} if unit.exciter.times_speed else {}),
-        "plant": _event_plant(event, unit.machine) if event else _plant(unit, first.inspection),
+        "plant": _plant(unit, first.inspection, event),
         **{key: added_section(part) for key, part in unit.added.items()},
         **recordings,
         "parameters": _parameters(unit.exciter),
@@ -237,7 +237,12 @@ def _bump_tests(
     entries = list[tuple[StartingTest, Section]]()
     for test in sorted(tests, key=lambda test: test.validates):
         inspection = test.inspection
-        level = _voltage_before(exciter, test)
+        level: Section = {}
+        voltage = inspection.channel_of("vt")
+        if exciter == ALONE and test.window is None:
+            level["vt0"] = Noted(rounded(voltage.level if voltage else 1.0), "at rest")
+        elif exciter != ALONE and test.steps and not test.steps[0].from_start:
+            level["vt0"] = Noted({"start": "auto"}, "at rest: the noise of its mean counts")
         steps = {**level, **steps_section(inspection, test.steps, test.sizes)}
         own = channels_section(inspection, ("vt", *test.bases), test.bases)
         text = in_braces(own)
@@ -253,28 +258,20 @@ def _bump_tests(
     return fitted, validating or {VALIDATION_TO_COME: None}
 
 
-def _voltage_before(exciter: str, test: StartingTest) -> Section:
-    """Give the voltage before a test: a number where the exciter is alone."""
-    voltage = test.inspection.channel_of("vt")
-    if exciter == ALONE and test.window is None:
-        return {"vt0": Noted(rounded(voltage.level if voltage else 1.0), "at rest")}
-    if exciter == ALONE or not test.steps or test.steps[0].from_start:
-        return {}
-    return {"vt0": Noted({"start": "auto"}, "at rest: the noise of its mean counts")}
-
-
-def _event_plant(event: Section, machine: PartData) -> Section:
-    return {**event["plant"], **_machine(machine, {"R": TYPICAL, "X": TYPICAL})}
-
-
-def _plant(unit: UnitData, inspection: Inspection) -> Section:
+def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
+    if event:
+        return {**event["plant"], **_machine(unit.machine, {"R": TYPICAL, "X": TYPICAL})}
     if unit.exciter.model.name == ALONE:
         return {"type": "none"}
     power = inspection.channel_of("p")
     if power is None or not shows_power(power):
         kind = Noted(OPEN_CIRCUIT.name, "the breaker is open, at rated speed")
         return {"type": kind, **_machine(unit.machine, {})}
-    levels = {signal.upper(): _level(inspection, signal) for signal in ("p", "q")}
+    levels: dict[str, float | str] = {"P": QUESTION, "Q": QUESTION}
+    for signal in ("p", "q"):
+        channel = inspection.channel_of(signal)
+        if channel is not None and channel.unit in (None, "pu"):
+            levels[signal.upper()] = float(f"{channel.level:.4g}")
     network = {
         "f0": Noted(QUESTION, "Hz, rated frequency"),
         "R": Noted(0.0, "pu, resistance to the source"),
@@ -296,14 +293,6 @@ def _machine(machine: PartData, sources: Mapping[str, str]) -> Section:
     values = {row.symbol: parameter(row, machine.values[row.symbol]) for row in model.sheet}
     section = {"machine": Noted(model.name, machine.origin or model.title), "parameters": values}
     return with_sources(section, {**sources, **machine.sources})
-
-
-def _level(inspection: Inspection, signal: str) -> float | str:
-    """Find the level of a signal at rest; to be filled in where the record does not show it."""
-    channel = inspection.channel_of(signal)
-    if channel is None or channel.unit not in (None, "pu"):
-        return QUESTION
-    return float(f"{channel.level:.4g}")
 
 
 def _parameters(exciter: PartData) -> Section:
@@ -361,21 +350,22 @@ def case_of_plan(
     says is to be filled in. Raises ExfitError where a record cannot be read or contradicts its row.
     """
     inspections = {file: settings.inspect(file) for file, settings in case.settings.items()}
-    tests = _tests(case.tests, inspections, bases)
+    first, only = case.tests[0], next(iter(inspections.values()))
+    if len(case.tests) == 1 and not tests_of(only) and first.at is None and first.step is None:
+        own = {} if first.base is None else {"vt": first.base}
+        tests = starting_tests([only], (), {**bases, **own})
+    else:
+        tests = tests_of_table([*_of_each_test(case.tests, inspections)], inspections, bases)
     draft = starting_case(unit, tests, folder, case.about)
-    given = dict(_given_values(case, draft.open_values()))
+    voltages = {settings.voltage for settings in case.settings.values() if settings.voltage}
+    given: dict[OpenValue, str | float] = {}
+    for value in draft.open_values():
+        *_, section, key = ("", *value.place)
+        if section == "network" and key in case.network:
+            given[value] = case.network[str(key)]
+        elif value.place[-3:] == ("channels", "vt", "column") and len(voltages) == 1:
+            given[value] = next(iter(voltages))
     return MadeCase(draft.filled(given), tuple(doubtful_bases(tests)))
-
-
-def _tests(
-    rows: Sequence[TableRow], inspections: Mapping[Path, Inspection], bases: Mapping[str, Base]
-) -> tuple[StartingTest, ...]:
-    """Return the tests of rows; one without an instant is of all the tests of its record."""
-    only = inspections[rows[0].file] if len(rows) == 1 and rows[0].file is not None else None
-    if only is not None and not tests_of(only) and rows[0].at is None and rows[0].step is None:
-        base = rows[0].base
-        return starting_tests([only], (), bases if base is None else {**bases, "vt": base})
-    return tests_of_table([*_of_each_test(rows, inspections)], inspections, bases)
 
 
 def _of_each_test(
@@ -397,16 +387,3 @@ def _of_each_test(
                 except ExfitError as fault:
                     raise ExfitError(f"{row.place}: step: {fault}") from None
             yield row._replace(at=test.at)
-
-
-def _given_values(
-    case: CaseOfTable, values: Sequence[OpenValue]
-) -> Iterator[tuple[OpenValue, str | float]]:
-    """Yield the open values of a case that its table gives, as a case has them."""
-    voltages = {settings.voltage for settings in case.settings.values() if settings.voltage}
-    for value in values:
-        *_, section, key = ("", *value.place)
-        if section == "network" and key in case.network:
-            yield value, case.network[str(key)]
-        elif value.place[-3:] == ("channels", "vt", "column") and len(voltages) == 1:
-            yield value, next(iter(voltages))

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign
-from typing import NamedTuple, NoReturn
 
 from exfit.case.suggestion import Base
 from exfit.errors import ExfitError, FileError
@@ -47,33 +46,32 @@ def starting_tests(
     for a record in which the breaker opens, for one of several that shows no step, and for a
     play-in file.
     """
-    _refuse_play_in(inspections)
-    if any(inspection.is_event for inspection in inspections):
-        return _events(inspections, sizes, bases or {})
-    _refuse_rejections(inspections)
-    recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
-    given = bases or {}
-    if not recorded and len(inspections) == 1:
-        _refuse_unused(sizes, [])
-        return (StartingTest("fit", inspections[0], (), bases=given),)
-    _refuse_without_steps(inspections)
-    made = [
-        started(inspection, test, amount, given, k % 2 == 1)
-        for k, ((inspection, test), amount) in enumerate(
-            zip(recorded, _amounts(recorded, sizes), strict=True)
-        )
-    ]
-    return renamed(made, [test for _, test in recorded])
-
-
-def _refuse_play_in(inspections: Sequence[Inspection]) -> None:
-    """Raise ExfitError for a play-in file: it has nothing that a fit could be compared with."""
     for inspection in inspections:
-        if inspection.plays_in:
+        if inspection.plays_in:  # it has nothing that a fit could be compared with
             raise ExfitError(
                 f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
                 "sections of a case that exfit simulate takes"
             )
+    if any(inspection.is_event for inspection in inspections):
+        return _events(inspections, sizes, bases or {})
+    for inspection in inspections:
+        if inspection.opening is not None:
+            raise _rejection(inspection, inspection.opening)
+    given = bases or {}
+    without = [inspection.path for inspection in inspections if not tests_of(inspection)]
+    if without and len(inspections) == 1:
+        _refuse_unused(sizes, [])
+        return (StartingTest("fit", inspections[0], (), bases=given),)
+    if without:
+        text = "shows no step; a table of tests can say where it is"
+        raise FileError(f"{path}: {text}" for path in without)
+    recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
+    amounts = zip(recorded, _amounts(recorded, sizes), strict=True)
+    made = [
+        started(inspection, test, amount, given, k % 2 == 1)
+        for k, ((inspection, test), amount) in enumerate(amounts)
+    ]
+    return renamed(made, [test for _, test in recorded])
 
 
 def _events(
@@ -105,11 +103,21 @@ def _amounts(
     """Return the size (pu) of each test, None where it is not given; raises ExfitError."""
     tests = [test for _, test in recorded]
     names = unique_names([test.name() for test in tests], tests)
-    by_name = _sizes_by_name(sizes, names)
+    of_all, own, unused = dict[str, float](), dict[str, float](), list[str]()
+    for text in sizes:
+        number = text.rpartition("=")[2]
+        try:
+            amount = float(number)
+        except ValueError:
+            raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
+        named = _named(text, names)
+        (own if "=" in text else of_all).update(dict.fromkeys(named, amount))
+        unused += [] if named else [text]
+    _refuse_unused(unused, names)
     for (inspection, test), name in zip(recorded, names, strict=True):
-        if len(recorded) > 1 and name in by_name and by_name[name].of_all:
-            refuse_other_size(inspection, test, by_name[name].amount)
-    return [by_name[name].amount if name in by_name else None for name in names]
+        if len(recorded) > 1 and name in of_all and name not in own:
+            refuse_other_size(inspection, test, of_all[name])
+    return [own.get(name, of_all.get(name)) for name in names]
 
 
 def sizes_in_use(texts: Sequence[str], inspections: Sequence[Inspection]) -> list[str]:
@@ -162,7 +170,7 @@ def started(
     Raises ExfitError where the record shows another one, or that the breaker opens.
     """
     if inspection.opening and any(inspection.opening.causes(step.at) for step in test.steps):
-        _refuse_rejection(inspection, inspection.opening)
+        raise _rejection(inspection, inspection.opening)
     return StartingTest(
         test.name(),
         inspection,
@@ -174,14 +182,8 @@ def started(
     )
 
 
-def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
-    for inspection in inspections:
-        if inspection.opening is not None:
-            _refuse_rejection(inspection, inspection.opening)
-
-
-def _refuse_rejection(inspection: Inspection, opening: BreakerOpening) -> NoReturn:
-    raise ExfitError(
+def _rejection(inspection: Inspection, opening: BreakerOpening) -> ExfitError:
+    return ExfitError(
         f"{inspection.path}: {opening.in_words}; new makes cases of bump tests: {REMEDY}; if the "
         "file has bump tests as well, --tests gives a table of them"
     )
@@ -228,45 +230,10 @@ def refuse_other_size(inspection: Inspection, test: DetectedTest, amount: float)
         )
 
 
-class StepAmount(NamedTuple):
-    """The size (pu) of the steps of a test, and whether it is that of all tests."""
-
-    amount: float
-    of_all: bool
-
-
-def _sizes_by_name(texts: Sequence[str], names: Sequence[str]) -> dict[str, StepAmount]:
-    """Return the sizes of tests by name; one for all counts less than one of some."""
-    sizes: dict[str, StepAmount] = {}
-    unused = []
-    for text in sorted(texts, key=lambda text: "=" in text):
-        words, _, number = text.rpartition("=")
-        try:
-            amount = float(number)
-        except ValueError:
-            raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
-        named = _named(text, names)
-        sizes |= dict.fromkeys(named, StepAmount(amount, not words))
-        unused += [] if named else [text]
-    _refuse_unused(unused, names)
-    return sizes
-
-
 def _named(text: str, names: Sequence[str]) -> list[str]:
     """Return the names of the tests that a size is of."""
     words = text.rpartition("=")[0]
     return [name for name in names if f"-{words}-" in f"-{name}-" or not words]
-
-
-def _refuse_without_steps(inspections: Sequence[Inspection]) -> None:
-    """Raise ExfitError for records, of several, that show no step."""
-    faults = [
-        f"{inspection.path}: shows no step; a table of tests can say where it is"
-        for inspection in inspections
-        if not tests_of(inspection)
-    ]
-    if faults:
-        raise FileError(faults)
 
 
 def _refuse_unused(texts: Sequence[str], names: Sequence[str]) -> None:

@@ -23,6 +23,20 @@ from exfit.util.text import near
 
 LARGEST_TABLE = 16_000_000  # bytes
 MOST_COLUMNS = 1000  # of a table
+COLUMNS = ("file", "at", "step", "base", "validates")
+YES, NO = ("yes", "y", "x", "1", "true"), ("", "no", "n", "0", "false", "-")
+NEAREST = 5.0  # s: how far a noted instant may be from the step that the record shows
+OF_UNIT = ("dyr", "bus", "id", "model", "machine", "name")
+OF_RECORD = ("time", "time unit", "sheet", "vt")
+OF_NETWORK = {"f0": "f0", "x": "X", "p": "P", "q": "Q"}  # columns, and their keys in a case
+ABOUT = "about."  # begins the names of columns for reports
+ALL_COLUMNS = (*COLUMNS, "unit", *OF_RECORD, *OF_UNIT, *OF_NETWORK)
+MOST_BUSES = 999_999
+LONGEST_ID = 2
+TIME_UNITS = ("s", "ms", "us", "min")
+BETWEEN_COLUMNS = ";"  # of date and time
+
+Value = TypeVar("Value")
 
 
 class Cells(NamedTuple):
@@ -30,6 +44,15 @@ class Cells(NamedTuple):
 
     place: str
     by_name: Mapping[str, str]
+
+    def read(self, name: str, reader: Callable[[str], Value], faults: list[str]) -> Value | None:
+        """Read a cell, None where it is blank; add its faults, which a reader raises as text."""
+        text = self.by_name.get(name, "")
+        try:
+            return reader(text) if text else None
+        except ExfitError as fault:
+            faults.append(f"{self.place}: {name}: {fault}")
+            return None
 
 
 def is_table(path: Path) -> bool:
@@ -51,21 +74,16 @@ def read_cells(path: Path, columns: Sequence[str], prefixes: Sequence[str] = ())
     names = _without_blank_end([text.strip() for text in texts])
     names = [name if name.startswith(tuple(prefixes)) else name.lower() for name in names]
     faults = [*_wrong_names(names, f"{path}:{head}", columns, prefixes)]
+    table = []
     for number, cells in rows:
-        if len(_without_blank_end(cells)) > len(names):
-            faults.append(f"{path}:{number}: more cells than columns: {len(cells)}, {len(names)}")
+        count = len(_without_blank_end(cells))
+        if count > len(names):
+            faults.append(f"{path}:{number}: more cells than columns: {count}, {len(names)}")
+        elif not faults:  # a table of too many columns is not copied
+            pairs = zip_longest(names, cells[: len(names)], fillvalue="")
+            table.append(Cells(f"{path}:{number}", {name: cell.strip() for name, cell in pairs}))
     if faults:
         raise FileError(faults)
-    table = [
-        Cells(
-            f"{path}:{number}",
-            {
-                name: cell.strip()
-                for name, cell in zip_longest(names, cells[: len(names)], fillvalue="")
-            },
-        )
-        for number, cells in rows
-    ]
     if not table:
         raise ExfitError(f"{path}: no row below the names of the columns")
     return table
@@ -87,7 +105,7 @@ def _wrong_names(
 
 
 def _without_blank_end(cells: Sequence[str]) -> list[str]:
-    """Return the cells up to the last that holds a word."""
+    """Return the cells up to the last that holds a word, with which a row counts."""
     count = max((k + 1 for k, cell in enumerate(cells) if cell.strip()), default=0)
     return [*cells[:count]]
 
@@ -118,14 +136,6 @@ def _workbook_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
                 yield number, cells
 
 
-COLUMNS = ("file", "at", "step", "base", "validates")
-YES, NO = ("yes", "y", "x", "1", "true"), ("", "no", "n", "0", "false", "-")
-NEAREST = 5.0  # s: how far a noted instant may be from the step that the record shows
-
-
-Value = TypeVar("Value")
-
-
 class TableRow(NamedTuple):
     """A row of a table, from a ``place``: what is None is not given."""
 
@@ -143,10 +153,10 @@ def read_test_table(path: Path) -> tuple[TableRow, ...]:
     All may be missing; files are relative to the table's folder. Raises ExfitError with all faults.
     """
     faults = list[str]()
-    rows = [table_row(row, path.parent, faults) for row in read_cells(path, COLUMNS)]
+    rows = tuple(_table_row(row, path.parent, faults) for row in read_cells(path, COLUMNS))
     if faults:
         raise FileError(faults)
-    return tuple(rows)
+    return rows
 
 
 def tests_of_table(
@@ -175,72 +185,47 @@ def tests_of_table(
     return renamed(tests, recorded)
 
 
-def table_row(row: Cells, folder: Path, faults: list[str]) -> TableRow:
+def _nearest(row: TableRow, tests: Sequence[DetectedTest]) -> DetectedTest:
+    """Return the test of a record that a row means; raises ExfitError where there is none."""
+    shown = f"{row.file} shows steps at (s): " + (
+        ", ".join(f"{test.at:.1f}" for test in tests) or "none"
+    )
+    if row.at is None:
+        if len(tests) == 1:
+            return tests[0]
+        raise ExfitError(f"{row.place}: at: missing; {shown}")
+    at = row.at
+    nearest = min(tests, key=lambda test: abs(test.at - at), default=None)
+    if nearest is None or abs(nearest.at - at) > NEAREST:
+        raise ExfitError(f"{row.place}: at: no step within {NEAREST:g} s of {at:g} s; {shown}")
+    return nearest
+
+
+def _table_row(row: Cells, folder: Path, faults: list[str]) -> TableRow:
     """Return a row with the files of a folder; add all that is wrong with it."""
     place, cells = row
-    base = checked(row, "base", lambda text: base_of(text, f"{place}: base"), faults)
+    base = row.read("base", base_of, faults)
     word = cells.get("validates", "").lower()
     if word not in (*YES, *NO):
         faults.append(f"{place}: validates: {word!r} is neither yes nor no")
     return TableRow(
         place,
         folder / cells["file"] if cells.get("file") else None,
-        number_in(row, "at", faults),
-        number_in(row, "step", faults),
+        row.read("at", _number, faults),
+        row.read("step", _number, faults),
         base,
         word in YES if "validates" in cells else None,
     )
 
 
-def number_in(row: Cells, name: str, faults: list[str]) -> float | None:
-    """Return the number in a column, None where it is blank; add what is wrong with it."""
-
-    def number(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            raise ExfitError(f"{row.place}: {name}: {text!r} is not a number") from None
-        if not isfinite(value):
-            raise ExfitError(f"{row.place}: {name}: {text!r} is not a finite number")
-        return value
-
-    return checked(row, name, number, faults)
-
-
-def checked(row: Cells, name: str, read: Callable[[str], Value], faults: list[str]) -> Value | None:
-    """Read a cell, None where it is blank; add its faults."""
-    text = row.by_name.get(name, "")
+def _number(text: str) -> float:
     try:
-        return read(text) if text else None
-    except ExfitError as fault:
-        faults.append(str(fault))
-        return None
-
-
-def _nearest(row: TableRow, tests: Sequence[DetectedTest]) -> DetectedTest:
-    """Return the test of a record that a row means; raises ExfitError where there is none."""
-    shown = ", ".join(f"{test.at:.1f}" for test in tests) or "none"
-    if row.at is None:
-        if len(tests) == 1:
-            return tests[0]
-        raise ExfitError(f"{row.place}: at: missing; {row.file} shows steps at (s): {shown}")
-    at = row.at
-    near_by = [test for test in tests if abs(test.at - at) <= NEAREST]
-    if not near_by:
-        where = f"no step within {NEAREST:g} s of {at:g} s"
-        raise ExfitError(f"{row.place}: at: {where}; {row.file} shows steps at (s): {shown}")
-    return min(near_by, key=lambda test: abs(test.at - at))
-
-
-OF_UNIT = ("dyr", "bus", "id", "model", "machine", "name")
-OF_RECORD = ("time", "time unit", "sheet", "vt")
-OF_NETWORK = {"f0": "f0", "x": "X", "p": "P", "q": "Q"}  # columns, and their keys in a case
-ABOUT = "about."  # begins the names of columns for reports
-ALL_COLUMNS = (*COLUMNS, "unit", *OF_RECORD, *OF_UNIT, *OF_NETWORK)
-MOST_BUSES = 999_999
-LONGEST_ID = 2
-TIME_UNITS = ("s", "ms", "us", "min")
-BETWEEN_COLUMNS = ";"  # of date and time
+        value = float(text)
+    except ValueError:
+        raise ExfitError(f"{text!r} is not a number") from None
+    if not isfinite(value):
+        raise ExfitError(f"{text!r} is not a finite number")
+    return value
 
 
 @dataclass(frozen=True)
@@ -280,10 +265,18 @@ def read_case_table(path: Path, dyr: Path | None = None) -> tuple[CaseOfTable, .
     faults = list[str]()
     by_case: dict[tuple[str, ...], list[Cells]] = {}
     for row in read_cells(path, ALL_COLUMNS, (ABOUT,)):
-        by_case.setdefault(_identity(row), []).append(row)
-    faults += _half_named(by_case)
+        by_case.setdefault(_identity(row.by_name), []).append(row)
+    for identity, rows in by_case.items():  # with an id in one row and none in another
+        of_file, bus, machine_id = (*identity, "", "")[:3]
+        others = [key for key in by_case if key[:2] == (of_file, bus) and len(key) > 1 and key[2]]
+        if len(identity) > 1 and bus and not machine_id and others:
+            faults.append(f"{rows[0].place}: id: missing, but given in another row of bus {bus}")
     cases = [_case(rows, path.parent, dyr, faults) for rows in by_case.values()]
-    faults += _repeated(cases)
+    first: dict[str, str] = {}
+    for case in cases:
+        place = first.setdefault(case.name.casefold(), case.place)
+        if place != case.place:
+            faults.append(f"{case.place}: name: {case.name}: also that of another unit, at {place}")
     if faults:
         raise FileError(dict.fromkeys(faults))
     return tuple(cases)
@@ -298,9 +291,8 @@ def case_name_of(bus: int, machine_id: str | None) -> str:
     return "-".join([f"bus-{bus}", *(["".join(letters)] if letters else [])])
 
 
-def _identity(row: Cells) -> tuple[str, ...]:
+def _identity(cells: Mapping[str, str]) -> tuple[str, ...]:
     """Identify the case of a row: by its name, or its unit, or its record."""
-    cells = row.by_name
     if cells.get("name"):
         return (cells["name"].casefold(),)
     if cells.get("bus"):
@@ -308,51 +300,37 @@ def _identity(row: Cells) -> tuple[str, ...]:
     return (cells.get("dyr", ""), "", cells.get("file", ""))
 
 
-def _half_named(by_case: Mapping[tuple[str, ...], Sequence[Cells]]) -> Iterator[str]:
-    """Yield units that have an id in one row and none in another: they may be the same."""
-    for identity, rows in by_case.items():
-        dyr, bus, machine_id = (*identity, "", "")[:3]
-        others = {key for key in by_case if key[:2] == (dyr, bus) and len(key) > 1 and key[2]}
-        if len(identity) > 1 and bus and not machine_id and others:
-            yield f"{rows[0].place}: id: missing, but given in another row of bus {bus}"
-
-
-def _repeated(cases: Sequence[CaseOfTable]) -> Iterator[str]:
-    first: dict[str, str] = {}
-    for case in cases:
-        place = first.setdefault(case.name.casefold(), case.place)
-        if place != case.place:
-            yield f"{case.place}: name: {case.name}: also that of another unit, at {place}"
-
-
 def _case(rows: Sequence[Cells], folder: Path, dyr: Path | None, faults: list[str]) -> CaseOfTable:
     """Return the case of rows of one unit; add all that is wrong with them."""
-    unit = _common(rows, [*OF_UNIT, *OF_NETWORK, *_about_columns(rows)], faults)
+    about = [name for name in rows[0].by_name if name.startswith(ABOUT)]
+    unit = _common(rows, [*OF_UNIT, *OF_NETWORK, *about], faults)
     cells = unit.by_name
     own = folder / cells["dyr"] if cells.get("dyr") else dyr
-    bus = checked(unit, "bus", lambda text: _bus(text, unit.place), faults)
-    machine_id = checked(unit, "id", lambda text: _id(text, unit.place), faults)
-    name = checked(unit, "name", lambda text: _name(text, unit.place), faults)
+    bus, machine_id = unit.read("bus", _bus, faults), unit.read("id", _id, faults)
+    name = unit.read("name", _name, faults)
     faults += _of_unit(unit, own, dyr)
-    network = {key: number_in(unit, column, faults) for column, key in OF_NETWORK.items()}
+    network = {key: unit.read(column, _number, faults) for column, key in OF_NETWORK.items()}
+    model = cells.get("model") or None
     return CaseOfTable(
         rows[0].place,
         name or _default_name(bus, machine_id, rows[0]),
         own,
         bus,
         machine_id,
-        _model(cells.get("model", ""), folder),
+        str(folder / model) if model and model.endswith(".py") else model,
         cells.get("machine") or None,
         tuple(_test(row, folder, faults) for row in rows),
         _settings(rows, folder, faults),
         {key: value for key, value in network.items() if value is not None},
-        {name.removeprefix(ABOUT): cells[name] for name in _about_columns(rows) if cells[name]},
+        {key.removeprefix(ABOUT): cells[key] for key in about if cells[key]},
     )
 
 
-def _model(name: str, folder: Path) -> str | None:
-    """Return the exciter that a table names; a file is relative to the table's folder."""
-    return str(folder / name) if name.endswith(".py") else name or None
+def _default_name(bus: int | None, machine_id: str | None, row: Cells) -> str:
+    if bus is not None:
+        return case_name_of(bus, machine_id)
+    stem = Path(row.by_name.get("file", "")).stem
+    return re.sub("[^A-Za-z0-9._%-]+", "-", stem).lstrip("-._%") or "case"
 
 
 def _common(rows: Sequence[Cells], names: Sequence[str], faults: list[str]) -> Cells:
@@ -370,10 +348,6 @@ def _common(rows: Sequence[Cells], names: Sequence[str], faults: list[str]) -> C
     return Cells(rows[0].place, shared)
 
 
-def _about_columns(rows: Sequence[Cells]) -> list[str]:
-    return [name for name in rows[0].by_name if name.startswith(ABOUT)]
-
-
 def _of_unit(unit: Cells, dyr: Path | None, of_all: Path | None) -> Iterator[str]:
     """Check the data of a unit for gaps and contradictions."""
     cells, place = unit.by_name, unit.place
@@ -383,53 +357,42 @@ def _of_unit(unit: Cells, dyr: Path | None, of_all: Path | None) -> Iterator[str
                 yield f"{place}: {name}: not allowed: every row is of a unit of {of_all}"
         if not cells.get("bus"):
             yield f"{place}: bus: missing"
-        return
-    if dyr is None and not cells.get("model"):
-        yield f"{place}: model: missing, and no dyr is given"
-    for name in ("bus", "id"):
-        if dyr is None and cells.get(name):
-            yield f"{place}: {name}: {cells[name]}: only with dyr, in which it is looked for"
-    if dyr is not None and cells.get("machine"):
+    elif dyr is None:
+        if not cells.get("model"):
+            yield f"{place}: model: missing, and no dyr is given"
+        for name in ("bus", "id"):
+            if cells.get(name):
+                yield f"{place}: {name}: {cells[name]}: only with dyr, in which it is looked for"
+    elif cells.get("machine"):
         yield f"{place}: machine: {cells['machine']}: not allowed with dyr, which has its own"
 
 
-def _bus(text: str, place: str) -> int:
+def _bus(text: str) -> int:
     if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) <= MOST_BUSES):
-        raise ExfitError(f"{place}: bus: {text!r} is not a whole number of 1 ... {MOST_BUSES}")
+        raise ExfitError(f"{text!r} is not a whole number of 1 ... {MOST_BUSES}")
     return int(text)
 
 
-def _id(text: str, place: str) -> str:
+def _id(text: str) -> str:
     if len(text) > LONGEST_ID:
-        raise ExfitError(f"{place}: id: {text!r} has more than {LONGEST_ID} letters or digits")
+        raise ExfitError(f"{text!r} has more than {LONGEST_ID} letters or digits")
     return text
 
 
-def _name(text: str, place: str) -> str:
+def _name(text: str) -> str:
     if not re.match(FILE_NAME, text):
-        raise ExfitError(f"{place}: name: {text!r} {PATTERNS[FILE_NAME]}")
+        raise ExfitError(f"{text!r} {PATTERNS[FILE_NAME]}")
     return text
-
-
-def _default_name(bus: int | None, machine_id: str | None, row: Cells) -> str:
-    if bus is not None:
-        return case_name_of(bus, machine_id)
-    stem = Path(row.by_name.get("file", "")).stem
-    return re.sub("[^A-Za-z0-9._%-]+", "-", stem).lstrip("-._%") or "case"
 
 
 def _test(row: Cells, folder: Path, faults: list[str]) -> TableRow:
-    test = table_row(row, folder, faults)
+    """Return a row, the base of the voltage with the unit of its own column, where it has none."""
+    test = _table_row(row, folder, faults)
     if test.file is None:
         faults.append(f"{row.place}: file: missing")
-    return test._replace(base=_base(row, test.base, faults))
-
-
-def _base(row: Cells, base: Base | None, faults: list[str]) -> Base | None:
-    """Return the base of the voltage with the unit of its own column, where it has none."""
-    unit, place = row.by_name.get("unit", ""), f"{row.place}: unit"
+    base, unit, place = test.base, row.by_name.get("unit", ""), f"{row.place}: unit"
     if not unit:
-        return base
+        return test
     if unit_of(unit) is None:
         faults.append(f"{place}: {unit!r} is not a unit of a voltage, as kV")
     elif base is None:
@@ -437,28 +400,23 @@ def _base(row: Cells, base: Base | None, faults: list[str]) -> Base | None:
     elif base.unit is not None:
         faults.append(f"{place}: {unit}: not allowed beside a base with its own, {base.unit}")
     else:
-        return base_of(f"{base.value!r} {unit}", place)
-    return base
+        return test._replace(base=base_of(f"{base.value!r} {unit}"))
+    return test
 
 
 def _settings(rows: Sequence[Cells], folder: Path, faults: list[str]) -> dict[Path, RecordSettings]:
     """Collect the settings by which each record of a unit is read."""
-    by_file: dict[str, list[Cells]] = {}
-    for row in rows:
-        by_file.setdefault(row.by_name.get("file", ""), []).append(row)
-    return {
-        folder / file: _reading(_common(own, OF_RECORD, faults), faults)
-        for file, own in by_file.items()
-        if file
-    }
-
-
-def _reading(row: Cells, faults: list[str]) -> RecordSettings:
-    cells = row.by_name
-    unit = cells["time unit"]
-    if unit and unit not in TIME_UNITS:
-        faults.append(f"{row.place}: time unit: {unit!r}; {near(unit, TIME_UNITS)}")
-    clock = (name.strip() for name in cells["time"].split(BETWEEN_COLUMNS))
-    return RecordSettings(
-        tuple(filter(None, clock)), unit or None, cells["sheet"] or None, cells["vt"] or None
-    )
+    settings: dict[Path, RecordSettings] = {}
+    for file in dict.fromkeys(row.by_name.get("file", "") for row in rows):
+        if file:
+            of_file = [row for row in rows if row.by_name.get("file", "") == file]
+            row = _common(of_file, OF_RECORD, faults)
+            cells, unit = row.by_name, row.by_name["time unit"]
+            if unit and unit not in TIME_UNITS:
+                faults.append(f"{row.place}: time unit: {unit!r}; {near(unit, TIME_UNITS)}")
+            names = (name.strip() for name in cells["time"].split(BETWEEN_COLUMNS))
+            clock, sheet = tuple(filter(None, names)), cells["sheet"] or None
+            settings[folder / file] = RecordSettings(
+                clock, unit or None, sheet, cells["vt"] or None
+            )
+    return settings
