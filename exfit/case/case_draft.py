@@ -92,7 +92,8 @@ def with_sources(section: Section, sources: Mapping[str, str]) -> Section:
 
 def plain_text(name: str) -> str:
     """Write a text in YAML, in quotes where it would be read as something else."""
-    plain = re.fullmatch(r"[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
+    # three dots end a document of YAML
+    plain = re.fullmatch(r"(?!\.{3})[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
     if plain and yaml.safe_load(name) == name:
         return name
     letters = json.dumps(name, ensure_ascii=False)

@@ -56,6 +56,12 @@ def test_a_case_on_load_has_the_signals_of_its_plant(tmp_path):
     assert inputs_of(case) == ("vref", "vs", "X")
 
 
+@pytest.mark.parametrize("kind", ["[infinite-bus]", "{}", "[[1, 2]]"])
+def test_a_kind_of_plant_that_is_no_word_is_a_fault(tmp_path, kind):
+    with pytest.raises(CaseError, match=r"plant\.type: .* is not possible; known: open-circuit"):
+        load_case(written(tmp_path, ("type: infinite-bus", f"type: {kind}")))
+
+
 def test_a_switch_says_what_the_network_has_from_then_on(tmp_path):
     """There and back: the swing is left, and the voltage at rest is that before the trip."""
     steps = "  vref: [{at: 1.0, step: 0.01}]\n  vs: [{at: 2.0, step: -0.005}]\n"

@@ -286,6 +286,12 @@ MEANING = {
         ("validate", 0, "record", "channels", "vt", "filter", "median"),
         "4 is not an odd number",
     ),
+    "even median of a record": (
+        (*DOWN, "filter"),
+        {"median": 4},
+        (*DOWN, "filter", "median"),
+        "4 is not an odd number",
+    ),
     "base of no unit": (VT, {"column": "vt", "base": 15.75}, (*VT, "unit"), "in which unit"),
     "unit without base": (VT, {"column": "vt", "unit": "kV"}, (*VT, "base"), "what is 1 pu in kV"),
     "per cent without base": (VT, {"column": "vt", "unit": "%"}, (*VT, "base"), "is 1 pu in %"),

@@ -11,7 +11,6 @@ from exfit.case.case_draft import (
     OpenValue,
     Remark,
     Section,
-    in_braces,
     parameter,
     with_sources,
 )
@@ -245,8 +244,7 @@ def _bump_tests(
             level["vt0"] = Noted({"start": "auto"}, "at rest: the noise of its mean counts")
         steps = {**level, **steps_section(inspection, test.steps, test.sizes)}
         own = channels_section(inspection, ("vt", *test.bases), test.bases)
-        text = in_braces(own)
-        channels = known.setdefault(text, own)
+        channels = known.setdefault(repr(own), own)  # with their comments
         shared = Noted(channels, "the records below have the same" if channels is own else "")
         given = channels if len(tests) == 1 else shared
         record = record_of(inspection, names[inspection.path], given, test.window)

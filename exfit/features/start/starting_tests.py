@@ -46,22 +46,15 @@ def starting_tests(
     for a record in which the breaker opens, for one of several that shows no step, and for a
     play-in file.
     """
-    for inspection in inspections:
-        if inspection.plays_in:  # it has nothing that a fit could be compared with
-            raise ExfitError(
-                f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
-                "sections of a case that exfit simulate takes"
-            )
+    _refuse_play_in(inspections)
     if any(inspection.is_event for inspection in inspections):
         return _events(inspections, sizes, bases or {})
-    for inspection in inspections:
-        if inspection.opening is not None:
-            raise _rejection(inspection, inspection.opening)
+    _refuse_rejections(inspections)
     given = bases or {}
-    without = [inspection.path for inspection in inspections if not tests_of(inspection)]
-    if without and len(inspections) == 1:
+    if len(inspections) == 1 and not tests_of(inspections[0]):
         _refuse_unused(sizes, [])
         return (StartingTest("fit", inspections[0], (), bases=given),)
+    without = [inspection.path for inspection in inspections if not tests_of(inspection)]
     if without:
         text = "shows no step; a table of tests can say where it is"
         raise FileError(f"{path}: {text}" for path in without)
@@ -72,6 +65,21 @@ def starting_tests(
         for k, ((inspection, test), amount) in enumerate(amounts)
     ]
     return renamed(made, [test for _, test in recorded])
+
+
+def _refuse_play_in(inspections: Sequence[Inspection]) -> None:
+    for inspection in inspections:
+        if inspection.plays_in:  # it has nothing that a fit could be compared with
+            raise ExfitError(
+                f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
+                "sections of a case that exfit simulate takes"
+            )
+
+
+def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
+    for inspection in inspections:
+        if inspection.opening is not None:
+            raise _rejection(inspection, inspection.opening)
 
 
 def _events(

@@ -224,6 +224,12 @@ def test_facts_come_into_the_case(record, new):
     assert content["about"] == {"Unit": "3", "Tested by": "A. Test"}
 
 
+def test_facts_that_mean_something_in_yaml_stay_text(record, new):
+    facts = {"Plant": "...", "...": "a", "Unit": "--- b", "true": "no", "#": "x: y"}
+    options = [option for fact in facts.items() for option in ("--about", "=".join(fact))]
+    assert new("--record", record, *options)[1]["about"] == facts
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
