@@ -58,7 +58,7 @@ def test_a_case_on_load_has_the_signals_of_its_plant(tmp_path):
 
 @pytest.mark.parametrize("kind", ["[infinite-bus]", "{}", "[[1, 2]]"])
 def test_a_kind_of_plant_that_is_no_word_is_a_fault(tmp_path, kind):
-    with pytest.raises(CaseError, match=r"plant\.type: .* is not possible; known: open-circuit"):
+    with pytest.raises(CaseError, match=r"plant\.type: .* is not possible; "):
         load_case(written(tmp_path, ("type: infinite-bus", f"type: {kind}")))
 
 

@@ -10,6 +10,7 @@ import yaml
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from places import ROOT
 
 from exfit.case.json_schema import json_schema
 from exfit.case.load import parse_case
@@ -284,12 +285,6 @@ MEANING = {
         ("validate", 0, "record", "channels"),
         {"vt": {"column": "vt", "filter": {"median": 4}}},
         ("validate", 0, "record", "channels", "vt", "filter", "median"),
-        "4 is not an odd number",
-    ),
-    "even median of a record": (
-        (*DOWN, "filter"),
-        {"median": 4},
-        (*DOWN, "filter", "median"),
         "4 is not an odd number",
     ),
     "base of no unit": (VT, {"column": "vt", "base": 15.75}, (*VT, "unit"), "in which unit"),
@@ -795,3 +790,10 @@ def test_junk_in_the_new_keys_gives_a_case_or_its_refusal(beside_a_record, chang
     assert np.isfinite(residuals.start).all()
     low, high = residuals.bounds
     assert (low < high).all()
+
+
+def test_an_even_median_of_all_channels_is_a_fault_as_that_of_one():
+    path = ROOT / "configs/grid_event.yaml"
+    text = path.read_text().replace("record:\n", "record:\n  filter: {median: 4}\n", 1)
+    with pytest.raises(CaseError, match=r"record\.filter\.median: 4 is not an odd number"):
+        parse_case(text, path)
