@@ -155,7 +155,6 @@ def _refuse(
     strategy: str | None,
     search: str | None,
 ) -> None:
-    """Raise ExfitError with all that is wrong with the arguments of a batch."""
     faults, (number, of) = [], part
     if not 1 <= number <= of:
         faults.append(f"part {number}/{of}: must be 1/N ... N/N")

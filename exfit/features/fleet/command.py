@@ -185,7 +185,6 @@ def _cases_of(tables: Sequence[Path], folder: Path) -> "dict[Path, CaseMaking]":
 
 
 def _exit(fleet: "Fleet") -> None:
-    """Raise SystemExit or Interruption where not all cases of the run are done and well."""
     rows = fleet.of_run
     done = [row for row in rows if row.status == "done"]
     if fleet.interrupted and not done:

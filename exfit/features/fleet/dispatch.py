@@ -83,7 +83,6 @@ def connected(address: str) -> Iterator["Client"]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep logs and warnings of distributed from standard error."""
     names = {name for name in logging.root.manager.loggerDict if name.split(".")[0] in LOGGERS}
     levels = {logger: logger.level for logger in map(logging.getLogger, {*LOGGERS, *names})}
     for logger in levels:
@@ -314,7 +313,6 @@ class Dispatch:
             raise ClusterError(self._refusals() or f"{address}: no worker is left")
 
     def _check(self, present: Mapping[str, int]) -> None:
-        """Use those workers that have shown that they may be, and ask those that are new."""
         for worker in [worker for worker, answer in self.checks.items() if answer.done()]:
             reason = answered(worker, self.checks.pop(worker))
             if reason:

@@ -263,7 +263,6 @@ def _parameters(result: "FitResult") -> dict[str, SummaryParameter]:
 
 
 def _curves(result: "FitResult") -> Iterator[SummaryCurve]:
-    """Yield the signals of the fitted records, thinned to their extremes."""
     from exfit.dsp.sampling import kept_rows
     from exfit.results.thinning import rounded
 

@@ -251,7 +251,6 @@ class Pool:
         self.workers += [WorkerProcess(self.answers) for _ in range(missing)]
 
     def _listen(self) -> None:
-        """Wait a moment for an answer, and act on it."""
         try:
             worker, content = self.answers.get(timeout=LISTENING)
         except Empty:

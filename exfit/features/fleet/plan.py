@@ -69,7 +69,6 @@ def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
 
 
 def _cases_below(top: Path, written: Path) -> Iterator[Path]:
-    """Yield the cases below a folder, in the order of their paths."""
     for place, folders, files in os.walk(top):
         here = Path(place)
         visible = (name for name in folders if not name.startswith("."))
@@ -146,7 +145,6 @@ def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool)
 
 
 def _group(content: Mapping[str, Any]) -> str:
-    """Name the group of cases that share their machine code."""
     parts = map(content.get, ("plant", "stabiliser", "governor"))
     limiters, parameters = content.get("limiters"), content.get("parameters")
     several = limiters if isinstance(limiters, list) else []

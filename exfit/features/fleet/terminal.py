@@ -139,7 +139,6 @@ class BatchProgress(BatchObserver):
         self.console.print(", ".join(filter(None, parts)), soft_wrap=True, markup=False)
 
     def _pace(self) -> str:
-        """Return the rate and the time left in words, as far as they are known."""
         elapsed, left = self._clock() - self._began, self.seconds_left
         if left is None or elapsed <= 0.0:
             return ""

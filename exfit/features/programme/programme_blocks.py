@@ -69,7 +69,6 @@ def checked_step(checked: CheckedStep) -> Iterator[Block]:
 
 
 def _at_rest(test: FinishedTest) -> Iterator[Block]:
-    """Yield the result of a test at rest; nothing of a fit."""
     if isinstance(test.result, SaturationResult):
         mark = fits.MARKS.get(test.verdict, "bad") if test.holds else "bad"
         yield paragraph(f"verdict: {test.verdict}: {test.reason}", mark)

@@ -62,7 +62,6 @@ def programme_page(result: ProgrammeResult, folder: Path) -> Page:
 
 
 def _overview(result: ProgrammeResult) -> Iterator[Block]:
-    """Yield the outcome of each test, and the values that tests gave to those after them."""
     rows: list[tuple[Cell, ...]] = []
     for test in result.tests:
         tests = f"\n{', '.join(test.tests)}" if len(test.tests) > 1 else ""
@@ -77,7 +76,6 @@ def _overview(result: ProgrammeResult) -> Iterator[Block]:
 
 
 def _of_test(test: FinishedTest, key: str) -> Iterator[ReportSection]:
-    """Yield the sections of a test that is not among the bump tests."""
     result, name = test.result, test.name
     if isinstance(result, SaturationResult):
         blocks = (*saturation(result), _saturation_chart(result, key))

@@ -259,7 +259,6 @@ def values_given(test: FinishedTest, programme: Programme) -> Iterator[EnteredVa
 
 
 def _measured(test: FinishedTest) -> Iterator[EnteredValue]:
-    """Yield what a test limits on both sides."""
     result = test.result
     if isinstance(result, SaturationResult):
         values = [(MACHINE + symbol, v, "") for symbol, v in result.machine_values.items()]

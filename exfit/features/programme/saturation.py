@@ -462,7 +462,6 @@ def _beside_others(
 
 
 def _widened(own: MeasuredValue, others: Sequence[MeasuredValue]) -> MeasuredValue:
-    """Return a value whose interval holds the values of others."""
     low, high = own.interval
     values = [own.value, *(other.value for other in others)]
     low = None if low is None else min(low, *values)
@@ -501,7 +500,6 @@ def _product(base: MeasuredValue, resistance: MeasuredValue) -> MeasuredValue:
 
 
 def _notes(result: SaturationResult) -> Iterator[str]:
-    """Yield what limits the numbers of a test, in sentences."""
     if result.exciter:
         yield (
             "ifd is the field current of a brushless exciter: the curve is that of exciter and "

@@ -195,7 +195,6 @@ def _rmse(comparisons: Sequence[Comparison]) -> float:
 def _refuted(
     models: Sequence[Likelihood], counts: Sequence[int], judged: Sequence[bool]
 ) -> list[bool]:
-    """Find the models that another one describes the records strongly better than."""
     rivals = [
         (model, count) for model, count, own in zip(models, counts, judged, strict=True) if own
     ]
