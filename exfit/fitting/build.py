@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import (
@@ -23,6 +22,7 @@ from exfit.fitting.experiment import (
     Experiment,
     ExperimentSetup,
     Switching,
+    Values,
     with_enough_substeps,
 )
 from exfit.fitting.nuisances import TURN, Found, nuisances_of, prefix_from
@@ -32,9 +32,6 @@ from exfit.plants import BREAKER, NETWORK, REFERENCES, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.simulator import Simulator
-
-Array = NDArray[np.float64]
-Values = Mapping[str, float]
 
 
 def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:

@@ -15,7 +15,7 @@ from exfit.case.schema import (
     RecordFile,
 )
 from exfit.errors import RecordError
-from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.experiment import Array, Channel, Experiment
 from exfit.fitting.recordings import column_of
 from exfit.records.record import Record
 from exfit.util.sorting import median
@@ -23,7 +23,6 @@ from exfit.util.sorting import median
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Filtering
 
-Array = NDArray[np.float64]
 
 LEAST_WINDOWS = 10  # of a running median in a record: a wider one hides the response
 FEWEST_SAMPLES = 3  # of a channel: fewer do not show its noise

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Recording
@@ -15,7 +14,7 @@ from exfit.dsp.jumps import FEWEST_SAMPLES, jumps_while_moving, rest_end
 from exfit.dsp.sampling import MOST_UNEVEN
 from exfit.errors import RecordError
 from exfit.fitting.channels import with_filter
-from exfit.fitting.experiment import Switching
+from exfit.fitting.experiment import Array, Switching
 from exfit.fitting.nuisances import TURN, Found, Nuisance, prefix_from
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recordings import deviation, record_of
@@ -24,7 +23,6 @@ from exfit.signals import RESTING
 from exfit.simulation.inputs import InputStep, RecordedInput, SplinedInput
 from exfit.util.text import show
 
-Array = NDArray[np.float64]
 Input = RecordedInput | SplinedInput
 
 LEAST_JUMPS = {"vt": 0.005, "angle": 0.02}  # pu, rad: a smaller one of the grid does no harm

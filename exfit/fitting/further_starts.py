@@ -6,12 +6,9 @@ for the next one: docs/methods.md has what was measured.
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from exfit.errors import SimulationError
 from exfit.estimate import Descent, spread
-from exfit.fitting.experiment import Experiment
+from exfit.fitting.experiment import Array, Experiment
 from exfit.fitting.global_search import Way
 from exfit.fitting.problem import FitProblem, compressed
 from exfit.fitting.residuals import Residuals, SimulationCounter
@@ -19,8 +16,6 @@ from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.simulation.simulator import Simulator
 from exfit.util.strategies import DEFAULT_STRATEGY
-
-Array = NDArray[np.float64]
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
 MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did

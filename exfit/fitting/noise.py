@@ -5,14 +5,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.errors import SimulationError
-from exfit.fitting.experiment import Channel, ExperimentSetup
+from exfit.fitting.experiment import Array, Channel, ExperimentSetup
 from exfit.simulation.simulator import Simulator
-
-Array = NDArray[np.float64]
 
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 WHITE_NOISE_SEED = 0

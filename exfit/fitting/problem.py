@@ -1,6 +1,6 @@
 """The problem of a fit: its residuals, as functions of all that is free."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.experiment import Channel, ExperimentSetup
+from exfit.fitting.experiment import Array, Channel, ExperimentSetup, Values
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.simulation.interpolation import NEIGHBOURS, Interpolation
-
-Array = NDArray[np.float64]
-Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)

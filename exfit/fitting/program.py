@@ -1,12 +1,12 @@
 """What simulates a case in place of exfit, by what is asked of it; a feature opens it."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Protocol, cast
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.experiment import ExperimentSetup, Values
 from exfit.registry import parts
 from exfit.simulation.simulator import Simulator
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:  # a simulation loads nothing of a fit
     from exfit.fitting.residuals import Residuals
 
 Setups = Sequence[ExperimentSetup]
-Values = Mapping[str, float]
 Differences = dict[str, dict[str, float]]  # pu, by record and signal
 
 

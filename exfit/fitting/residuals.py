@@ -11,12 +11,11 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.ties import TieError, Ties
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
-from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.experiment import Array, Channel, Experiment
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.simulation.substeps import NO_SUBSTEPS
@@ -24,7 +23,6 @@ from exfit.simulation.substeps import NO_SUBSTEPS
 if TYPE_CHECKING:
     from exfit.dsp.robust_loss import Loss
 
-Array = NDArray[np.float64]
 
 CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)

@@ -6,7 +6,6 @@ from functools import cached_property, partial
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -14,7 +13,7 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import Announce
-from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.experiment import Array, ExperimentSetup
 from exfit.fitting.global_search import (
     METHODS_OF_AUTO,
     NO_JUDGE,
@@ -39,8 +38,6 @@ from exfit.util.strategies import (
     STRATEGIES,
 )
 from exfit.util.text import near
-
-Array = NDArray[np.float64]
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %

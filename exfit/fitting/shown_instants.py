@@ -4,7 +4,7 @@ An instant that is fitted to the whole of a response absorbs errors of the model
 made later passes for a unit that is slower.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import inf, isfinite
 from typing import NamedTuple
@@ -13,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.step_detection import CHI_SQUARE, MEDIAN_SAMPLES, interval_below, running_median
-from exfit.fitting.experiment import ExperimentSetup, compared
+from exfit.fitting.experiment import Array, ExperimentSetup, Values, compared
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import BREAKER
 from exfit.util.sorting import median
-
-Array = NDArray[np.float64]
-Values = Mapping[str, float]
 
 TRIED, STAGES = 41, 2  # instants in an interval, first in that of the record, then about the best
 REST_BEFORE = 2.0  # s: so long a rest before a step is looked at

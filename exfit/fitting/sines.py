@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 from math import inf, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import RecordFile, Unknown
 from exfit.dsp.lines import Line, cosine_and_sine, largest_line
 from exfit.errors import RecordError
 from exfit.fitting.descents import descent_near
-from exfit.fitting.experiment import Channel, ExperimentSetup
+from exfit.fitting.experiment import Array, Channel, ExperimentSetup, Values
 from exfit.fitting.noise import noise_of
 from exfit.fitting.nuisances import (
     COSINE,
@@ -27,9 +26,6 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slices
 from exfit.inference.noise import SURPRISING, is_white, whiteness
 from exfit.util.text import digits
-
-Array = NDArray[np.float64]
-Values = Mapping[str, float]
 
 
 @dataclass(frozen=True)

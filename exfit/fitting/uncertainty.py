@@ -6,13 +6,12 @@ from itertools import accumulate
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.quality import quantum
 from exfit.dsp.rounding import is_coarse, noise_before_rounding, rounding_waves
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
-from exfit.fitting.experiment import Channel
+from exfit.fitting.experiment import Array, Channel
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference.confidence import (
@@ -32,8 +31,6 @@ from exfit.inference.identifiability import (
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
 from exfit.util.text import listed
 from exfit.util.typed import IN_FILE, KEY
-
-Array = NDArray[np.float64]
 
 PLURALS = {"has": "have", "is": "are", "lies": "lie", "depends": "depend"}
 MOST_RISE = 1.25  # times the rise that linear theory predicts: there an end may be 12 % off

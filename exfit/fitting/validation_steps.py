@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import (
@@ -22,7 +21,7 @@ from exfit.case.schema import (
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.experiment import Array, ExperimentSetup, Values
 from exfit.fitting.recordings import clock_of, read_section
 from exfit.plants import REFERENCES
 from exfit.records.formats import open_table
@@ -37,8 +36,6 @@ from exfit.records.steps import (
 )
 from exfit.util.text import show
 
-Array = NDArray[np.float64]
-Values = Mapping[str, float]
 Test = Mapping[str, Any]  # keys of a test with what they become
 
 OWN_REFERENCE = "the reference is the one recorded beside the response"

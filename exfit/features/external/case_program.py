@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.parts import OF_RECORD
@@ -33,7 +32,7 @@ from exfit.features.external.responders import (
     RunResponder,
 )
 from exfit.fitting.descents import Announce, following
-from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.experiment import Array, ExperimentSetup, Values
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Differences, Setups
 from exfit.fitting.residuals import Residuals
@@ -42,8 +41,6 @@ from exfit.simulation.simulator import Simulator
 from exfit.util.files import on_disk
 from exfit.util.text import near
 
-Array = NDArray[np.float64]
-Values = Mapping[str, float]
 Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared
 
 TOLERANCE = 1e-5  # of the cost: no gain that is less is worth a run
