@@ -39,12 +39,12 @@ OF_CORE = {
     for name, group, text, place in (
         ("inspect", "start", "Show the content of a recorder's file.", "records:inspect_"),
         ("fit", "fit", "Fit the free parameters of each CASE to its records.", "fitting:fit"),
-        ("simulate", "examine", "Simulate CASE at its start values.", "responses:simulate"),
+        ("simulate", "examine", "Simulate CASE at its start values.", "simulating:simulate"),
         (
             "validate",
             "examine",
             "Compare fitted values with records that were not fitted.",
-            "responses:validate",
+            "examining:validate",
         ),
         ("check", "examine", "Check a case before its fit.", "examining:check"),
         ("show", "examine", "Print a stored result again.", "examining:show"),

@@ -289,17 +289,13 @@ class Seats:
                 raise NoProcess("the batch has ended")
             yield seat
         finally:
-            self._give_back(seat)
-
-    def _give_back(self, seat: Seat) -> None:
-        with self.lock:
-            self.busy.discard(seat)
-            if seat.ended:
-                return
-            self.idle.append(seat)
-            self.leaving = Timer(0.0 if self.stopped else IDLE, self._leave)
-            self.leaving.daemon = True
-            self.leaving.start()
+            with self.lock:
+                self.busy.discard(seat)
+                if not seat.ended:
+                    self.idle.append(seat)
+                    self.leaving = Timer(0.0 if self.stopped else IDLE, self._leave)
+                    self.leaving.daemon = True
+                    self.leaving.start()
 
     def _leave(self) -> None:
         """End the processes that have had nothing to do for long."""

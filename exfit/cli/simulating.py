@@ -1,0 +1,55 @@
+"""The command simulate."""
+
+from pathlib import Path
+
+import click
+
+from exfit.cli.options import (
+    Output,
+    assignments,
+    case_argument,
+    file_options,
+    load,
+    parameters_option,
+    set_option,
+)
+
+
+@click.command()
+@case_argument
+@set_option
+@parameters_option
+@file_options
+def simulate(
+    case: Path,
+    changes: tuple[str, ...],
+    parameters: Path | None,
+    output: Output,
+) -> None:
+    """Simulate CASE at its start values.
+
+    Writes response.csv (every sample of t, vref, vt, efd, ifd and the states) and figures to
+    runs/CASE-simulate, or to DIR. --set overrides --parameters, and both override the case; a
+    parameter of the machine is named as in --set machine.Tpd0=6.
+    """
+    from exfit import workflows
+    from exfit.show import run_folder
+    from exfit.workflows.given_values import changed_values, fitted_code, read_parameters
+
+    loaded = load(case, *(fitted_code(parameters) if parameters else ()))
+    folder = output.folder_of(loaded, "simulate", run_folder.OF_SIMULATION)
+    values = read_parameters(loaded, parameters) if parameters else {}
+    values |= changed_values(loaded, assignments(changes, "--set"), "--set")
+    simulation = workflows.simulate(loaded, values)
+    figures = run_folder.write_simulation(simulation, case.stem, folder)
+    if output.shown:
+        from exfit.show import terminal, validations
+        from exfit.show.blocks import notes, paragraph
+
+        console, compared = terminal.console(), simulation.comparison
+        if compared is not None:
+            terminal.show(console, validations.comparisons([compared]))
+        substeps = paragraph(f"sub-steps: {simulation.response.substeps}")
+        terminal.show(console, [substeps, *notes(simulation.notes)])
+        terminal.written(console, folder)
+    output.draw(figures)
