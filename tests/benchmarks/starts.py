@@ -19,8 +19,7 @@ from rich.table import Table
 
 from exfit.case.load import load_case
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.further_starts import last_leg, legs_of
-from exfit.fitting.global_search import MERGED
+from exfit.fitting.further_starts import MERGED, last_leg, legs_of
 from exfit.fitting.search import fitted
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
@@ -32,7 +31,7 @@ REPEATS = 2
 def legs():
     """Return the residuals of the case and the legs of its further starts."""
     _, problem = fitted(load_case(CASE))
-    return problem.residuals, legs_of(problem.residuals, last_leg(problem)).linear
+    return problem.residuals, legs_of(problem.residuals, last_leg(problem))[0]
 
 
 def timed(points, of_case, workers):
