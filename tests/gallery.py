@@ -216,7 +216,7 @@ def ran(run: Run) -> bytes:
     with ExitStack() as changes:
         changes.enter_context(patch.object(plots.style, "DPI", DPI))
         changes.enter_context(patch.object(terminal, "console", lambda: console))
-        changes.enter_context(patch.object(terminal, "LiveIterations", Still))
+        changes.enter_context(patch.object(live, "LiveIterations", Still))
         for name in DRAWN:
             if f"{name}.png" not in run.figures:
                 changes.enter_context(patch.object(plots, name, lambda *_: Figure()))
