@@ -192,7 +192,6 @@ def _loop(w: Writer, name: str, count: str) -> Iterator[str]:
 
 
 def _row(w: Writer, table: str, number: str, fields: Sequence[str]) -> dict[str, str]:
-    """Read a row of a table, as addresses."""
     first = w.address(table, w.let(f"mul i64 {number}, {len(fields)}"))
     return {
         field: w.let(f"load ptr, ptr {w.address(first, column)}, align 8")

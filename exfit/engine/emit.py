@@ -92,23 +92,25 @@ def _module(parts: Parts, functions: Mapping[str, Writer], around: str) -> str:
         f"declare {shape.type} @llvm.fmuladd.{shape.suffix}({', '.join([shape.type] * 3)})\n"
         for shape in dict.fromkeys((Shape(1), *shapes))
     ]
-    arrays = [
-        f"ptr noalias %{part.mark}{array}" for part in parts for array in ("p", "r", "x", "out")
-    ]
-    bodies = ""
-    for name, body in functions.items():
-        driven = [part for part in parts if name != "rest" and (part.inputs or not part.mark)]
-        inputs = [f"ptr noalias %{part.mark}u" for part in driven]
-        arguments = ", ".join([*arrays, *inputs, *STEPS[name]])
-        # realigned: a vector of 512 bits on the stack else lies across two lines of the cache
-        head = f'define void @{name}({arguments}) "prefer-vector-width"="512" "stackrealign" {{'
-        bodies += "\n".join([head, "entry:", *body.lines, "  ret void", "}", ""])
+    bodies = "".join(_function(name, body, parts) for name, body in functions.items())
     inlined: dict[str, str] = {}
     for shape in shapes:
         inlined[f"@exp_{shape.suffix}("] = exponential(shape)
         inlined |= {f"@{name}_{shape.suffix}(": sine(shape, name) for name in ("sin", "cos")}
     called = [text for name, text in inlined.items() if name in bodies]
     return "".join([*declarations, *called, bodies, around, WEIGHTS])
+
+
+def _function(name: str, body: Writer, parts: Parts) -> str:
+    arrays = [
+        f"ptr noalias %{part.mark}{array}" for part in parts for array in ("p", "r", "x", "out")
+    ]
+    driven = [part for part in parts if name != "rest" and (part.inputs or not part.mark)]
+    inputs = [f"ptr noalias %{part.mark}u" for part in driven]
+    arguments = ", ".join([*arrays, *inputs, *STEPS[name]])
+    # realigned: a vector of 512 bits on the stack else lies across two lines of the cache
+    head = f'define void @{name}({arguments}) "prefer-vector-width"="512" "stackrealign" {{'
+    return "\n".join([head, "entry:", *body.lines, "  ret void", "}", ""])
 
 
 def _rest(parts: Parts) -> Writer:
@@ -146,12 +148,7 @@ def _run(parts: Parts) -> Writer:
     for name, divisor in (("h", 1), ("2", 2), ("3", 3), ("6", 6)):
         value = w.let(f"fdiv double %h, {Shape(1).number(divisor)}")
         fractions[name] = {part.shape: w.spread(value, part.shape) for part in parts}
-    slots: dict[Node, str] = {}
-    for part in parts:
-        for row, node in enumerate(part.nodes.x):
-            slots[node] = w.let(f"alloca {part.shape.type}, align 64")
-            value = w.load(f"%{part.mark}x", row, part.shape)
-            w.put(f"store {part.shape.type} {value}, ptr {slots[node]}, align 64")
+    slots = _slots(w, parts)
     count = w.let("sitofp i64 %m to double")
     share = w.let(f"fdiv double {Shape(1).number(1.0)}, {count}")
     w.put("br label %outer")
@@ -183,6 +180,16 @@ def _run(parts: Parts) -> Writer:
         for row, node in enumerate(part.nodes.x):
             w.store(final[node], f"%{part.mark}x", row, part.shape)
     return w
+
+
+def _slots(w: Writer, parts: Parts) -> dict[Node, str]:
+    slots: dict[Node, str] = {}
+    for part in parts:
+        for row, node in enumerate(part.nodes.x):
+            slots[node] = w.let(f"alloca {part.shape.type}, align 64")
+            value = w.load(f"%{part.mark}x", row, part.shape)
+            w.put(f"store {part.shape.type} {value}, ptr {slots[node]}, align 64")
+    return slots
 
 
 def _write_substep(

@@ -120,8 +120,18 @@ def _slope(node: Node, inner: Sequence[Slope | None]) -> Slope | None:
             return _chosen(args[0], inner[1], inner[2])
         case "clip":
             return _clipped(args, inner)
+        case "exp":
+            return _times(inner[0], node)
+        case "log":
+            return _times(inner[0], graph.divide(1.0, args[0]))
+        case "sqrt":
+            return _times(inner[0], graph.divide(0.5, node))
+        case "sin":
+            return _times(inner[0], graph.apply("cos", args[0]))
+        case "cos":
+            return _times(inner[0], graph.subtract(0.0, graph.apply("sin", args[0])))
         case op:
-            return _times(inner[0], _derivative(op, node, args[0]))
+            raise KeyError(op)
 
 
 def _clipped(args: Sequence[Node], inner: Sequence[Slope | None]) -> Slope | None:
@@ -135,24 +145,6 @@ def _clipped(args: Sequence[Node], inner: Sequence[Slope | None]) -> Slope | Non
         return _chosen(above, inner[2], _chosen(x.graph.compare("<=", x, low), inner[1], inner[0]))
     inside = _chosen(x.graph.compare("<=", high, x), inner[2], inner[0])
     return _chosen(x.graph.compare("<=", x, low), inner[1], inside)
-
-
-def _derivative(op: str, node: Node, x: Node) -> Node:
-    """Return the derivative of an elementary function at x, where it is ``node``."""
-    graph = node.graph
-    match op:
-        case "exp":
-            return node
-        case "log":
-            return graph.divide(1.0, x)
-        case "sqrt":
-            return graph.divide(0.5, node)
-        case "sin":
-            return graph.apply("cos", x)
-        case "cos":
-            return graph.subtract(0.0, graph.apply("sin", x))
-        case _:
-            raise KeyError(op)
 
 
 def _times(slope: Slope | None, factor: Node) -> Slope | None:

@@ -147,7 +147,6 @@ def _followers(
 
 
 def _order(followers: Mapping[int, set[int]]) -> list[int]:
-    """Order nodes by what they follow, else by their indices."""
     waits = Counter(unit for after in followers.values() for unit in after)
     ready = sorted(followers.keys() - waits.keys())
     order = []

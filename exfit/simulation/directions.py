@@ -95,25 +95,31 @@ def moves_of(system: System, inputs: Inputs, directions: Sequence[Sequence[Direc
     """Collect the moves of the directions of several sets."""
     every = [(k, move) for own in directions for k, move in enumerate(own)]
     free = {name for _, move in every for name in move.parameters}
-    shapes = {
-        InputShape(step, instant)
-        for _, move in every
-        for step, rates in move.steps.items()
-        for instant, rate in zip((True, False), rates, strict=True)
-        if rate
-    }
-    pairs = [(inputs.steps[shape.step].signal, shape) for shape in sorted(shapes)]
-    moving = {signal for signal, _ in pairs}
     return Moves(
         columns=tuple(sorted({k for k, move in every if move.parameters or move.steps})),
         delayed=tuple(sorted({k for k, move in every if move.delay != 0.0})),
         free=tuple(name for name in system.parameters if name in free),
-        shapes={
-            name: tuple(shape for signal, shape in pairs if signal == name)
-            for name in system.inputs
-            if name in moving
-        },
+        shapes=_shapes(system, inputs, [move for _, move in every if move.steps]),
     )
+
+
+def _shapes(
+    system: System, inputs: Inputs, moves: Sequence[Direction]
+) -> dict[str, tuple[InputShape, ...]]:
+    """Return the shapes of each input that moves."""
+    shapes = {
+        InputShape(step, instant)
+        for move in moves
+        for step, rates in move.steps.items()
+        for instant, rate in zip((True, False), rates, strict=True)
+        if rate
+    }
+    of_inputs: dict[str, tuple[InputShape, ...]] = {}
+    for name in system.inputs if shapes else ():
+        own = sorted(shape for shape in shapes if inputs.steps[shape.step].signal == name)
+        if own:
+            of_inputs[name] = tuple(own)
+    return of_inputs
 
 
 def tangents_by_equations(

@@ -115,11 +115,7 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
         found += [*_limit(state, low, -1.0, state), *_limit(state, high, 1.0, state)]
     for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
         if node.op == "clip" and node not in clamps:
-            x, low, high = node.operands
-            for bound, sign in ((low, -1.0), (high, 1.0)):
-                clamped_there = x.op == "clip" and any(bound is operand for operand in x.operands)
-                if _limit_name(bound) and not clamped_there:
-                    found += _limit(x, bound, sign, _state_in(x, states))
+            found += _clamp(node, states)
         elif node.op == "select" and node.operands[0].varies:
             found += _choice(node, states)
     limits = [
@@ -130,6 +126,14 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     ]
     limits += [limit for limit, _ in _limiter_gates(system)]
     return tuple(sorted(dict.fromkeys(limits), key=lambda limit: limit.value.index))
+
+
+def _clamp(node: Node, states: Container[Node]) -> Iterator[EquationLimit]:
+    x, low, high = node.operands
+    for bound, sign in ((low, -1.0), (high, 1.0)):
+        clamped_there = x.op == "clip" and any(bound is operand for operand in x.operands)
+        if _limit_name(bound) and not clamped_there:
+            yield from _limit(x, bound, sign, _state_in(x, states))
 
 
 def _choice(node: Node, states: Container[Node]) -> Iterator[EquationLimit]:
@@ -146,7 +150,6 @@ def _choice(node: Node, states: Container[Node]) -> Iterator[EquationLimit]:
 
 
 def _limit(value: Node, bound: Node, sign: float, state: Node | None) -> Iterator[EquationLimit]:
-    """Yield a limit that is not infinite."""
     fixed = bound.constant
     if fixed is None or isfinite(fixed):
         name = _given(bound) if fixed is None else f"{fixed:g}"
@@ -236,7 +239,6 @@ def _is_limit(node: Node) -> bool:
 
 
 def _name(symbol: Node) -> str:
-    """Return the name of what a symbol of a trace stands for."""
     return str(symbol.args[0]).partition(".")[2]
 
 

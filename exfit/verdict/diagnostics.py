@@ -286,7 +286,6 @@ def _against(signal: str, overlay: Overlay, before: Mask) -> str:
 
 
 def _farthest(moves: Array) -> float:
-    """Return the largest of moves (M,), with its sign."""
     return float(moves[np.argmax(np.abs(moves))])
 
 

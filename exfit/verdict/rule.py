@@ -54,9 +54,7 @@ def verdict_of(evidence: Evidence) -> Verdict:
     except KeyboardInterrupt:
         words, reason = MATCHES, UNTESTED
         evidence.pace.stopped((VALUES,), interrupted=True)
-    # averages that the record shows, unless a trial is to name them
-    if averages is not None and averages.shown and (matched or averages.reason in reason):
-        contradicted.append(averages)
+    contradicted += _shown(averages, matched, reason)
     contradicted.sort(key=lambda each: -each.likelihood)
     if contradicted and good_but_for_averages:
         words, reason = MATCHES, contradicted[0].reason
@@ -64,6 +62,15 @@ def verdict_of(evidence: Evidence) -> Verdict:
     if words == MATCHES:
         causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
+
+
+def _shown(
+    averages: RecorderAverages | None, matched: bool, reason: str
+) -> tuple[RecorderAverages, ...]:
+    """Averages that the record shows, unless a trial is to name them."""
+    if averages is None or not averages.shown:
+        return ()
+    return (averages,) if matched or averages.reason in reason else ()
 
 
 def verdict_alone(evidence: Evidence) -> Verdict:
@@ -132,7 +139,6 @@ def _label(record: str, signal: str, evidence: Evidence) -> str:
 
 
 def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
-    """Name the reasons for which a fit that matches is not good."""
     undetermined = evidence.undetermined
     if undetermined:
         verb = "is" if len(undetermined) == 1 else "are"
@@ -146,6 +152,12 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
         yield f"typical values matter: {first_of([*evidence.typical_values])}"
     if evidence.averages is not None and evidence.averages.matters:
         yield evidence.averages.reason
+    yield from _not_noise(tests, evidence)
+    if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
+        yield "the search ended before a minimum"
+
+
+def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[str]:
     coloured = [test for test in tests if not test.are_white]
     larger = [test for test in tests if test.are_white and not test.are_noise]
     for chosen, doubt in (
@@ -155,8 +167,6 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
         if chosen:
             signals = [_label(test.record, test.signal, evidence) or test.signal for test in chosen]
             yield f"the residuals of {listed(signals)} {doubt}"
-    if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
-        yield "the search ended before a minimum"
 
 
 def _undetermined(evidence: Evidence) -> Iterator[Cause]:

@@ -171,10 +171,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
     column = {free.name: each for free, each in zip(added, others.T, strict=True)}
     directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
-    # those of a saturation as one: they come from the same curve
-    saturation = tuple(name for name in SATURATION if name in fixed)
-    alone = [(name,) for name in fixed if name not in saturation]
-    for names in [saturation, *alone] if saturation else alone:
+    for names in _together([*fixed]):
         direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
         directions.append((_held_value(evidence, names), direction))
     directions = [each for each in directions if np.isfinite(each[1]).all()]
@@ -201,6 +198,14 @@ def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, flo
     }
     freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
     return with_freed(extended, freed), of_test, fixed
+
+
+def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Yield names, those of a saturation as one: they come from the same curve."""
+    saturation = tuple(name for name in SATURATION if name in names)
+    if saturation:
+        yield saturation
+    yield from ((name,) for name in names if name not in saturation)
 
 
 def _held_value(evidence: Evidence, names: Sequence[str]) -> Held:

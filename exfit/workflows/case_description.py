@@ -58,6 +58,10 @@ def _played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Iter
     if masks:
         left_out = ", ".join(f"{start:.4g} ... {end:.4g} s" for start, end in masks)
         yield f"left out of the comparison: {left_out}"
+    yield from _filters(recording)
+
+
+def _filters(recording: Recording) -> Iterator[str]:
     filters = {"all channels": recording.record.filter}
     filters |= {signal: channel.filter for signal, channel in recording.record.channels.items()}
     for name, given in filters.items():
@@ -90,14 +94,18 @@ def inputs_of(
     for number, script in enumerate(case.program_files):
         label = f"program{number or ''}"
         hashes[label], names[label] = file_hash(script), script.name
-    labels = [f"records.{recording.name}" for recording in case.records]
-    labels = labels or ["record" for _ in case.recordings]
-    labels += [f"validate.{recording.name}" for recording in case.validations]
-    for label, setup in zip(labels, setups, strict=True):
+    for label, setup in zip(_labels(case), setups, strict=True):
         records = {f"{label}.{signal}": record for signal, record in setup.references.items()}
         for name, record in {label: setup.record, **records}.items():
             hashes[name], names[name] = record.sha256, record.source.name
     return hashes, names
+
+
+def _labels(case: Case) -> list[str]:
+    """Return the labels of the records of a case: of those fitted, then of the validations."""
+    fitted = [f"records.{recording.name}" for recording in case.records]
+    fitted = fitted or ["record" for _ in case.recordings]
+    return [*fitted, *(f"validate.{recording.name}" for recording in case.validations)]
 
 
 def text_of(case: Case) -> str:
@@ -179,7 +187,6 @@ def tests_of(
 
 
 def _events(case: Case, recording: Recording, identified: Identified) -> Iterator[str]:
-    """Describe the steps and switchings of a test."""
     test, prefix = recording.test, prefix_from(recording.name)
     if test.vt0 is not None:
         yield f"vt0 {_given(test.vt0, 'g', 'pu', identified.get(f'{prefix}vt0'))}"

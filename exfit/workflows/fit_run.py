@@ -3,6 +3,7 @@
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -88,40 +89,20 @@ def fit_result(
     # of the processor, but for a program that runs beside it
     timer = clock.process_time if program is None else clock.perf_counter
     search_began = timer()
-    start = case.values()
     setups, problem = fitted(case, program)
-    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
-    if program is not None:
-        unseen = program.simulated(unseen)
+    unseen = _unseen(case, program)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     (hashes, names), case_text = inputs_of(case, used), text_of(case)
 
-    def announce(state: SearchState, line: estimate.SolverIteration) -> None:
-        residuals = state.problem.residuals
-        if live is not None:
-            response = live_response(state.setups[0], residuals, line.x)
-            if response is not None:
-                live(response)
-        progress(_iteration(line, residuals))
-
+    announce = partial(_announce, progress, live)
     began_with = case, setups, unseen, problem, method, options, program
     state = in_turn(STAGES, SearchState(*began_with, announce, search_progress))
     problem, found, best = state.problem, state.found, state.found.best
     residuals, values = problem.residuals, problem.residuals.values(best.x)
     history = [_iteration(line, residuals) for line in found.history]
     fine = [setup.with_enough_substeps(values) for setup in state.fitted]
-    begin = residuals.values(residuals.start)
-    moves = residuals.moves(scaled_values(residuals.free, values))
-    comparisons = tuple(
-        with_iteration_responses(
-            compare_with_record(setup, setup.name, values, begin, moves=moves),
-            setup,
-            residuals,
-            history,
-        )
-        for setup in fine
-    )
+    comparisons = _comparisons(fine, residuals, values, history)
     analysis = _analysed(state, values, fine, comparisons, history)
     uncertainty = analysis.uncertainty
     walked = problem.compressed if program is None else None
@@ -145,14 +126,8 @@ def fit_result(
     noted = [*minima_notes(residuals, found, minima, uncertainty)]
     if uncertainty is not None and verdict.no_interval:
         uncertainty = analysis.uncertainty = uncertainty.without_intervals(verdict.no_interval)
-    own_values = {
-        part.kind: {symbol: values[part.prefix + symbol] for symbol in part.symbols}
-        for part in case.parts.all
-    }
-    models = {part.kind: part.name for part in case.parts.all}
-    limiters = [limiter.kind for limiter in case.parts.limiters]
-    why = "the search was interrupted" if analysis.interrupted else "no finite derivatives"
-    parameters = _parameters(case, residuals, values, uncertainty, why)
+    own_values, models, limiters = _of_parts(case, values)
+    parameters = _parameters(case, residuals, values, uncertainty, analysis.why)
     identified = identified_values(parameters, analysis.validation)
     simulated = [*state.fitted, *state.unseen]
     return FitResult(
@@ -194,8 +169,6 @@ def fit_result(
             *state.line_notes,
             *noted,
             *_notes(state, comparisons, analysis),
-            *([] if program is None else program.notes(simulated)),
-            *([LINEAR_ALONE] if case.has_no_equations else []),
             *filter(None, [pace.sentence]),
         ),
         validation=tuple(analysis.validation),
@@ -236,6 +209,63 @@ class Analysis:
     as_found: AsFound | None = None
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
+
+    @property
+    def why(self) -> str:
+        """Why there is no uncertainty, where there is none."""
+        return "the search was interrupted" if self.interrupted else "no finite derivatives"
+
+
+def _announce(
+    progress: Callable[[Iteration], None],
+    live: Callable[[LiveResponse], None] | None,
+    state: SearchState,
+    line: estimate.SolverIteration,
+) -> None:
+    residuals = state.problem.residuals
+    if live is not None:
+        response = live_response(state.setups[0], residuals, line.x)
+        if response is not None:
+            live(response)
+    progress(_iteration(line, residuals))
+
+
+def _unseen(case: Case, program: Program | None) -> tuple[ExperimentSetup, ...]:
+    start = case.values()
+    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
+    return unseen if program is None else program.simulated(unseen)
+
+
+def _comparisons(
+    fine: Sequence[ExperimentSetup],
+    residuals: Residuals,
+    values: Values,
+    history: Sequence[Iteration],
+) -> tuple[Comparison, ...]:
+    """Return the fitted response beside each record, with the iterations that led to it."""
+    start = residuals.values(residuals.start)
+    moves = residuals.moves(scaled_values(residuals.free, values))
+    return tuple(
+        with_iteration_responses(
+            compare_with_record(setup, setup.name, values, start, moves=moves),
+            setup,
+            residuals,
+            history,
+        )
+        for setup in fine
+    )
+
+
+def _of_parts(
+    case: Case, values: Values
+) -> tuple[dict[str, dict[str, float]], dict[str, str], list[str]]:
+    """Return the values of each part by its kind and their symbols, its model, the limiters."""
+    own = {
+        part.kind: {symbol: values[part.prefix + symbol] for symbol in part.symbols}
+        for part in case.parts.all
+    }
+    limiters = [limiter.kind for limiter in case.parts.limiters]
+    return own, {part.kind: part.name for part in case.parts.all}, limiters
 
 
 def _analysed(
@@ -334,7 +364,6 @@ def _iteration(line: estimate.SolverIteration, residuals: Residuals) -> Iteratio
 def _notes(
     state: SearchState, comparisons: Sequence[Comparison], analysis: Analysis
 ) -> Iterator[str]:
-    """Yield notes beside the numbers of a fit."""
     case, residuals, best = state.case, state.problem.residuals, state.found.best
     if case.accept is not None and not case.validations:
         yield NOTHING_TO_ACCEPT
@@ -361,3 +390,7 @@ def _notes(
     yield from skipped_response_notes(comparisons)
     if analysis.unfinished:
         yield INTERRUPTED_AFTERWARDS
+    if state.program is not None:
+        yield from state.program.notes([*state.fitted, *state.unseen])
+    if case.has_no_equations:
+        yield LINEAR_ALONE

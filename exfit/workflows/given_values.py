@@ -50,12 +50,16 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
             raise CaseError([f"{place}: {tied}"]) from None
         following = {name: values[name] for name in case.ties.by_name if name not in given}
         faults += _outside(rows, following)
-        for part in case.parts.all:  # contradictions among the values of a system
-            own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
-            faults += [f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own)]
+        faults += _contradictions(case, values)
     if faults:
         raise CaseError(f"{place}: {fault}" for fault in faults)
     return dict(given)
+
+
+def _contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
+    for part in case.parts.all:
+        own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
+        yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
 
 
 def with_given_values(
@@ -82,7 +86,6 @@ def with_given_values(
 
 
 def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
-    """Yield the values that the equations exclude."""
     for name, value in values.items():
         fault = rows[name].range_fault(value) if name in rows else None
         if fault is not None:

@@ -9,6 +9,7 @@ from exfit.case.case import Case
 from exfit.engine.system import time_constants
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
@@ -69,15 +70,7 @@ class Check:
 def check(case: Case, program: Program | None = None) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     of_events = tuple(event_warnings(case))
-    try:
-        setups = tuple(
-            setup.with_enough_substeps(setup.with_start_values(case.values()))
-            for setup in (build_experiments(case) if case.recordings else ())
-        )
-    except ExfitError as fault:
-        if not of_events:
-            raise
-        raise ExfitError("\n".join([*of_events, str(fault)])) from fault
+    setups = _ready(case, of_events)
     experiments = [setup.experiment for setup in setups] or [planned(case)]
     free = free_parameters(case, setups)
     names = {parameter.name for parameter in free}
@@ -118,6 +111,21 @@ def check(case: Case, program: Program | None = None) -> Check:
         has_equations=not case.has_no_equations,
         from_program=from_program,
     )
+
+
+def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
+    """Return the tests of a case at its values; a fault follows what is wrong with the records."""
+    if not case.recordings:
+        return ()
+    try:
+        return tuple(
+            setup.with_enough_substeps(setup.with_start_values(case.values()))
+            for setup in build_experiments(case)
+        )
+    except ExfitError as fault:
+        if not warnings:
+            raise
+        raise ExfitError("\n".join([*warnings, str(fault)])) from fault
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

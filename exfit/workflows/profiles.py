@@ -1,6 +1,6 @@
 """The profile likelihood of a case's parameters: how far each can move if the others follow."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, isinf
 from typing import Any, NamedTuple
@@ -13,7 +13,8 @@ from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.channel_weights import as_fitted
-from exfit.fitting.problem import with_setups
+from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.problem import FitProblem, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
@@ -22,6 +23,7 @@ from exfit.inference.confidence import LEVEL, Interval
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.intervals.determination import (
     FoundMinimum,
+    ProfilesAboutMinima,
     limits_of,
     other_minima,
     profiles_about,
@@ -151,13 +153,7 @@ def profile(
     names = tuple(names)
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
-    options = case.estimate.to_the_minimum()
-    start, judged = case.values(), case.validations if options.strategy == "auto" else ()
-    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
-    at = case, setups, unseen, problem, options.strategy, options, program
-    state = in_turn(SEARCH, SearchState(*at, watch=progress))
-    if state.interrupted:
-        raise KeyboardInterrupt
+    state = _searched(case, setups, problem, progress, program)
     setups, problem, best = state.setups, state.problem, state.found.best
     x, records = best.x, names_of_records(setups)
     uncertainty = uncertainty_at(problem, x, records)
@@ -185,18 +181,6 @@ def profile(
             break
         x = profiles.lower
     first = next(iter(profiles.by_index.values()))[0]
-    notes = [f"no parameter has an interval: {verdict.misfit}"] if verdict.misfit else []
-    notes += search_range_notes(case)
-    if not best.success:
-        notes.append(f"the fit did not end at a minimum: {best.message}")
-    if by_twin and profiles.lower is not None:
-        notes.append(LOWER_BY_TWIN)
-    if not np.array_equal(first.x, best.x):
-        notes.append(LOWER)
-    if any(others for _, *others in profiles.by_index.values()):
-        notes.append(ENCLOSED)
-    if program is not None:
-        notes += program.notes(setups, "profiles")
     return Profiles(
         name=case.path.stem,
         cost=first.cost,
@@ -204,10 +188,52 @@ def profile(
             _profile(case, residuals, uncertainty, each, verdict)
             for each in profiles.by_index.values()
         ),
-        notes=tuple(notes),
+        notes=(
+            *_notes(case, verdict, best, profiles, by_twin),
+            *([] if program is None else program.notes(setups, "profiles")),
+        ),
         interrupted=profiles.interrupted,
         verdict=verdict,
     )
+
+
+def _searched(
+    case: Case,
+    setups: tuple[ExperimentSetup, ...],
+    problem: FitProblem,
+    progress: Callable[[estimate.Progress], None],
+    program: Program | None,
+) -> SearchState:
+    """Search a case to its minimum; raises KeyboardInterrupt at an interruption."""
+    options = case.estimate.to_the_minimum()
+    start, judged = case.values(), case.validations if options.strategy == "auto" else ()
+    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
+    at = case, setups, unseen, problem, options.strategy, options, program
+    state = in_turn(SEARCH, SearchState(*at, watch=progress))
+    if state.interrupted:
+        raise KeyboardInterrupt
+    return state
+
+
+def _notes(
+    case: Case,
+    verdict: Verdict,
+    best: estimate.Result,
+    profiles: ProfilesAboutMinima,
+    by_twin: bool,
+) -> Iterator[str]:
+    """Yield notes on the minimum that the profiles are about, and on others."""
+    if verdict.misfit:
+        yield f"no parameter has an interval: {verdict.misfit}"
+    yield from search_range_notes(case)
+    if not best.success:
+        yield f"the fit did not end at a minimum: {best.message}"
+    if by_twin and profiles.lower is not None:
+        yield LOWER_BY_TWIN
+    if not np.array_equal(next(iter(profiles.by_index.values()))[0].x, best.x):
+        yield LOWER
+    if any(others for _, *others in profiles.by_index.values()):
+        yield ENCLOSED
 
 
 def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:

@@ -23,7 +23,7 @@ from exfit.fitting.validation_steps import GivenSteps, SetupOfRecord, with_steps
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
-from exfit.results.description import OtherProgram
+from exfit.results.description import OtherProgram, RecordedTest
 from exfit.results.validation_result import ValidationResult
 from exfit.util.criteria import Criteria
 from exfit.util.file_names import folded
@@ -111,8 +111,7 @@ def validate(
     steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
     or where there is nothing to validate on.
     """
-    sizes, instants = (tuple(n) if isinstance(n, Sequence) else (n,) for n in (step, at))
-    given = GivenSteps(sizes, instants)
+    given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
     saw: tuple[Recording, ...] = ()
@@ -140,6 +139,10 @@ def validate(
         tests += [_validated(case, matches, *pair, own) for pair in pairs]
     described = other_program_of(case, program, [test.setup for test in tests])
     return Validation(case, own, tuple(tests), described)
+
+
+def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Sequence) else (given,)
 
 
 def _fitted(
@@ -294,34 +297,22 @@ def validation_result(
     """
     case, values, tests, other_program = validation
     own = [(test.setup, test.values) for test in tests]
-    setups, of_case, matches = [setup for setup, _ in own], case.values(), validation.comparisons
+    setups = [setup for setup, _ in own]
     hashes, names = inputs_of(case, setups)
-    free = case.free() if validation.fitted else ()
-    # of values that differ from the case, the one who gave them
-    changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
-    others = [name for name in changed if name not in case.ties.by_name]
-    given = {name: word for name, word in sources.items() if name in of_case}
-    described = []
-    identified = identified_values({}, matches)
-    for match, test in zip(matches, tests_of(case, setups, identified), strict=True):
-        # of a record by hand the steps that it shows
-        done = "; ".join(step.text for step in match.steps) or test.done
-        role = "validation" if match.validation else "fitted"
-        described.append(replace(test, name=match.name, role=role, done=done))
     return ValidationResult(
         case=case.path,
         about=case.about,
         model=case.subject,
         saturation=case.saturation,
         origin=GIVEN if validation.fitted else AS_FOUND if case.free() else OF_CASE,
-        values={name: values[name] for name in of_case},
-        sources={**case.sources(fitted=free), **dict.fromkeys(others, NOT_STATED), **given},
+        values={name: values[name] for name in case.values()},
+        sources=_sources(validation, sources),
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
-        matches=tuple(matches),
+        matches=tuple(validation.comparisons),
         versions=versions,
         inputs=hashes,
         parts=tuple(parts_of(case)),
-        tests=tuple(described),
+        tests=tuple(_described(validation, setups)),
         behaviour=None if case.has_no_equations else behaviour_of(own),
         files=names,
         case_text=text_of(case),
@@ -329,3 +320,23 @@ def validation_result(
         criteria=Criteria(**dict(case.report.criteria)),
         other_program=other_program,
     )
+
+
+def _sources(validation: Validation, sources: Mapping[str, str]) -> dict[str, str]:
+    """Name the source of every value: of those that differ from the case, the one who gave it."""
+    case, values = validation.case, validation.values
+    of_case, free = case.values(), case.free() if validation.fitted else ()
+    changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
+    given = {name: word for name, word in sources.items() if name in of_case}
+    others = [name for name in changed if name not in case.ties.by_name]
+    return {**case.sources(fitted=free), **dict.fromkeys(others, NOT_STATED), **given}
+
+
+def _described(validation: Validation, setups: Sequence[ExperimentSetup]) -> Iterator[RecordedTest]:
+    """Yield the tests with their records; of a record by hand the steps that it shows."""
+    matches = validation.comparisons
+    described = tests_of(validation.case, setups, identified_values({}, matches))
+    for match, test in zip(matches, described, strict=True):
+        done = "; ".join(step.text for step in match.steps) or test.done
+        role = "validation" if match.validation else "fitted"
+        yield replace(test, name=match.name, role=role, done=done)

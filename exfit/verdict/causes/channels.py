@@ -62,8 +62,8 @@ def _other_scale(
 ) -> Iterator[Suspicion]:
     signal, place = channel.signal, f"{channel.signal}{evidence.name_of(number)}"
     levels = levels_at_rest(record.comparison, signal, record.steady_until)
-    factor = 1.0 if levels is None else _factor_between(levels)
-    start = channel.scale * (1.0 if signal == "vt" else factor)
+    factor = 1.0 if signal == "vt" or levels is None else _factor_between(*levels)
+    start = channel.scale * factor
     scale = Nuisance("cause.scale", "scale", signal=signal)
     opened = [Opened.within(scale, start, LARGEST_FACTOR)]
     with_voltage = signal == "vt" and record.given_vt0 is None and levels is not None
@@ -72,9 +72,7 @@ def _other_scale(
     trial = refitted(evidence, with_opened(evidence.residuals, number, opened))
     if trial is None:
         return
-    starts = "" if levels is None else f": it starts from {levels[0]:.4g} pu"
-    if levels is not None and abs(factor - 1.0) > LEAST_CHANGE:
-        starts += f", the response from {levels[1]:.4g} pu"
+    starts = "" if levels is None else _starts(*levels)
     found, prior = trial.values["cause.scale"] / channel.scale, 0.0
     if with_voltage and levels is not None:
         before, after = ((vt - 1.0) / TESTED_AT for vt in (levels[0], trial.values["cause.vt0"]))
@@ -94,9 +92,15 @@ def is_wrong_base(signal: str, factor: float) -> bool:
     return abs(factor - 1.0) >= (LEAST_CHANGE if signal == "vt" else LEAST_ERROR_OF_BASE)
 
 
-def _factor_between(levels: tuple[float, float]) -> float:
+def _starts(measured: float, simulated: float) -> str:
+    text = f": it starts from {measured:.4g} pu"
+    if abs(_factor_between(measured, simulated) - 1.0) > LEAST_CHANGE:
+        text += f", the response from {simulated:.4g} pu"
+    return text
+
+
+def _factor_between(measured: float, simulated: float) -> float:
     """Ratio of the simulated level to the measured one; 1 where one of them is zero."""
-    measured, simulated = levels
     return simulated / measured if measured and simulated else 1.0
 
 
@@ -106,7 +110,6 @@ def nearer_to_rated(levels: tuple[float, float] | None, trial: Trial) -> bool:
 
 
 def _voltage(evidence: Evidence, number: int) -> Opened:
-    """Leave the voltage before the first step open."""
     vt0 = evidence.residuals.experiments[number].own.get(VT0, 1.0)
     return Opened.around(Nuisance("cause.vt0", "vt0"), vt0, FARTHEST_VOLTAGE)
 

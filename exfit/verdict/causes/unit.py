@@ -66,16 +66,22 @@ def fixed_values(evidence: Evidence) -> Iterator[Suspicion]:
         if value > 0.0 and name in rows and name not in own
         if "MAX" not in name and "MIN" not in name  # those are limits
     ]
-    linear = linear_fit(evidence)
-    if linear is None or not names:
-        return
+    for name in _most_explaining(evidence, names) if names else ():
+        yield from _other_values(evidence, [name], RARE)
+
+
+def _most_explaining(evidence: Evidence, names: list[str]) -> list[str]:
+    """Return the fixed values that would explain most, the first first."""
+    fixed, linear = evidence.residuals.fixed, linear_fit(evidence)
+    if linear is None:
+        return []
     freed = [freed_within(name, fixed[name], LARGEST_FACTOR) for name in names]
     residuals = with_freed(evidence.residuals, freed)
     theta = np.append(evidence.solution.x, [each.scaled(each.start) for each in freed])
     try:
         _, slopes = residuals.errors(theta)
     except SimulationError:
-        return
+        return []
     columns = slopes[:, -len(freed) :]
     sizes = np.linalg.norm(columns, axis=0)
     costs = {
@@ -83,8 +89,7 @@ def fixed_values(evidence: Evidence) -> Iterator[Suspicion]:
         for k, name in enumerate(names)
         if np.isfinite(sizes[k]) and sizes[k] > DEPENDENT * np.nanmax(sizes)
     }
-    for name in sorted(costs, key=lambda name: costs[name])[:MOST_FIXED]:
-        yield from _other_values(evidence, [name], RARE)
+    return sorted(costs, key=lambda name: costs[name])[:MOST_FIXED]
 
 
 def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> Iterator[Suspicion]:
