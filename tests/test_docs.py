@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 import yaml
 from commands import COMMANDS
-from matplotlib.figure import Figure
 from places import REFERENCE, ROOT
 from test_layers import IN_ORDER
 
@@ -28,7 +27,7 @@ from exfit.errors import CaseError
 from exfit.fitting.recordings import phasors_of, record_of
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.show import run_folder
+from exfit.show import figures, run_folder
 from exfit.util.strategies import STRATEGIES
 
 DOCS = ROOT / "docs"
@@ -106,7 +105,7 @@ def run(folder, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(WIDTH))
     for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)
+    monkeypatch.setattr(figures, "drawn", lambda _: np.zeros((1, 1, 4), np.uint8))
 
     def command(line: str) -> tuple[int, str]:
         capsys.readouterr()
