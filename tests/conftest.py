@@ -5,6 +5,7 @@ import os
 import sys
 
 import hypothesis
+import numpy as np
 import pytest
 from commands import Ran
 from oracle import EXCITERS, SATURATED, SURROUNDED
@@ -13,6 +14,7 @@ from writers import prepare
 from exfit import cli
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
+from exfit.show import figures
 
 CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
 # one of each family: without a plant; commutators; rotating rectifiers; static; compound; a round
@@ -49,6 +51,7 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "long: does not run over the few models")
     config.addinivalue_line("markers", "every_example: runs with --models=all only")
     config.addinivalue_line("markers", "each_model: a law of each model, in whichever folder")
+    config.addinivalue_line("markers", "pixels: its commands draw their figures in pixels")
     few = config.getoption("models") == "few"
     hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -140,8 +143,13 @@ def saturated(request):
 
 
 @pytest.fixture
-def run(capsys):
-    """Return a function that runs a command as the shell does."""
+def run(capsys, monkeypatch, request):
+    """Return a function that runs a command as the shell does.
+
+    Figures are made, but in pixels only for tests that are marked so.
+    """
+    if not request.node.get_closest_marker("pixels"):
+        monkeypatch.setattr(figures, "drawn", lambda _: np.zeros((1, 1, 4), np.uint8))
 
     def command(*arguments):
         capsys.readouterr()

@@ -344,6 +344,7 @@ def test_a_cache_that_cannot_be_written_costs_only_time(run, tmp_path, monkeypat
     assert (ran.code, ran.out, ran.err) == (0, "", "")
 
 
+@pytest.mark.pixels
 def test_a_fit_that_converges_ends_with_0_and_writes_its_files(run):
     ran = run("fit", case_file())
     assert (ran.code, ran.err) == (0, "")

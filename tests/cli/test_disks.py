@@ -17,7 +17,7 @@ READ_ONLY = (errno.EROFS, "Read-only file system")
 FEW = ("simulate", "new", "import")  # the others take longer
 LATER = 3  # writes after which a disk is full
 
-pytestmark = pytest.mark.usefixtures("in_prepared_folder")
+pytestmark = [pytest.mark.usefixtures("in_prepared_folder"), pytest.mark.pixels]
 
 
 @pytest.fixture

@@ -155,6 +155,7 @@ def test_tables_of_a_run_have_a_cell_for_each_column(run, hostile):
             assert len({len(row) for row in csv.reader(file)}) == 1
 
 
+@pytest.mark.pixels
 def test_figures_draw_hostile_names(run, hostile):
     """A dollar sign begins a formula in a figure, unless it is escaped."""
     shutil.copy(hostile / RECORD, hostile / "$\\frac{$.csv")

@@ -306,6 +306,7 @@ def test_wrong_files_are_refused(run):
             assert word in err
 
 
+@pytest.mark.pixels
 def test_the_command_writes_its_files_and_says_what_they_hold(run):
     time = clock(0.01)
     a, b = good()

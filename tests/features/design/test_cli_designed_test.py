@@ -35,6 +35,7 @@ def run(*words):
     return CliRunner().invoke(main, ["identify", *map(str, words)])
 
 
+@pytest.mark.pixels
 @pytest.mark.long
 def test_a_design_prints_its_sheet_and_leaves_it_as_files(case, tmp_path):
     result = run(case, *OPTIONS, "-o", "designed")

@@ -26,6 +26,7 @@ def place(folder, monkeypatch):
     return written(programme_content(), folder)
 
 
+@pytest.mark.pixels
 def test_a_programme_leaves_a_folder_for_each_test_and_one_report(run, place):
     ran = run("run", place, *OUT)
     assert (ran.code, ran.err) == (0, "")

@@ -25,6 +25,7 @@ def workplace(empty_folder, monkeypatch):
     return empty_folder
 
 
+@pytest.mark.pixels
 @pytest.mark.long
 def test_the_table_the_files_and_the_figure_are_of_all_models(run, monkeypatch):
     monkeypatch.setattr(plots.style, "DPI", 40)

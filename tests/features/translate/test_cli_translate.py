@@ -29,6 +29,7 @@ def workplace(empty_folder):
     return empty_folder
 
 
+@pytest.mark.pixels
 def test_it_leaves_a_case_and_records_of_the_other_model(run, fitted):
     code, out, err = run("translate", fitted, "--model", "EXAC1", "--step", "0.01")
     assert (code, err) == (0, "")
