@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.util.files import siblings
@@ -45,13 +46,8 @@ def files_in(content: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
 
 def command_of(content: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the command by which another program simulates a case, () where none does."""
-    plant = content.get("plant")
-    command = plant.get("command") if isinstance(plant, Mapping) else None
-    return (
-        tuple(word for word in command if isinstance(word, str))
-        if isinstance(command, list)
-        else ()
-    )
+    words = (entry.text for entry in _at(content, "plant", "command").entries)
+    return tuple(word for word in words if word is not None)
 
 
 def fmu_of(content: Mapping[str, Any]) -> tuple[str, ...]:
@@ -90,9 +86,8 @@ def section_of(text: str, case: Path, key: str) -> Any:
 
 def stabiliser_inputs(text: str, case: Path) -> tuple[str, ...]:
     """Return the input signals that the text of a case gives its stabiliser, () for its own."""
-    section = section_of(text, case, "stabiliser")
-    given = section.get("inputs") if isinstance(section, Mapping) else None
-    return tuple(map(str, given or ()))
+    inputs = _at(content_of(text, case), "stabiliser", "inputs").entries
+    return tuple(str(entry.value) for entry in inputs)
 
 
 def _content(case: Path) -> Mapping[str, Any]:
@@ -134,32 +129,21 @@ def _parts(file: Path) -> Iterator[Path]:
 
 
 def _names(content: Mapping[str, Any], free: bool) -> tuple[str, ...]:
-    names = [
-        prefix + str(name)
+    sections = [
+        (prefix, _at(content, *place))
         for prefix, places in SECTIONS.items()
         for place in places
         if not free or place[-1] == "free"
-        for name in _section(content, place)
     ]
-    names += _names_of_limiters(content, free)
-    return tuple(dict.fromkeys(names))
+    for limiter in _at(content, "limiters").entries:
+        prefix = f"{limiter.at('model').text or ''}"[:3].lower()
+        keys = ("free",) if free else ("free", "parameters")
+        sections += [(f"{prefix}.", limiter.at(key)) for key in keys if prefix]
+    return tuple(dict.fromkeys(prefix + name for prefix, own in sections for name in own.content))
 
 
-def _names_of_limiters(content: Mapping[str, Any], free: bool) -> Iterator[str]:
-    """Yield the names of the parameters that a file gives its limiters."""
-    limiters = content.get("limiters")
-    for limiter in limiters if isinstance(limiters, list) else ():
-        model = limiter.get("model") if isinstance(limiter, Mapping) else None
-        for key in ("free",) if free else ("free", "parameters"):
-            given = _section(limiter, (key,)) if isinstance(model, str) else ()
-            yield from (f"{str(model)[:3].lower()}.{name}" for name in given)
-
-
-def _section(content: Mapping[str, Any], place: tuple[str, ...]) -> Mapping[str, Any]:
-    inner: Any = content
-    for key in place:
-        inner = inner.get(key) if isinstance(inner, Mapping) else None
-    return inner if isinstance(inner, Mapping) else {}
+def _at(content: Mapping[str, Any], *place: str) -> ContentNode:
+    return ContentNode((), dict(content)).at(*place)
 
 
 def stamps_of(case: Path, beside: Iterable[Path] = ()) -> Stamps:
@@ -174,45 +158,34 @@ def changed(before: Stamps) -> tuple[Path, ...]:
     """Wait for changed files, until they change no more; return these."""
     from watchfiles import watch
 
-    others = _others(before)
-    if others and _stands_still(others):
+    others = _changed_and_still(before)
+    if others:
         return others
+    # a file itself is lost where an editor puts another in its place; of a folder that does not
+    # exist it is the nearest above it that does
+    folders = (
+        next(parent for parent in path.absolute().parents if parent.is_dir()) for path in before
+    )
     announced = watch(
-        *_folders(before),
+        *dict.fromkeys(folders),
         watch_filter=None,
         step=STILL,
         rust_timeout=LOOK,
         yield_on_timeout=True,
         recursive=False,
     )
-    for _ in announced:
-        others = _others(before)
-        if others and _stands_still(others):
-            return others
-    return ()
+    return next(filter(None, (_changed_and_still(before) for _ in announced)), ())
 
 
-def _others(before: Stamps) -> tuple[Path, ...]:
-    return tuple(path for path, stamp in before.items() if _stamp(path) != stamp)
-
-
-def _stands_still(paths: Iterable[Path]) -> bool:
+def _changed_and_still(before: Stamps) -> tuple[Path, ...]:
+    """Return the files that are others than before, once they change no more; else none."""
     from time import sleep
 
-    first = [_stamp(path) for path in paths]
-    sleep(STILL / 1000.0)
-    return first == [_stamp(path) for path in paths]
-
-
-def _folders(before: Stamps) -> tuple[Path, ...]:
-    """Return the folders of files: a file itself is lost where an editor puts another in its place.
-
-    Of one that does not exist it is the nearest above it that does.
-    """
-    folders = (
-        next(parent for parent in path.absolute().parents if parent.is_dir()) for path in before
-    )
-    return tuple(dict.fromkeys(folders))
+    others = {path: _stamp(path) for path, stamp in before.items() if _stamp(path) != stamp}
+    if others:
+        sleep(STILL / 1000.0)
+    still = all(_stamp(path) == stamp for path, stamp in others.items())
+    return tuple(others) if still else ()
 
 
 def _stamp(path: Path) -> Stamp:
