@@ -1,7 +1,7 @@
 """Many starts, each refined to a minimum, and the distinct minima they lead to."""
 
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
 from math import inf, nan
@@ -161,14 +161,9 @@ def multistart(
     begun = [refined(x, legs[:1] if joins else legs[first:]) for x, first, joins in ways]
     whole = finish_all(begun, workers, receive)
     if whole and near:
-        there = {k: start.end for k, start in sorted(near.items()) if start.end is not None}
-        places = [*there]
-        groups = [[places[k] for k in own] for own in distinct([*there.values()], merged or 0.0)]
-        groups += [[k] for k, start in sorted(near.items()) if start.end is None]
-        begins = []
-        for own in groups:
-            end = near[own[0]].end
-            begins.append(points[own[0]] if end is None else end.result.x)
+        groups = _alike(near, merged or 0.0)
+        ways_on = ((points[own[0]], near[own[0]].end) for own in groups)
+        begins = [x if end is None else end.result.x for x, end in ways_on]
         going_on = [refined(x, legs[1:]) for x in begins]
         whole = finish_all(going_on, workers, lambda k, end: take(groups[k], end))
     every = [
@@ -176,6 +171,14 @@ def multistart(
         *(ends.get(k, RefinedStart(nan)) for k in range(len(points))),
     ]
     return summary(every, legs[-1], interrupted=not whole)
+
+
+def _alike(near: Mapping[int, "RefinedStart"], merged: float) -> list[list[int]]:
+    """Starts whose ends lie within so many standard errors, the best first; others alone."""
+    there = {k: start.end for k, start in sorted(near.items()) if start.end is not None}
+    places = [*there]
+    groups = [[places[k] for k in own] for own in distinct([*there.values()], merged)]
+    return groups + [[k] for k, start in sorted(near.items()) if start.end is None]
 
 
 @dataclass(frozen=True)

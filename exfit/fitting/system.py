@@ -7,6 +7,7 @@ from traceback import extract_tb
 
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, RecordFile, Recording
+from exfit.case.schema.tests import Switch
 from exfit.case.ties import Ties
 from exfit.engine.system import System, parameters_used, trace
 from exfit.errors import CaseError, ModelError
@@ -73,17 +74,21 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     changed = {"vref"}
     for test in case.tests:
         changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
-        for switch in test.network:
-            changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
+        changed |= {name for switch in test.network for name in _switched(switch)}
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}
-    if recording is not None and recording.test.breaker:
-        changed |= {BREAKER, *driving_after_opening(case, recording)}
-    elif recording is None and any(test.breaker for test in case.tests):
+    tests = case.tests if recording is None else (recording.test,)
+    if any(test.breaker for test in tests):
         changed.add(BREAKER)
+    if recording is not None:
+        changed |= {*driving_after_opening(case, recording)}
     inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
+
+
+def _switched(switch: Switch) -> list[str]:
+    return [name for name in ("R", "X", "E") if getattr(switch, name) is not None]
 
 
 def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:

@@ -38,7 +38,6 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 FARTHEST_BASE = 4.0  # times the base that fits best at the start: as far as one without bounds goes
-DEFAULT_UNITS = MappingProxyType({"vt": "pu", "ifd": "A", "efd": "V"})  # of a saturation test
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,23 +141,20 @@ def saturation(test: SaturationTest, points: Points, machine: Machine | None) ->
     Raises ExfitError for input that cannot be used.
     """
     given = {signal: column.unit for signal, column in test.columns.items()}
-    units = {
-        signal: given.get(signal) or points.units.get(signal) or default
-        for signal, default in DEFAULT_UNITS.items()
-    }
-    vt = points.columns["vt"]
+    units = {name: unit for name, unit in (*points.units.items(), *given.items()) if unit}
+    vt, vt_unit = points.columns["vt"], units.get("vt", "pu")
     base = test.columns["vt"].base if "vt" in test.columns else None
-    if base is None and needs_base(units["vt"]):
-        text = f"columns.vt.base: is missing: what is 1 pu in {units['vt']}, the unit of the file?"
+    if base is None and needs_base(vt_unit):
+        text = f"columns.vt.base: is missing: what is 1 pu in {vt_unit}, the unit of the file?"
         raise RecordError(f"{points.source}: {text}")
     winding = test.winding
     return saturation_curve(
         vt if base is None else vt / base,
         points.columns["ifd"],
         test.form or (machine.saturation if machine else "quadratic"),
-        unit=units["ifd"],
+        unit=units.get("ifd", "A"),
         efd=points.columns.get("efd"),
-        efd_unit=units["efd"],
+        efd_unit=units.get("efd", "V"),
         winding=FieldWinding(winding.resistance, winding.temperature, winding.hot),
         exciter=test.brushless,
     )
