@@ -202,7 +202,7 @@ def rest_noise(setup: ExperimentSetup, values: Values) -> dict[str, RestNoise]:
             continue
         angle = driving.get(signal) if signal == "angle" else None
         turning = isinstance(angle, SplinedInput) and not angle.integrated
-        # what turns may do so evenly at rest (`fitting.recorded.event`)
+        # what turns may do so evenly at rest (`fitting.event`)
         level = np.ones(len(time))
         courses = np.stack([level, time - time[0]] if turning else [level])
         weights = np.linalg.pinv(courses[:, rest].T)
@@ -241,8 +241,8 @@ def weighted_search(
     reason = why_not_weighted(own, setups)
     if reason is not None:
         return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHTED} {reason}"))
-    bias, cost = np.zeros_like(theta), float(own.costs([theta])[0])
     try:
+        bias, cost = np.zeros_like(theta), float(own.costs([theta])[0])
         for further in range(MOST_PASSES):
             watch(Progress("weighing", further, MOST_PASSES, cost))
             at, before = theta, bias

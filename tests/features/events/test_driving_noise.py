@@ -2,6 +2,7 @@
 
 import re
 from itertools import pairwise
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -10,6 +11,7 @@ import yaml
 from grid_events import TRUTH, event_case, recorded
 
 from exfit.case.load import load_case
+from exfit.estimate import Stop
 from exfit.features.events import input_noise
 from exfit.features.events.input_noise import noise_of_inputs, propagated_noise, with_added
 from exfit.fitting.build import build_experiments
@@ -210,3 +212,19 @@ def test_a_given_value_is_contradicted_where_it_is_wrong_and_not_by_what_drives(
     assert not right.causes
     assert wrong.verdict == MATCHES
     assert wrong.reason.startswith("the record contradicts machine.")
+
+
+def test_ctrl_c_as_the_weighing_begins_keeps_the_search():
+    class Interrupted(SimpleNamespace):
+        robust = None
+
+        def costs(self, points):
+            raise KeyboardInterrupt
+
+    best = SimpleNamespace(x=np.zeros(2), stop=None)
+    problem, found = SimpleNamespace(residuals=Interrupted()), SimpleNamespace(best=best)
+    found._replace = lambda **changes: SimpleNamespace(**{**vars(found), **changes})
+    with mock.patch("exfit.features.events.input_noise.stopped", lambda end, stop: stop):
+        own, kept = input_noise.weighted_search(problem, (), found, mock.Mock())
+    assert own is problem
+    assert kept.best is Stop.INTERRUPTED
