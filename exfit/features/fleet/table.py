@@ -84,7 +84,8 @@ def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup])
             cells = [*of_unit, text_cell(name), *_interval(own), text_cell(own.unit)]
             if (case.name, name) in compared:
                 all_of_them, value = compared[case.name, name]
-                numbers = (all_of_them.centre, all_of_them.spread, *value[-2:])
+                of_all = (all_of_them.centre, all_of_them.spread)
+                numbers = (*of_all, value.deviation, value.probability)
                 cells += [str(len(all_of_them.values)), *map(_cell, numbers), _cell(value.remark)]
             else:
                 cells += [""] * len(SISTER_COLUMNS[1:]) + [missing_interval(case, name)]
@@ -110,6 +111,8 @@ def _cell(value: Any) -> str:
     """Write a text or a number; what is not known is blank."""
     if isinstance(value, str):
         return text_cell(value)
+    if isinstance(value, int):
+        return str(value)  # of a bus, which may have more digits than a measured number
     return "" if value is None or value != value else f"{value:.{DIGITS}g}"
 
 

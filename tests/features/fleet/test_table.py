@@ -134,3 +134,9 @@ def test_tables_and_page_are_written_together(tmp_path):
     }  # fmt: skip
     write_tables(replace(fleet(0, tmp_path), cases=()))
     assert read(Path(tmp_path / "fleet.csv").read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize("bus", [999999999, 1234567890, 10**400])
+def test_a_bus_keeps_all_of_its_digits(bus):
+    (line,) = read(fleet_table([row("unit1", bus=bus)]))
+    assert line["bus"] == str(bus)
