@@ -80,15 +80,16 @@ def records_of_translation(translation: Translation, result: FitResult) -> str:
 
 def responses_table(translation: Translation) -> str:
     """Return the responses of both models in every step, as CSV."""
-    columns = {"t": translation.time}
+    header, columns = ["t"], [translation.time]
     for step in translation.steps:
         for model, signals in (
             (translation.source, step.source),
             (translation.target, step.target),
         ):
             for signal, samples in signals.items():
-                columns[f"{signal} {model} {step.label}"] = samples
-    return table([*columns], [*columns.values()])
+                header.append(f"{signal} {model} {step.label}")  # both models may have one name
+                columns.append(samples)
+    return table(header, columns)
 
 
 def _plant(result: FitResult) -> Section:

@@ -1,13 +1,15 @@
 """A case with another exciter: the same tests and records, and a case that loads."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import yaml
 from places import ROOT
 
 from exfit.case.load import parse_case
-from exfit.features.translate.files import translated_case
+from exfit.features.translate.files import responses_table, translated_case
 from exfit.features.translate.result import TranslatedParameter
 from exfit.models import MODELS
 from exfit.models.sheet import typical
@@ -89,3 +91,14 @@ def test_without_a_case_file_it_is_a_case_to_simulate():
     assert case.record is None
     assert case.values()["machine.Tpd0"] == 6.5
     assert case.test.duration == 10.0
+
+
+def test_responses_of_two_models_of_one_name_stand_beside_each_other():
+    signals = {"vt": np.ones(3), "efd": np.full(3, 2.0)}
+    others = {name: 2.0 * samples for name, samples in signals.items()}
+    step = SimpleNamespace(label="+1 % open circuit", source=signals, target=others)
+    both = SimpleNamespace(source="DC1A", target="DC1A", time=np.arange(3.0), steps=[step])
+    head, first, *_ = responses_table(both).splitlines()
+    names = [f"{name} DC1A {step.label}" for name in ("vt", "efd")]
+    assert head.split(",") == ["t", *names, *names]
+    assert [*map(float, first.split(","))] == [0.0, 1.0, 2.0, 2.0, 4.0]
