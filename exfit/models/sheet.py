@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import cleandoc
+from itertools import chain
 from math import inf, isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -442,6 +443,12 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
     _refuse_incomplete(name, parts)
     equations, rest, rows, states = (parts[part] for part in NEEDED)
     given = {part.lower(): parts[part] for part in OPTIONAL if part in parts}
+    for part in ("aliases", "inputs", "places"):
+        if not isinstance(given.get(part, ""), str):  # listed one by one
+            given[part] = " ".join(given[part])
+    for part in {"records", "pslf_records"} & given.keys():
+        several = (each if isinstance(each, tuple) else (each,) for each in given[part])
+        given[part] = tuple(chain.from_iterable(several))
     found = documented(equations, rest, rows, states, text=str(parts["__doc__"]), **given)
     names = {
         "STATES": (*found.states, *found.setpoints),

@@ -12,6 +12,7 @@ from tiers import few_of
 import exfit
 from exfit import cli
 from exfit.errors import CaseError, ModelError
+from exfit.models import from_file
 from exfit.models.user_code import run_user_code
 
 SOURCE = ROOT / "exfit" / "models" / "exciters" / "first_order.py"
@@ -116,3 +117,17 @@ def test_values_of_a_fit_are_not_those_of_another_model(case):
         with pytest.raises(CaseError, match="not run: the file has changed"):
             use(case, result)
     assert not (case.parent / "run").exists()
+
+
+def test_names_and_records_may_be_listed_one_by_one(tmp_path):
+    """As files have them that were copied from models before these were given in one text."""
+    path = tmp_path / "mine.py"
+    record = 'record("MINE", "TA KA")'
+    path.write_text(
+        f"{SOURCE.read_text()}\nfrom exfit.models.sheet import record\n"
+        f'ALIASES = ("ONE", "OTHER")\nINPUTS = ("speed",)\nRECORDS = ({record},)\n'
+        f"PSLF_RECORDS = {record} + {record}\n"
+    )
+    mine = from_file(path)
+    assert (mine.aliases, mine.inputs) == (("ONE", "OTHER"), ("speed",))
+    assert [each.name for each in (*mine.records, *mine.pslf_records)] == ["MINE"] * 3
