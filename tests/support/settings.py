@@ -27,7 +27,7 @@ SETTINGS["oldest"] = {**SETTINGS["prescott"], **SETTINGS["numpy"], **SETTINGS["x
 LINEAR_ALGEBRA = (
     *("simulation", "dsp", "estimate", "inference", "fitting", "results/intervals", "verdict"),
     *("workflows", "features/events", "features/translate", "features/design"),
-    *("features/programme/steady", "features/compare", "features/rank", "features/external"),
+    *("features/programme", "features/compare", "features/rank", "features/external"),
 )
 NUMERICAL = ("engine", "models", "plants", *LINEAR_ALGEBRA)
 

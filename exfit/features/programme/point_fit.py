@@ -175,7 +175,8 @@ def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:
         theta = search.theta(lowest.problem.values(lowest.profile.x))
     known = dict(intervals.parameters)
     for name, (form, profile) in profiles.items():
-        known[name] = of_profiles(known[name], form.free[profile.index], [profile])
+        parameter = form.free[profile.index]
+        known[name] = of_profiles(known[name], parameter, [profile], "the points do")
     intervals = replace(intervals, parameters=known)
     return FittedPoints(values, result, intervals, identifiability(linear, intervals))
 

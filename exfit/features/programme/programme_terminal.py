@@ -27,15 +27,16 @@ class ProgrammeProgress(RunLines):
         longest = max((len(name) for name in names), default=0)
         width = min(longest, max(room - verdict, FEWEST_OF_NAME))
         forms = (f"{{:<{KIND}}}", f"{{:<{verdict}}}", f"{{:>{SECONDS}}}")
+        self.steps = steps
         super().__init__(console, ("test", "kind", "verdict", "s"), forms, width, len(steps))
 
     def __call__(self, step: ProgrammeStep, progress: Iteration | Progress | None) -> None:
-        """Show how far the test that runs is."""
+        """Show how far the test that runs is: those before it have ended, or failed."""
+        self.done = self.steps.index(step)
         self.show(step.name, "begins" if progress is None else progress_words(progress))
 
     def finished(self, test: FinishedTest) -> None:
         """Show a test that has ended; of the bump tests each, the verdict on their fit once."""
-        self.done += 1
         result, seconds = test.result, KEPT if test.kept else ""
         if isinstance(result, FitResult) and not test.kept:
             seconds = f"{result.seconds:.1f}"

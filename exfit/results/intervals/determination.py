@@ -51,6 +51,7 @@ NEEDS_PROFILE = (
     "`exfit profile` gives one"
 )
 UNFINISHED = "has no interval: its profile was interrupted"
+THE_RECORD_DOES = "the record does"  # not exclude a bound
 
 
 class FoundMinimum(NamedTuple):
@@ -226,12 +227,15 @@ def with_intervals(
 
 
 def of_profiles(
-    own: Uncertainty, parameter: FreeParameter, profiles: Sequence[estimate.CostProfile]
+    own: Uncertainty,
+    parameter: FreeParameter,
+    profiles: Sequence[estimate.CostProfile],
+    data_does: str = THE_RECORD_DOES,
 ) -> Uncertainty:
     """Combine the profiles of a parameter to its uncertainty, by their hull."""
     hull = limits_of(profiles)
     low, high = (None if isinf(limit) else parameter.value(limit) for limit in hull)
-    below, above = reasons(parameter, profiles)
+    below, above = reasons(parameter, profiles, data_does)
     open_sides = [
         f"has no {side} limit: {reason}"
         for side, reason in (("lower", below), ("upper", above))
@@ -328,10 +332,14 @@ def limits_of(profiles: Iterable[estimate.CostProfile]) -> tuple[float, float]:
     return low, high
 
 
-def reasons(parameter: FreeParameter, profiles: Sequence[estimate.CostProfile]) -> tuple[str, str]:
+def reasons(
+    parameter: FreeParameter,
+    profiles: Sequence[estimate.CostProfile],
+    data_does: str = THE_RECORD_DOES,
+) -> tuple[str, str]:
     """Reasons for which profiles leave the lower and upper limit open; "" for one that they set."""
     words = {
-        estimate.ProfileEnd.BOUND: "the record does not exclude its {} {:.4g}",
+        estimate.ProfileEnd.BOUND: f"{data_does} not exclude its {{}} {{:.4g}}",
         estimate.ProfileEnd.FAILED: "there is no response beyond",
         estimate.ProfileEnd.FLAT: "the cost hardly rises",
         estimate.ProfileEnd.INTERRUPTED: "interrupted",
