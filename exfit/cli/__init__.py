@@ -74,7 +74,7 @@ class Commands(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command; None where there is none of that name."""
-        known = _commands().get(cmd_name)
+        known = OF_CORE.get(cmd_name) or of_features().get(cmd_name)
         command: click.Command | None = None if known is None else known.part.load()
         return command
 

@@ -109,8 +109,6 @@ def _meant(path: Path) -> Path | None:
 
 def _kind_of(path: Path) -> Kind | None:
     """Recognise a file; None where that is not certain."""
-    from exfit.case.peek import keys_of
-
     suffix = path.suffix.lower()
     if path.is_dir():
         return Kind.RESULT if (path / RESULT).is_file() else None
@@ -120,7 +118,11 @@ def _kind_of(path: Path) -> Kind | None:
         return Kind.DYNAMICS
     if path.name == RESULT:
         return Kind.RESULT
-    keys = keys_of(path) if suffix in CASES else frozenset()
+    if suffix not in CASES:
+        return None
+    from exfit.case.peek import keys_of
+
+    keys = keys_of(path)
     if {"plant", "test", "tests", "record"} & keys:
         return Kind.CASE
     return Kind.PARAMETERS if "parameters" in keys else None

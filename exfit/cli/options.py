@@ -149,9 +149,11 @@ class Refusal(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message, all faults of a case under each other."""
-        lines = self.message.splitlines()
-        cut = (line[:LONGEST_LINE] + "..." * (len(line) > LONGEST_LINE) for line in lines)
-        echo("Error: " + "\n       ".join(cut), err=True, file=file)
+        lines = (
+            line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
+            for line in self.message.splitlines()
+        )
+        echo("Error: " + "\n       ".join(lines), err=True, file=file)
 
 
 class Interruption(click.ClickException):

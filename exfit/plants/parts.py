@@ -19,8 +19,10 @@ Part = tuple[str, Sheet]  # how the names of its parameters begin, and its data 
 # what an exciter sees of limiters where none acts
 UNLIMITED: Mapping[str, float] = {
     "vsum": 0.0,
-    **{"vuel": -inf, "voel": inf},
-    **{"vuel_out": -inf, "voel_out": inf},
+    "vuel": -inf,
+    "voel": inf,
+    "vuel_out": -inf,
+    "voel_out": inf,
 }
 
 

@@ -30,8 +30,6 @@ from exfit.features.fleet.plan import PlannedCase
 from exfit.features.fleet.remote import BundledTask, RemoteCase, Reply, unpacked
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from distributed import Client
     from distributed import Future as DaskFuture
 
@@ -43,8 +41,18 @@ MISSING = re.compile("No module named '[^']*'")
 LOGGERS = ("distributed", "tornado", "asyncio")
 SETTINGS = {
     "distributed.comm.timeouts.connect": f"{CONNECTED_WITHIN:g}s",
-    "distributed.admin.large-graph-warning-threshold": "1 TB",  # the limits are dispatch's
+    "distributed.admin.large-graph-warning-threshold": "1 TB",  # the limits are those below
 }
+
+MOST_DEATHS = 3  # of the process of a case, after which the case is to blame
+MOST_LOSSES = 10  # of its worker: mostly that is ended from outside, so there are more tries
+AHEAD = 2  # cases for each thread of a worker: one that it fits, one that it need not wait for
+MOST_BYTES = 256_000_000  # of the cases that are under way; one alone may have more
+LOOK = 1.0  # s between two looks at which workers there are
+AT_FIRST = 0.1  # s, before the first case
+FIRST_WORKER = 10.0  # s: so long may the first worker take to appear
+WITHOUT_WORKERS = 300.0  # s: so long may a cluster be without any
+FETCHED_WITHIN = 5.0  # s, an outcome that is there
 
 
 class ClusterError(ExfitError):
@@ -155,13 +163,13 @@ def lost(client: "Client", fault: BaseException | None = None) -> ClusterError:
     return ClusterError(f"{client.scheduler.address}: {text}")
 
 
-def asked(client: "Client", worker: str) -> "Future[Mapping[str, Any]]":
+def asked(client: "Client", worker: str) -> Future[Mapping[str, Any]]:
     """Ask a worker for its versions, and return what will have the answer."""
     call = client._run(remote.versions, workers=[worker], on_error="return")
     return asyncio.run_coroutine_threadsafe(call, client.loop.asyncio_loop)
 
 
-def answered(worker: str, answer: "Future[Mapping[str, Any]]") -> str | None:
+def answered(worker: str, answer: Future[Mapping[str, Any]]) -> str | None:
     """Read the reason to refuse a worker, "" for none; None where it was lost meanwhile.
 
     It has other versions than this computer, so that the results would not be the same, or no
@@ -193,17 +201,6 @@ def stop(client: "Client", workers: list[str], batch: str) -> None:
             call, remote.stop_batch, batch, workers=workers, on_error="ignore",
             callback_timeout=CLOSED_WITHIN,
         )  # fmt: skip
-
-
-MOST_DEATHS = 3  # of the process of a case, after which the case is to blame
-MOST_LOSSES = 10  # of its worker: mostly that is ended from outside, so there are more tries
-AHEAD = 2  # cases for each thread of a worker: one that it fits, one that it need not wait for
-MOST_BYTES = 256_000_000  # of the cases that are under way; one alone may have more
-LOOK = 1.0  # s between two looks at which workers there are
-AT_FIRST = 0.1  # s, before the first case
-FIRST_WORKER = 10.0  # s: so long may the first worker take to appear
-WITHOUT_WORKERS = 300.0  # s: so long may a cluster be without any
-FETCHED_WITHIN = 5.0  # s, an outcome that is there
 
 
 def cluster_workers(address: str, time_limit: float) -> Compute:
@@ -255,7 +252,7 @@ class Dispatch:
     sent: dict[str, Sent] = field(default_factory=dict)
     threads: dict[str, int] = field(default_factory=dict)
     groups: dict[str, str] = field(default_factory=dict)
-    checks: "dict[str, Future[Mapping[str, Any]]]" = field(default_factory=dict)
+    checks: dict[str, Future[Mapping[str, Any]]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     deaths: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)

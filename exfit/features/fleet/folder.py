@@ -42,6 +42,13 @@ CaseStatus = Literal[
 ]  # fmt: skip
 FailureKind = Literal["failed", "timed out", "crashed"]
 
+INDEX = "index"
+SUMMARY, FAILED = "summary.json", "failed.json"
+OUTCOMES = (WHOLE_FIT, WHOLE_PROGRAMME, FAILED)
+FIT_OF_PROGRAMME = "fit"
+VERSION = 1  # of a summary; one of another version is made again
+KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
+KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
 MOST_POINTS = 120  # of a curve in a summary
 CURVE_DIGITS = 6  # significant, of a point of a curve
 
@@ -272,15 +279,6 @@ def _curves(result: "FitResult") -> Iterator[SummaryCurve]:
             rows = kept_rows(drawn, (MOST_POINTS - 2) // (2 * len(drawn)))
             samples = [rounded(line[rows], CURVE_DIGITS) for line in (comparison.time, *drawn)]
             yield SummaryCurve(comparison.name, signal, *samples)
-
-
-INDEX = "index"
-SUMMARY, FAILED = "summary.json", "failed.json"
-OUTCOMES = (WHOLE_FIT, WHOLE_PROGRAMME, FAILED)
-FIT_OF_PROGRAMME = "fit"
-VERSION = 1  # of a summary; one of another version is made again
-KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
-KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
 
 
 @dataclass(frozen=True)
