@@ -17,6 +17,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from exfit.case.ties import is_tie
+from exfit.case.yaml import LONGEST_WHOLE
 from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import magnitude_fault, show
 
@@ -29,7 +30,6 @@ Value = TypeVar("Value")
 
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._%-]*$"  # of any system; a percent sign as in up-5%
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
-LONGEST_WHOLE = 15  # digits: every whole number of so many is a double
 REFUSED = "refused"  # the kind of fault of a value that a function here refuses
 
 
