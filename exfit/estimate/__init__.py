@@ -2,8 +2,8 @@
 
 Arrays in, result out: minimise f(x) = 1/2 sum(fun(x)^2) over low <= x <= high.
 
-One loop (`run`) serves all methods. In each iteration a *search* (`searches`) tries points that the
-linear model fun(x + d) = fun(x) + J d proposes (`linear`). That linear problem is itself solved
+One loop (`solver`) serves all methods. In each iteration a *search* (`searches`) tries points that
+the linear model fun(x + d) = fun(x) + J d proposes (`linear`). That linear problem is itself solved
 within the bounds, by an active set that starts afresh every time: a variable rests on a bound
 exactly as long as the model wants it there. Directions that J does not see at all are left alone;
 those it sees weakly are taken in full, but no variable moves farther than recent steps have proved

@@ -86,11 +86,8 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Cha
 
     Raises RecordError where too little of it is left, or where it cannot be filtered.
     """
-    section, samples, place = (
-        file.channels[signal],
-        record.signals[signal],
-        f"{record.source}: {signal}",
-    )
+    section, samples = file.channels[signal], record.signals[signal]
+    place = f"{record.source}: {signal}"
     kept = np.isfinite(samples)
     if section.outliers is not None:
         from exfit.dsp.filtering import outliers
@@ -110,9 +107,8 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Cha
     weight, noise = section.weight, section.noise
     if noise is not None:  # the finest of all fitted channels weighs 1
         fitted = [each for own in case.recordings for each in own.record.channels.values()]
-        weight = (
-            min((each.noise for each in fitted if each.noise is not None), default=noise) / noise
-        )
+        finest = min((each.noise for each in fitted if each.noise is not None), default=noise)
+        weight = finest / noise
     if not isinstance(section, ChannelSection):
         return Channel(signal, samples, weight, filtering, noise)
     column = column_of(section)

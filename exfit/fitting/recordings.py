@@ -124,10 +124,11 @@ def _refuse_other_test(case: Case, test: BumpTest, record: Record) -> None:
         start = test.begin
     for at in test.instants:
         if not start <= at < end:
-            hint = (
-                "; is the time column in another unit?" if at > OTHER_CLOCK * max(end, 0.0) else ""
-            )
-            hint = f"; {BEFORE_RECORD}" if at < start else hint
+            hint = ""
+            if at < start:
+                hint = f"; {BEFORE_RECORD}"
+            elif at > OTHER_CLOCK * max(end, 0.0):
+                hint = "; is the time column in another unit?"
             raise RecordError(
                 f"{path}: holds {show(start)} ... {show(end)} s, but {case.path} has a step at "
                 f"{show(at)} s{hint}"

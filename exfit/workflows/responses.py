@@ -20,7 +20,6 @@ from exfit.fitting.parameters import scaled_values
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import UNREACHABLE, Residuals
-from exfit.fitting.shown_instants import instants_of, with_shown_instants
 from exfit.fitting.system import values_of
 from exfit.models import find
 from exfit.results.acceptance import judged
@@ -66,6 +65,8 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> TestWithValue
 
     fine, held = setup.with_enough_substeps(values), frozenset[str]()
     if not case.has_no_equations:  # whose every response is a run
+        from exfit.fitting.shown_instants import instants_of, with_shown_instants
+
         fine, held = with_shown_instants(fine, values), instants_of(fine)
     own = fitted_to_record(case, fine, values, held)
     if not setup.automatic_sines:
