@@ -84,7 +84,7 @@ class Table:
     """Rows of cells; of a wide one that is shown in parts each begins with ``leading`` columns.
 
     A page has its ``style``, the name of one in its style sheet; with a ``summary`` it can be
-    folded behind that.
+    folded behind that, together with a ``legend``: what its headings mean.
     """
 
     columns: tuple[TableColumn, ...]
@@ -93,6 +93,7 @@ class Table:
     leading: int = 1
     style: str = ""
     summary: str = ""
+    legend: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,9 +114,13 @@ class Note:
 
 @dataclass(frozen=True)
 class Verbatim:
-    """Lines that are shown letter by letter: a drawing in characters, a section of a case."""
+    """Lines that are shown letter by letter: a drawing in characters, a section of a case.
+
+    A page calls them by their ``title``, which is not shown.
+    """
 
     text: str
+    title: str = "Text"
 
 
 @dataclass(frozen=True)

@@ -66,9 +66,10 @@ def _piece(block: Block, draw: Callable[[Chart], str]) -> str:
         case Table():
             length = "long" if len(block.rows) > LONG else "short"
             head = f'<details open class="{length}">\n<summary>{escape(block.summary)}</summary>'
-            return f"{head}\n{_wide(block.title, _table(block))}\n</details>"
-        case Verbatim(text):
-            return _wide("Text", f"<pre>{escape(text)}</pre>")
+            legend = f"<p>{sentence(block.legend)}</p>\n" if block.legend else ""
+            return f"{head}\n{_wide(block.title, _table(block))}\n{legend}</details>"
+        case Verbatim(text, title):
+            return _wide(title, f"<pre>{escape(text)}</pre>")
         case Diagram(title, svg):
             caption = f"<figcaption><strong>{escape(title)}</strong></figcaption>"
             return f'<figure class="block-diagram">\n{_wide(title, svg)}\n{caption}\n</figure>'
@@ -131,7 +132,7 @@ def _row(table: Table, cells: tuple[Cell, ...]) -> str:
     whole = all(cell.mark == "doubt" for cell in cells)
     shown = []
     for k, (column, cell) in enumerate(zip(table.columns, cells, strict=True)):
-        if k < table.leading:
+        if k < table.leading and cell.text:
             style = _class(*_of_column(column))
             shown.append(f'<th scope="row"{style}>{_lines(cell.text)}</th>')
             continue

@@ -32,6 +32,11 @@ def test_every_text_is_shown_and_none_becomes_a_tag():
             Page(page_of(text))
 
 
+def test_what_the_headings_of_a_folded_table_mean_is_folded_with_it():
+    table = Table(columns("a"), (row("1"),), "t", summary="one line", legend="a: as in `b`")
+    assert html([table]).endswith("</div>\n<p>a: as in <code>b</code></p>\n</details>")
+
+
 def test_warnings_that_follow_each_other_are_one_list():
     page = Page(html([Note("a", "warning"), Note("b", "warning"), Note("c"), Note("d", "remedy")]))
     assert [tag for tag, _ in page.tags] == ["ul", "li", "li", "p", "ul", "li"]

@@ -103,14 +103,15 @@ def form_table(rows: Sequence[FormRow]) -> Iterator[Block]:
         (*heads, TableColumn("section", number=True)),
         tuple(
             (
-                *(Cell(each.cf), Cell(each.asked, "strong")),
+                Cell(each.cf),
+                Cell(each.asked),
                 Cell(each.answer, "" if each.is_stated else "faint"),
                 Cell("", see=each.section),
             )
             for each in rows
         ),
         "What a verification report states (cf.: clauses of NERC MOD-026-1)",
-        leading=0,
+        leading=2,
         style="form",
     )
     yield Note(WHERE_STATED)
@@ -344,7 +345,8 @@ def command_of(result: Reported, folder: Path | None = None) -> str:
 
 def reproduction(result: Reported, folder: Path) -> Iterator[Block]:
     """Yield how the report is made again: by which commands, from which files, by what."""
-    yield Verbatim(f"{command_of(result, folder)}\n{join(('exfit', 'report', str(folder)))}\n")
+    commands = f"{command_of(result, folder)}\n{join(('exfit', 'report', str(folder)))}\n"
+    yield Verbatim(commands, "Commands")
     versions = {**result.versions}
     if versions.get("exfit") != __version__:
         versions["exfit that made this report"] = __version__
@@ -370,7 +372,7 @@ def reproduction(result: Reported, folder: Path) -> Iterator[Block]:
             "Values that the fit had in place of those of the case file",
         )
     if result.case_text:
-        yield Verbatim(result.case_text)
+        yield Verbatim(result.case_text, "The case file")
     else:
         yield Note("The result does not hold the text of a case.", mark="faint")
 

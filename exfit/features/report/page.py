@@ -209,8 +209,13 @@ def page_html(page: Page, interactive: bool = True) -> str:
 
     Its figures, tables and sections are numbered in the order in which they stand.
     """
-    blocks = [block for section in page.sections for block in section.blocks]
-    live = [block for block in blocks if isinstance(block, Chart) and block.live is not None]
+    live: list[Chart] = []
+    hinted, before = [], False  # the first of adjoining sections with live charts says what they do
+    for section in page.sections:
+        charts = [each for each in section.blocks if isinstance(each, Chart) and each.live]
+        if charts and not before:
+            hinted.append(section.key)
+        live, before = [*live, *charts], bool(charts)
     shared = environment()
     chart: Any = shared.get_template("chart.jinja").module
     text: str = shared.get_template("report.html.jinja").render(
@@ -218,6 +223,7 @@ def page_html(page: Page, interactive: bool = True) -> str:
         headline=page.headline,
         sections=[(each, blocks_html(each.blocks, chart.chart)) for each in page.sections],
         data=list(live_data(live)),
+        hinted=hinted,
         css=CHART_STYLE.read_text(encoding="utf-8") + _text("report.css"),
         script=_text("report.js") if interactive else "",
     )

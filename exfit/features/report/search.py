@@ -69,7 +69,6 @@ def search(result: FitResult) -> Iterator[Block]:
     history = result.history
     if history:
         yield _history(result)
-        yield Note(OF_HISTORY)
     else:
         yield Note("The result holds no history.", mark="faint")
     if result.minima is not None and result.minima.minima:
@@ -132,6 +131,7 @@ def _history(result: FitResult) -> Table:
         "Iterations; line 0 is the start",
         style="history",
         summary=f"History of {len(result.history) - 1} iterations",
+        legend=OF_HISTORY,
     )
 
 

@@ -247,6 +247,8 @@ def test_a_page_is_whole_self_contained_and_small(pages, name):
         if tag == "svg" and attrs.get("role") == "img":
             assert set(attrs["aria-labelledby"].split()) <= set(page.ids)
         assert not attrs.get("href") or attrs["href"][1:] in page.ids
+    regions = [attrs["aria-label"] for _, attrs in page.tags if attrs.get("role") == "region"]
+    assert len(regions) == len(set(regions))  # one who hears the page goes to them by name
     assert page.size < MOST
     heads = "Unit and test, Model, Parameters, Search, Usability, Small-signal view, Reproduction"
     for head in heads.split(", "):
@@ -264,6 +266,14 @@ def test_every_figure_and_table_has_its_number_and_every_section_is_among_the_co
     labels = [attrs["aria-labelledby"] for tag, attrs in page.tags if tag == "section"]
     contents = linked[linked.index(f"#{labels[0]}") :][: len(labels)]
     assert contents == [f"#{label}" for label in labels]
+
+
+@pytest.mark.parametrize("name", few_of(EVERY, 3))
+def test_how_the_figures_of_records_are_read_is_said_once_where_they_begin(pages, name):
+    tags = pages(name).tags
+    (hint,) = [k for k, (_, attrs) in enumerate(tags) if attrs.get("class") == "hint"]
+    sections = [attrs["aria-labelledby"] for tag, attrs in tags[:hint] if tag == "section"]
+    assert sections[-1] == "fit"
 
 
 def test_what_identifies_unit_and_test_is_reported(pages):
