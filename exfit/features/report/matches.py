@@ -385,7 +385,7 @@ def against(result: FitResult, other: FitResult) -> Iterator[Block]:
         this, older = f"{this} (this report)", f"{older} (the other)"
     matches = [{m.name: m for m in (*fit.comparisons, *fit.validation)} for fit in pair]
     facts = [
-        row("case", *(str(fit.case) for fit in pair)),
+        row("case", *(fit.case.name for fit in pair)),
         row("model", *(fit.model for fit in pair)),
         row("verdict", *map(outcome_of, pair)),
         row("criteria", *(judged_by_criteria(fit).sentence for fit in pair)),

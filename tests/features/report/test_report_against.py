@@ -45,6 +45,7 @@ def test_both_fits_are_named_with_their_facts_and_parameters(fits):
         row[0]: row[1:]
         for row in page.tables["Facts of Höllental, revision 2 and Höllental, revision 1"][1:]
     }
+    assert facts["case"] == ["case.yaml", "case.yaml"]
     assert facts["model"] == ["AC1A", "AC1A"]
     assert facts["rmse of fit (pu)"][0].startswith(f"{newer.rmse:.3g} ")
     rows = {row[0]: row[1:] for row in page.tables["Fitted parameters of either fit"][1:]}
