@@ -102,6 +102,7 @@ class Output:
 
             console = terminal.console()
             terminal.show(console, blocks)
+            console.print()
             terminal.written(console, folder)
         self.draw(figures)
 

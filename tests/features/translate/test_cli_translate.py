@@ -36,7 +36,7 @@ def test_it_leaves_a_case_and_records_of_the_other_model(run, fitted):
     assert out.lstrip().startswith("exact: EXAC1 responds as AC1A in all steps")
     assert max(map(len, out.splitlines()[:-1])) <= WIDTH
     folder = Path("runs/ac1a_good-EXAC1")
-    assert f"\nwritten to {folder}\n  translation.png  the responses of both" in out
+    assert f"\n\nwritten to {folder}\n  translation.png  the responses of both" in out
     assert {path.name for path in folder.iterdir()} == {*FILES, "translation.png"}
     figures = json.loads((folder / "translation.json").read_text())
     case = load_case(folder / "ac1a_good-EXAC1.yaml")
