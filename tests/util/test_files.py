@@ -1,4 +1,4 @@
-"""Files are there whole or not at all, whatever comes between."""
+"""Files are there whole or not at all, whatever comes between; what is too large is not read."""
 
 import os
 import signal
@@ -10,7 +10,18 @@ import pytest
 
 from exfit.errors import ExfitError
 from exfit.util import files
-from exfit.util.files import ABANDONED, remove_abandoned, write, write_together, write_whole
+from exfit.util.files import (
+    ABANDONED,
+    ROOT,
+    below,
+    on_disk,
+    read_json,
+    read_limited,
+    remove_abandoned,
+    write,
+    write_together,
+    write_whole,
+)
 
 OLD = {"a.csv": "old a", "b.csv": "old b", "result.json": "old result"}
 NEW = {"a.csv": "new a", "c.csv": "new c", "result.json": "new result"}
@@ -226,3 +237,67 @@ def test_files_of_others_stay_however_old_they_are(tmp_path, name):
     os.utime(tmp_path / name, (0.0, 0.0))
     remove_abandoned(tmp_path)
     assert contents(tmp_path) == {name: "mine"}
+
+
+def test_a_file_is_read_up_to_its_limit(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"x" * 100)
+    assert read_limited(path, 100) == b"x" * 100
+    with pytest.raises(ExfitError, match=r"larger than 9\.9e-05 MB, the limit of such a file"):
+        read_limited(path, 99)
+
+
+def test_a_file_that_is_too_large_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(files, "LARGEST_FILE", 1_000_000)
+    path = tmp_path / "large.json"
+    path.write_bytes(b" " * 1_000_001)
+    with pytest.raises(ExfitError, match="larger than 1 MB"):
+        read_json(path)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such file here")
+def test_a_file_without_an_end_is_refused():
+    with pytest.raises(ExfitError, match="a pipe or a device"):
+        read_json(Path("/dev/zero"))
+
+
+@pytest.mark.parametrize("name", ["missing", "a\0b", ""])
+def test_a_file_that_cannot_be_read_is_named(tmp_path, name):
+    with pytest.raises(ExfitError, match="cannot be read: "):
+        read_json(tmp_path / name)
+
+
+@pytest.mark.parametrize("text", ["[]", "1", '"text"', "null"])
+def test_the_top_is_a_mapping(tmp_path, text):
+    path = tmp_path / "file.json"
+    path.write_text(text)
+    with pytest.raises(ExfitError, match="not a mapping"):
+        read_json(path)
+
+
+def test_texts_of_any_language_are_read_with_a_mark_at_the_beginning_or_without(tmp_path):
+    path = tmp_path / "file.json"
+    for text in ('{"unit": "Höllental 😀"}', '\ufeff{"unit": "H\\u00f6llental \\ud83d\\ude00"}'):
+        path.write_text(text, encoding="utf-8")
+        assert read_json(path) == {"unit": "Höllental 😀"}
+
+
+def test_without_a_root_a_file_lies_where_its_path_says(monkeypatch):
+    monkeypatch.delenv(ROOT, raising=False)
+    assert on_disk(Path("../a/../b.csv")) == Path("../a/../b.csv")
+
+
+def test_with_a_root_every_file_lies_below_it(tmp_path, monkeypatch):
+    (tmp_path / "home").mkdir()
+    monkeypatch.chdir(tmp_path / "home")
+    monkeypatch.setenv(ROOT, str(tmp_path))
+    assert on_disk(Path("b.csv")) == tmp_path / "home" / "b.csv"
+    assert on_disk(Path("/data/b.csv")) == tmp_path / "data" / "b.csv"
+
+
+def test_dots_above_the_root_stay_at_the_root(tmp_path, monkeypatch):
+    (tmp_path / "home").mkdir()
+    monkeypatch.chdir(tmp_path / "home")
+    assert below(tmp_path, Path("../../../a.csv")) == tmp_path / "a.csv"
+    assert below(tmp_path, Path("a/../b.csv")) == tmp_path / "home" / "b.csv"
+    assert below(tmp_path, Path("/data/../a.csv")) == tmp_path / "a.csv"
