@@ -23,19 +23,17 @@ The core asks for plugs here and names no feature.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import iter_modules
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 PLACE = "exfit.features"
 
 
-@dataclass(frozen=True)
-class LazyPart:
+class LazyPart(NamedTuple):
     """Something of a feature, imported when it is loaded: ``path`` is "package.module:name"."""
 
     path: str
@@ -46,8 +44,7 @@ class LazyPart:
         return getattr(import_module(module), name)
 
 
-@dataclass(frozen=True)
-class LazyCommand:
+class LazyCommand(NamedTuple):
     """A command of the shell, known without being imported: its group and its short help."""
 
     group: str

@@ -98,7 +98,7 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
         from_file=False,
         model=name,
         saturation="quadratic",
-        parts=replace(case.parts, exciter=multiplied, all=(exciter, *others)),
+        parts=case.parts._replace(exciter=multiplied, all=(exciter, *others)),
         ties=Ties({tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}),
         parameters=Parameters(free={row.symbol: _free_section(row) for row in free_of(model)}),
         given_values={key: given for key, given in case.given_values.items() if key not in own},

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from exfit.case.schema.values import FreeSection
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
@@ -83,8 +83,7 @@ class Part:
         return values
 
 
-@dataclass(frozen=True)
-class Parts:
+class Parts(NamedTuple):
     """The models that a case names, and all its parts."""
 
     exciter: Model | None
@@ -177,7 +176,7 @@ def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:
     network = (network_part(given, kind),) if kind.on_load else ()
     if kind.has_exciter:
         others = tuple(part for part in parts.all if part.kind != "network")
-        return replace(parts, all=(*others, *network))
+        return parts._replace(all=(*others, *network))
     machine = tuple(part for part in parts.all if part.kind == "machine")
     return Parts(None, parts.machine, None, None, (*machine, *network))
 

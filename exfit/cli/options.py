@@ -2,10 +2,9 @@
 
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -51,8 +50,7 @@ file_option = click.option(
 force_option = click.option("--force", is_flag=True, help="Write over a file that exists.")
 
 
-@dataclass(frozen=True)
-class Output:
+class Output(NamedTuple):
     """Where a command leaves its files, and what it prints: tables, JSON or nothing."""
 
     given: Path | None
@@ -185,8 +183,7 @@ def refuse_own_files(
     run_folder.refuse_inputs(written, files, folder, names)
 
 
-@dataclass(frozen=True)
-class Given:
+class Given(NamedTuple):
     """Values given beside a case: a file of parameters, and those of --set over it."""
 
     parameters: Path | None

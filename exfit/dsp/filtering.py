@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -21,8 +22,7 @@ NODES = 8  # of a window, by Gauss and Legendre: exact for polynomials of order 
 OUTLIER_WINDOW = 7  # samples, of which the middle one is compared with the rest; 3 may be spikes
 
 
-@dataclass(frozen=True)
-class LowPass:
+class LowPass(NamedTuple):
     """A Butterworth filter of second order, run forwards and backwards: no delay, and half the
     amplitude at ``cutoff`` (Hz)."""
 
@@ -237,8 +237,7 @@ def outliers(time: Array, samples: Array, limit: float, scatter: float | None = 
     return np.asarray(away > limit * scale[window])
 
 
-@dataclass(frozen=True, eq=False)
-class Averages:
+class Averages(NamedTuple):
     """Where a simulation is read about each sample, and what of that each signal shows.
 
     ``offsets`` (n,) are s from the sample, ``weights`` (signals, n).

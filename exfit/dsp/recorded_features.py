@@ -61,8 +61,7 @@ class _Smoothing(NamedTuple):
     left: Array
 
 
-@dataclass(frozen=True, eq=False)
-class FoundByRecord:
+class FoundByRecord(NamedTuple):
     """How the response beside a record depends on the N values that were found by this record.
 
     ``curve`` (M, N) are the derivatives of the response, ``samples`` (M, N) those of the errors

@@ -1,8 +1,8 @@
 """Losses of a weighted error: how much a sample counts that lies far from the rest."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,7 @@ Scale = float | Array  # one for all errors, or each its own
 OfError = Callable[[Array, Scale], Array]
 
 
-@dataclass(frozen=True)
-class Loss:
+class Loss(NamedTuple):
     """Functions of the errors e (M,) and of the scale C > 0, a number or (M,), in the unit of e,
     beyond which they count less.
 

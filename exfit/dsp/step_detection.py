@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -59,8 +60,7 @@ class ReturnsError(ValueError):
     """A response that leaves its rest and returns to it."""
 
 
-@dataclass(frozen=True)
-class Onset:
+class Onset(NamedTuple):
     """The interval (s) that holds the instant at which a response sets out, at 95 %."""
 
     earliest: float
@@ -201,8 +201,7 @@ def departure(time: Array, samples: Array) -> Onset:
     return _onset(time, samples, rest, len(samples) - 1)
 
 
-@dataclass(frozen=True, eq=False)
-class _LeftRest:
+class _LeftRest(NamedTuple):
     """A response that leaves its rest: smoothed (M,), its noise, ``level`` and how far it goes.
 
     It is last near the level at the sample ``left``, and first beyond ``far`` at ``gone``.

@@ -43,8 +43,7 @@ class System:
     motion: Callable[[Signals, Signals, Signals, Signals], Motion]
 
 
-@dataclass(frozen=True)
-class Trace:
+class Trace(NamedTuple):
     """The graph of a system: its symbols, and what is computed from them."""
 
     p: tuple[Node, ...]
@@ -60,7 +59,7 @@ class Trace:
     def text(self) -> str:
         """The graph in full, and which of its nodes these are; before it is differentiated."""
         lines = [str(node) for node in self.x[0].graph.nodes]
-        groups = [[node.index for node in group] for group in vars(self).values()]
+        groups = [[node.index for node in group] for group in self]
         return "\n".join([*lines, *map(str, groups)])
 
 

@@ -7,7 +7,6 @@ two derivatives is the product of a sum where their tangents are the same.
 
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 from typing import NamedTuple
 
@@ -21,8 +20,7 @@ from exfit.engine.trace import TRUTHS, Node, in_order
 PARTIAL = ("/", "sqrt", "log", "exp")  # what makes infinity or no number of a number
 
 
-@dataclass(frozen=True)
-class Tangents:
+class Tangents(NamedTuple):
     """The derivatives of a trace in several directions at once."""
 
     p: tuple[Node | None, ...]  # the tangent of each parameter; None where it is not free

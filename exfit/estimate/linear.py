@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,8 +60,7 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float =
 WEAKEST = 0.03  # of the norm of the largest column, in units: a smaller one counts as this
 
 
-@dataclass(frozen=True)
-class DampedStep:
+class DampedStep(NamedTuple):
     """Where the full step leads, its slope g^T d, and the decrease the model promises for it."""
 
     origin: Array

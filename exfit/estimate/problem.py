@@ -1,7 +1,6 @@
 """What a search makes small: asked for, counted, differentiated, and never trusted to be finite."""
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from math import inf, isfinite, nan, sqrt
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar
@@ -22,8 +21,7 @@ def norm(x: Array) -> float:
     return sqrt(float(x @ x))
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(NamedTuple):
     """The bounds, and the distance that counts as one unit of each variable; all (N,)."""
 
     low: Array
@@ -116,8 +114,7 @@ Answer = Sequence[Array] | Array
 Steps = Generator[Request, Any, Done]  # it is sent the Answer to each Request
 
 
-@dataclass(frozen=True, eq=False)
-class OneByOne:
+class OneByOne(NamedTuple):
     """The user's functions of one point, which are never trusted to be finite.
 
     Where arithmetic fails the residuals are one nan, and so is the Jacobian.
@@ -162,8 +159,7 @@ class EvaluationLimit(Exception):
     """More residuals were asked for than a search may have."""
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """A point, its residuals (M,) and their cost."""
 
     x: Array
@@ -319,8 +315,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True)
-class SolverIteration:
+class SolverIteration(NamedTuple):
     """One line of the log, announced when the iteration is over.
 
     number         0 is the start; counts on through the phases, and once where one restarts
@@ -351,8 +346,7 @@ class SolverIteration:
     capped: bool | None = None
 
 
-@dataclass(frozen=True)
-class Result:
+class Result(NamedTuple):
     """The best point seen and how it was reached; fun (M,), jac (M, N), grad (N,) belong to x.
 
     status: 1 gradient, 2 floor, 3 step, 4 kink, 5 creeping (converged); 6 match, 7 flat (ended at
@@ -382,8 +376,7 @@ class Result:
     active_mask: NDArray[np.int_]
 
 
-@dataclass(frozen=True)
-class Progress:
+class Progress(NamedTuple):
     """How far many searches are, side by side or in turn; ``best`` is the lowest cost so far."""
 
     stage: Literal["screening", "refining", "profiling", "weighing", "causes"]

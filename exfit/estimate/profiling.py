@@ -8,10 +8,11 @@ Source: Bates & Watts 1988, sections 6.1 (profile t, profile traces) and A3.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
 from math import inf, isfinite, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -234,7 +235,7 @@ class Side:
         """
         valley, fine, place = self.valley, FINE * self.rise, float(guess[self.index])
         low, high = self.at(place, valley.box.low), self.at(place, valley.box.high)
-        held = replace(valley.box, low=low, high=high)
+        held = valley.box._replace(low=low, high=high)
         problem = Problem(valley.functions, None, held, valley.scaled)
         point = yield from problem.evaluate(guess)
         if point.cost == inf:
@@ -380,8 +381,7 @@ LOWER = 1e-3  # of the rise: what is farther below the minimum refutes it
 MOST_MINIMA = 5
 
 
-@dataclass(frozen=True)
-class LowerMinimum:
+class LowerMinimum(NamedTuple):
     """A minimum whose profiles are known: its cost, and the intervals of parameters there."""
 
     cost: float

@@ -5,9 +5,9 @@ by a trust region, or as textbooks have it, by the gain ratio or Armijo's rule.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf, isfinite, isnan, nan, sqrt
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -22,8 +22,7 @@ SAME = 1e-9  # units: a step that differs by less is the same
 Cut = Callable[[float, float], float]
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """What one iteration came to: a better point, or a reason to stop, or both.
 
     ``capped``: the step that was tried first was not the full Gauss-Newton step.
@@ -110,8 +109,7 @@ LEAST_REACH = 0.3
 LENGTH_PROVED = 0.25  # gain ratio from which the model was right about the length
 
 
-@dataclass(frozen=True)
-class FullStep:
+class FullStep(NamedTuple):
     """Gauss-Newton: the full step or nothing; ``retries``: a first one that fails is shortened."""
 
     retries: bool = False
@@ -121,7 +119,7 @@ class FullStep:
         """Take the full step, the first one shortened once where that is necessary."""
         if linear.singular[0] > WORST_CONDITION * linear.singular[linear.rank - 1]:
             return Move(None, 1.0, 0, stop=Stop.ILL_CONDITIONED), self
-        full, length, once = linear.full, 1.0, replace(self, retries=False)
+        full, length, once = linear.full, 1.0, self._replace(retries=False)
         for rejections in range(2 if self.retries else 1):
             trial = yield from problem.evaluate(full.at(length))
             decrease = linear.point.cost - trial.cost
@@ -132,8 +130,7 @@ class FullStep:
         return Move(None, 1.0, rejections + 1, stop=Stop.FULL_STEP), once
 
 
-@dataclass(frozen=True)
-class LineSearch:
+class LineSearch(NamedTuple):
     """Damped Gauss-Newton: a step, shortened until Armijo's rule holds.
 
     Capped, the step is the best of the linear model that moves no variable farther than the reach
@@ -159,7 +156,7 @@ class LineSearch:
         farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))
         useful = move.damping == 1.0 and move.quality > LENGTH_PROVED
         least = self.reach if useful else LEAST_REACH
-        return move, replace(self, reach=max(least, 2.0 * farthest))
+        return move, self._replace(reach=max(least, 2.0 * farthest))
 
 
 BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge
@@ -173,8 +170,7 @@ PROBE = 0.1  # of a step: where its curvature is looked at
 STRAIGHT = 0.75  # of a step: what its curvature may add, at most
 
 
-@dataclass(frozen=True)
-class TrustRegion:
+class TrustRegion(NamedTuple):
     """Levenberg-Marquardt: nu keeps the scaled step within a radius (Moré 1978).
 
     A cost with kinks (limits that are met a step earlier or later) makes a small radius smaller
@@ -199,7 +195,7 @@ class TrustRegion:
 
     def handing_over(self) -> Self:
         """Return the search that ends where full Gauss-Newton steps prove good."""
-        return replace(self, hand_over=True)
+        return self._replace(hand_over=True)
 
     def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Shrink the radius until a trial lowers the cost, and enlarge it after a good one."""
@@ -209,11 +205,11 @@ class TrustRegion:
             problem, linear, solve(linear, reach=1.0), 1.0, BOLD_TRIALS, self.armijo
         )
         if move.point is None:
-            wary = replace(self, timid=0, patience=2 * self.patience)
+            wary = self._replace(timid=0, patience=2 * self.patience)
             second, search = yield from wary.within(problem, linear, move.inner)
-            return replace(second, capped=move.capped), search
+            return second._replace(capped=move.capped), search
         radius = max(self.radius, linear.scaled_length(move.point.x))
-        return replace(move, damping=0.0), replace(self, timid=0, patience=PATIENCE, radius=radius)
+        return move._replace(damping=0.0), self._replace(timid=0, patience=PATIENCE, radius=radius)
 
     def within(
         self, problem: Problem, linear: LinearModel, spent: int = 0
@@ -223,7 +219,7 @@ class TrustRegion:
         if self.radius == inf:
             unit = 1.0 if problem.scaled else norm(linear.scale * linear.box.unit)
             longest = max(linear.scaled_length(linear.full.target), TINY)
-            search = replace(self, radius=min(self.first * unit, longest))
+            search = self._replace(radius=min(self.first * unit, longest))
         capped = False
         for rejections in range(spent, spent + MOST_TRIALS):
             nu = damping(linear, search.radius)
@@ -250,8 +246,8 @@ class TrustRegion:
         """Return the search after an accepted trial: how many were timid, or damped, in a row."""
         bold = decrease >= TIMID * linear.highest_promise
         timid = not bold and decrease < TIMID * linear.full.promise
-        return replace(
-            self, timid=self.timid + 1 if timid else 0, damped=self.damped + 1 if nu > 0.0 else 0
+        return self._replace(
+            timid=self.timid + 1 if timid else 0, damped=self.damped + 1 if nu > 0.0 else 0
         )
 
     def resized(self, linear: LinearModel, step: DampedStep, nu: float, decrease: float) -> Self:
@@ -259,11 +255,11 @@ class TrustRegion:
         quality = gain_ratio(decrease, step.promise)
         length = linear.scaled_length(step.target)
         if quality >= GOOD or (quality > BAD and nu == 0.0):
-            return replace(self, radius=max(self.radius, 2.0 * length))
+            return self._replace(radius=max(self.radius, 2.0 * length))
         if quality > BAD:
             return self
         share = to_parabola(-decrease, step.slope) if decrease < 0.0 else 0.5
-        return replace(self, radius=share * min(self.radius, 10.0 * length))
+        return self._replace(radius=share * min(self.radius, 10.0 * length))
 
 
 def bent(problem: Problem, linear: LinearModel, step: DampedStep, nu: float) -> Steps[Array]:
@@ -316,8 +312,7 @@ def damping(linear: LinearModel, radius: float) -> float:
 LOW, HIGH = 0.25, 0.75  # gain ratios: nu is raised below the first, lowered above the second
 
 
-@dataclass(frozen=True)
-class RatioDamping:
+class RatioDamping(NamedTuple):
     """Levenberg-Marquardt: (nu I + J^T J) d = -g, nu raised and lowered by the gain ratio.
 
     A trial that lowers f, or leaves it as it is, is accepted; one that does not multiplies nu by
@@ -355,10 +350,10 @@ class RatioDamping:
             ratio = gain_ratio(cost - trial.cost, promise)
             if ratio >= 0.0:
                 move = Move(trial, nu, rejections, ratio, capped=first_nu > 0.0)
-                return move, replace(self, nu=self.after(nu, ratio))
+                return move, self._replace(nu=self.after(nu, ratio))
             nu = self.raised(nu)
         move = Move(None, nu, rejections, stop=Stop.STALLED, capped=first_nu > 0.0)
-        return move, replace(self, nu=nu)
+        return move, self._replace(nu=nu)
 
     def raised(self, nu: float) -> float:
         """Return nu after a bad trial."""
@@ -386,8 +381,7 @@ def damped_step(linear: LinearModel, nu: float) -> DampedStep:
     return step_to(linear, scale * bounded_minimum(rows, b, low, high, linear.unseen))
 
 
-@dataclass(frozen=True)
-class ArmijoDamping:
+class ArmijoDamping(NamedTuple):
     """Levenberg-Marquardt: (nu I + J^T J) d = -g, of which lambda = 1, 1/2, 1/4 ... is tried.
 
     ``nu`` is the same everywhere; None: the norm of the gradient at each point. As in
@@ -407,7 +401,7 @@ class ArmijoDamping:
         nu = linear.gradient_norm if self.nu is None else self.nu
         step = damped_step(linear, nu)
         move = yield from shorten(problem, linear, step, armijo=self.armijo, cut=to_half)
-        return replace(move, damping=nu, capped=nu > 0.0), self
+        return move._replace(damping=nu, capped=nu > 0.0), self
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import count, islice
 from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -72,8 +72,7 @@ INDISTINGUISHABLE = 0.5  # standard errors: a difference that no record shows
 Watch = Callable[[Progress], object]
 
 
-@dataclass(frozen=True)
-class LocalMinimum:
+class LocalMinimum(NamedTuple):
     """A minimum: its point x (N,), its cost, how many starts led there, the best of their ends."""
 
     x: Array
@@ -82,8 +81,7 @@ class LocalMinimum:
     result: Result
 
 
-@dataclass(frozen=True)
-class MultistartResult:
+class MultistartResult(NamedTuple):
     """What a search from many starts found: the distinct ``minima``, the lowest first.
 
     best         of the lowest minimum; after an interruption of the lowest point seen: that may be
@@ -181,8 +179,7 @@ def _alike(near: Mapping[int, "RefinedStart"], merged: float) -> list[list[int]]
     return groups + [[k] for k, start in sorted(near.items()) if start.end is None]
 
 
-@dataclass(frozen=True)
-class RefinedStart:
+class RefinedStart(NamedTuple):
     """What a start led to: its cost at first, and the end of the last leg if it came there.
 
     That is ``end``, or ``cut_short`` where an interruption ended it.
@@ -212,7 +209,7 @@ def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
         first_cost, x = min(first_cost, first), end.x
         calls = (calls[0] + end.nfev, calls[1] + end.njev)
         if last:
-            result = replace(end, nfev=calls[0], njev=calls[1])
+            result = end._replace(nfev=calls[0], njev=calls[1])
         elif end.stop is Stop.INTERRUPTED:
             raise KeyboardInterrupt
     if result is not None and result.stop is Stop.INTERRUPTED:
@@ -229,7 +226,7 @@ def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> 
     for group in distinct(ends, nothing=nothing):
         best = ends[group[0]].result
         (residuals,), (J,) = leg.functions.residuals([best.x]), leg.functions.jacobians([best.x])
-        whole = replace(best, fun=residuals, jac=J)
+        whole = best._replace(fun=residuals, jac=J)
         minima.append(LocalMinimum(best.x, best.cost, len(group), whole))
     cut_short = [start.cut_short for start in starts if start.cut_short is not None]
     candidates = [*(local.result for local in minima[:1]), *cut_short]
@@ -266,8 +263,7 @@ def spread(
     return points if x0 is None else np.vstack([first, points])[:count]
 
 
-@dataclass(frozen=True)
-class StartOutcome:
+class StartOutcome(NamedTuple):
     """Where a refinement ended, without residuals and J: thousands would not fit into the memory.
 
     ``triangle`` (N, N) has the lengths of J; ``variance`` is half that of the residuals.
@@ -282,7 +278,7 @@ def outcome_of(result: Result) -> StartOutcome:
     """Locate the end of a refinement, with its linear model."""
     freedom = max(1, len(result.fun) - len(result.x))
     triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
-    small = replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x))))
+    small = result._replace(fun=np.zeros(0), jac=np.zeros((0, len(result.x))))
     return StartOutcome(small, triangle, result.cost / freedom)
 
 

@@ -17,13 +17,12 @@ Announce = Callable[[SolverIteration], None]
 
 def stopped(end: Result, stop: Stop) -> Result:
     """Return an end for another reason, which is no convergence."""
-    return replace(end, stop=stop, status=STATUS[stop], message=stop.value, success=False)
+    return end._replace(stop=stop, status=STATUS[stop], message=stop.value, success=False)
 
 
 def following(last: SolverIteration, line: SolverIteration) -> SolverIteration:
     """Return a line of a descent as it stands behind those of an earlier one."""
-    return replace(
-        line,
+    return line._replace(
         number=last.number + 1 + line.number,
         nfev=last.nfev + line.nfev,
         njev=last.njev + line.njev,

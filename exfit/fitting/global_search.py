@@ -6,7 +6,6 @@ noise and the validations.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from math import nan
 from typing import Literal, NamedTuple, Protocol
 
@@ -125,7 +124,7 @@ class _Descents(NamedTuple):
         for history in (*(end.history for end in others), best.history):
             lines += [following(lines[-1], line) if lines else line for line in history]
         nfev, njev = sum(end.nfev for end in others), sum(end.njev for end in others)
-        return tuple(lines), replace(best, nfev=best.nfev + nfev, njev=best.njev + njev)
+        return tuple(lines), best._replace(nfev=best.nfev + nfev, njev=best.njev + njev)
 
 
 def local_search(
@@ -188,7 +187,7 @@ def continued(
 
     ``phase`` says in its history how that point was found.
     """
-    path, last = _refined(searches, found.history, replace(found.best, x=point), announce, phase)
+    path, last = _refined(searches, found.history, found.best._replace(x=point), announce, phase)
     if found.minima is None:
         return found._replace(best=last, history=path)
     alike, others = list[LocalMinimum](), list[LocalMinimum]()
@@ -196,7 +195,7 @@ def continued(
         same_minimum = is_same(last, local.result) or is_same(local.result, last)
         (alike if same_minimum else others).append(local)
     lowest = LocalMinimum(last.x, last.cost, sum(local.starts for local in alike), last)
-    minima = replace(found.minima, minima=(lowest, *others), best=last)
+    minima = found.minima._replace(minima=(lowest, *others), best=last)
     return found._replace(best=last, history=path, minima=minima, place=0)
 
 
@@ -287,16 +286,16 @@ def _interrupted(
 ) -> SearchResult:
     """Return the best point of a search that an interruption ended."""
     best = min([*descents.ends, *filter(None, [minima.best])], key=_cost)
-    minima, own = replace(minima, interrupted=True), _own_end(descents, best)
+    minima, own = minima._replace(interrupted=True), _own_end(descents, best)
     if own is not None:
         path, last = descents.joined(own)
         ends = enumerate(minima.minima)
         place = next((k for k, end in ends if is_same(end.result, own)), None)
         return SearchResult(last, minima, path, own, place, ways)
     path, _ = descents.joined(descents.best)
-    line = _after_search(path[-1], replace(best.history[-1], nfev=0, njev=0), FROM_FURTHER_STARTS)
+    line = _after_search(path[-1], best.history[-1]._replace(nfev=0, njev=0), FROM_FURTHER_STARTS)
     announce(line)
-    best = replace(stopped(best, Stop.INTERRUPTED), nfev=path[-1].nfev, njev=path[-1].njev)
+    best = stopped(best, Stop.INTERRUPTED)._replace(nfev=path[-1].nfev, njev=path[-1].njev)
     return SearchResult(best, minima, (*path, line), descents.best, ways=ways)
 
 
@@ -361,10 +360,10 @@ def _refined(
         announce(path[-1])
 
     result = searches.refined(end, join)
-    return tuple(path), replace(result, nfev=last.nfev + result.nfev, njev=last.njev + result.njev)
+    return tuple(path), result._replace(nfev=last.nfev + result.nfev, njev=last.njev + result.njev)
 
 
 def _after_search(last: SolverIteration, point: SolverIteration, phase: str) -> SolverIteration:
     """Return the line of a point that further starts led to, behind the last one of the case."""
-    line = following(last, replace(point, number=0))
-    return replace(line, phase=phase, step_norm=0.0, damping=nan, inner=0, capped=None)
+    line = following(last, point._replace(number=0))
+    return line._replace(phase=phase, step_norm=0.0, damping=nan, inner=0, capped=None)

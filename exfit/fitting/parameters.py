@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, isfinite
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from exfit.models.sheet import Parameter
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
-@dataclass(frozen=True)
-class Prior:
+class Prior(NamedTuple):
     """Prior of a parameter: its mean and standard deviation."""
 
     mean: float

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,7 @@ from exfit.fitting.residuals import Residuals, Robust
 from exfit.simulation.interpolation import NEIGHBOURS, Interpolation
 
 
-@dataclass(frozen=True, eq=False)
-class FitProblem:
+class FitProblem(NamedTuple):
     """Residuals of a fit, in two forms with the same cost and gradient at every point.
 
     ``residuals`` are those of all samples; ``compressed`` are fewer, or the same where nothing is

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -44,8 +44,7 @@ class SimulationCounter:
             self.substeps = max(self.substeps, substeps)
 
 
-@dataclass(frozen=True)
-class Robust:
+class Robust(NamedTuple):
     """A loss that bears spikes, from ``scale`` standard deviations of a channel's noise on."""
 
     loss: "Loss"

@@ -235,7 +235,7 @@ class CaseSearches:
         )
         own = [end.history[0].cost for end in earlier]
         start_costs = np.append(own, self.problem.compressed.costs([*starts.points]))
-        minima = replace(minima, start_costs=start_costs)
+        minima = minima._replace(start_costs=start_costs)
         if self.counter is not None:
             self.counter.add(counter.simulations)
         return FurtherDescents(minima, starts.ways, starts.why_direct)

@@ -1,8 +1,9 @@
 """Periodic disturbances of channels: as a case names them, or as residuals show them."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +29,7 @@ from exfit.inference.noise import SURPRISING, is_white, whiteness
 from exfit.util.text import digits
 
 
-@dataclass(frozen=True)
-class Sine:
+class Sine(NamedTuple):
     """A disturbance of a signal: a cosine and a sine of one frequency about an instant (s).
 
     The amplitudes (pu) are found under ``name.cosine`` and ``name.sine``, and so is the

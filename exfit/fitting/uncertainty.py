@@ -95,7 +95,7 @@ class UncertaintyAnalysis:
         What no record can tell apart stays.
         """
         parameters = {
-            name: replace(own, interval=None, why=why, method=None)
+            name: own._replace(interval=None, why=why, method=None)
             for name, own in self.confidence.parameters.items()
         }
         known = self.identifiability
@@ -103,7 +103,7 @@ class UncertaintyAnalysis:
         return replace(
             self,
             confidence=replace(self.confidence, parameters=parameters, sentences=()),
-            identifiability=replace(known, unseen=exact, suggestion=()),
+            identifiability=known._replace(unseen=exact, suggestion=()),
         )
 
     @property
@@ -164,7 +164,7 @@ def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> 
         low, high = own.interval or (None, None)
         if low is not None and high is not None:
             cut = max(low, parameter.low), min(high, parameter.high)
-            within[parameter.name] = replace(own, interval=cut)
+            within[parameter.name] = own._replace(interval=cut)
     intervals = replace(intervals, parameters=within)
     return UncertaintyAnalysis(
         confidence=intervals,
@@ -260,7 +260,7 @@ def _channels(
             of_record = any(nuisance.signal == channel.signal for nuisance in experiment.nuisances)
             if channel.plain and as_many and not (of_record or white):
                 rounding = _rounding(channel, errors[samples], slopes[own])
-                block = replace(block, rounding=rounding)
+                block = block._replace(rounding=rounding)
             yield block
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import exp, inf, isfinite
 from statistics import NormalDist
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ Interval = tuple[float | None, float | None]  # None: the record sets no limit o
 IntervalMethod = Literal["linear", "profile", "hull", "windows", "averages"]
 
 
-@dataclass(frozen=True)
-class Uncertainty:
+class Uncertainty(NamedTuple):
     """Uncertainty of one parameter.
 
     std_error       in its own unit; None where nothing determines it
@@ -58,8 +57,7 @@ def closed(interval: Interval | None) -> bool:
     return interval is not None and None not in interval
 
 
-@dataclass(frozen=True, eq=False)
-class Correlation:
+class Correlation(NamedTuple):
     """The correlations (N, N) of the estimates of N parameters; nan without a standard error."""
 
     names: tuple[str, ...]

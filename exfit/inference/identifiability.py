@@ -4,7 +4,7 @@ Effects say which parameter matters first: how far a small change of each moves 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf, isfinite, nan, sqrt
 from typing import Annotated, Literal, NamedTuple
 
@@ -28,8 +28,7 @@ PERCENT = 0.01
 OF_INTERVAL = "is 0: 1 % of its interval"
 
 
-@dataclass(frozen=True)
-class SignalChange:
+class SignalChange(NamedTuple):
     """Change of a signal: root mean square, in pu and in standard deviations of noise."""
 
     signal: str
@@ -88,8 +87,7 @@ class Fixing:
         return frozenset((*self.names, *better))
 
 
-@dataclass(frozen=True, eq=False)
-class Identifiability:
+class Identifiability(NamedTuple):
     """Relative changes of the parameters ``names`` (K,) that the record determines.
 
     Those on a bound and those without effect are not among them. singular_values (K,) descend,
@@ -123,7 +121,7 @@ class Identifiability:
         kept = tuple(each for each in self.unseen if not each.leaves(intervals))
         contradicted = {name for each in self.unseen if each not in kept for name in each.reached}
         suggestion = (each for each in self.suggestion if not each.concerned & contradicted)
-        return replace(self, unseen=kept, suggestion=tuple(suggestion))
+        return self._replace(unseen=kept, suggestion=tuple(suggestion))
 
 
 def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiability:

@@ -50,8 +50,7 @@ class Rounding(NamedTuple):
     variance: float
 
 
-@dataclass(frozen=True, eq=False)
-class ResidualBlock:
+class ResidualBlock(NamedTuple):
     """The errors of one signal in one record, on one clock, in the order of time.
 
     label   "vt", or "up vt" where there are several records

@@ -1,7 +1,6 @@
 """The noise of each channel of a fit: how large, and how much of it is the same again."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import nan, sqrt
 from typing import Annotated, NamedTuple
 
@@ -61,8 +60,7 @@ class Autoregression(NamedTuple):
         return np.asarray(np.sqrt(self.share) * lfilter([1.0], denominator, backwards, axis=1))
 
 
-@dataclass(frozen=True)
-class Noise:
+class Noise(NamedTuple):
     """The noise of a channel, of its weighted errors.
 
     std        standard deviation that counts: the one given, or the estimated one

@@ -1,7 +1,6 @@
 """Errors of several channels whose noise is correlated, made white: weighted by its covariance."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,8 +48,7 @@ class WhitenedRows(NamedTuple):
     matrix: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Whitening:
+class Whitening(NamedTuple):
     """Matrix that makes errors (M,) white: W (M, M), W'W the inverse of their covariance / scale^2.
 
     An error becomes what those before it in time do not predict, over the standard deviation of
@@ -68,7 +66,7 @@ class Whitening:
 
     def shifted(self, shift: Array) -> "Whitening":
         """Return the same with another shift (M,)."""
-        return replace(self, shift=shift)
+        return self._replace(shift=shift)
 
     def errors(self, errors: Array) -> Array:
         """Return errors (K, M) as white ones."""

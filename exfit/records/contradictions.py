@@ -5,8 +5,7 @@ in per unit, by where the machine rests with it.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from exfit.signals import SIGNALS
 
@@ -32,8 +31,7 @@ SAME_BASE = 0.2  # of their level: how far efd and ifd in per unit may be from e
 WITHOUT_SATURATION = 0.01  # of the voltage: so near to it a machine rests that does not saturate
 
 
-@dataclass(frozen=True)
-class ScaleRange:
+class ScaleRange(NamedTuple):
     """The factor on the numbers of a column, within its range, where it is to be found."""
 
     start: float

@@ -156,7 +156,7 @@ def _measured_features(
         instants = [window, *(_first_move(setup, time, each) for each in moved)]
         at = np.array([np.nan if instant is None else instant[0] for instant in instants])
         found = FoundByRecord(curve, errors, (at[1:] - at[0]) / SMALL)
-        if not all(np.isfinite(each).all() for each in vars(found).values()):
+        if not all(np.isfinite(each).all() for each in found):
             found = None
     response = RecordedResponse(time, vt.measured[kept], vt.simulated[kept], *window, found)
     measured = recorded_features(response)

@@ -56,8 +56,7 @@ class Overlay:
         return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else float("nan")
 
 
-@dataclass(frozen=True)
-class Match:
+class Match(NamedTuple):
     """How well a signal matches its record: errors per unit, and the fit percentage."""
 
     rmse: Annotated[float, nan]
@@ -81,8 +80,7 @@ def judged_of(signals: Iterable[str]) -> str:
     return "vt" if "vt" in names else names[0]
 
 
-@dataclass(frozen=True, eq=False)
-class IterationResponses:
+class IterationResponses(NamedTuple):
     """A signal, measured and after some iterations of a fit, per unit, at ``time`` (M,) in s.
 
     ``numbers`` (K,) are those of the iterations, in rising order; 0 is the start. ``measured`` is
@@ -96,8 +94,7 @@ class IterationResponses:
     samples: Array
 
 
-@dataclass(frozen=True)
-class StepFeatures:
+class StepFeatures(NamedTuple):
     """Features of vt after the first step, None where the record does not have it."""
 
     measured: Features | None
@@ -157,8 +154,7 @@ class Excursion(NamedTuple):
         return f"{self.value:+.3g} {unit} at {self.at:.4g} s"
 
 
-@dataclass(frozen=True)
-class PlayedErrors:
+class PlayedErrors(NamedTuple):
     """How a simulated signal departs from its record, per unit, and when, in s.
 
     ``largest`` is the error of greatest magnitude, ``at_rest`` its mean before the event; the
@@ -172,8 +168,7 @@ class PlayedErrors:
     simulated: Excursion | None
 
 
-@dataclass(frozen=True, eq=False)
-class DrivingSignal:
+class DrivingSignal(NamedTuple):
     """A recorded signal (M,) that drove the simulation; ``label`` is that of an axis.
 
     The samples are in its ``unit``.

@@ -83,8 +83,7 @@ class UnitDescription:
     sources: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class RecordedTest:
+class RecordedTest(NamedTuple):
     """A test and its record: what was done, in which condition of the unit, what was measured.
 
     ``first``, ``last`` and ``spacing`` of its samples are in s; ``network`` is by symbol, where the
@@ -104,8 +103,7 @@ class RecordedTest:
     network: Mapping[str, NetworkParameter]
 
 
-@dataclass(frozen=True)
-class FlatRun:
+class FlatRun(NamedTuple):
     """How far (pu) the signals of a test stray from rest without a step; nan without a rest."""
 
     test: str
@@ -113,8 +111,7 @@ class FlatRun:
     rests: bool
 
 
-@dataclass(frozen=True)
-class SmallSignalView:
+class SmallSignalView(NamedTuple):
     """The small-signal view of tests whose system and state of rest are the same.
 
     ``view`` is None for the reason ``why``.
@@ -140,16 +137,14 @@ class OtherProgram:
     differences: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class HitLimits:
+class HitLimits(NamedTuple):
     """The limits that the response of a test was on."""
 
     test: str
     hits: tuple[LimitHit, ...]
 
 
-@dataclass(frozen=True)
-class Behaviour:
+class Behaviour(NamedTuple):
     """What the fitted values do: without a step, near rest, at the limits."""
 
     flat_runs: tuple[FlatRun, ...]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 from exfit.results.verdict import REJECTED, Cause
 from exfit.util.text import rounded_value
@@ -14,8 +14,7 @@ MOST_NAMED = 3  # parameters, and values, of a sentence
 STRONG = 10.0  # of chi-square: two hypotheses that differ by more are told apart
 
 
-@dataclass(frozen=True)
-class TypicalValue:
+class TypicalValue(NamedTuple):
     """A typical value that the responses depend on, and what it moves.
 
     ``shifts`` is by how much each fitted parameter would move, in its own unit, if the value were
@@ -61,8 +60,7 @@ def first_of(names: Sequence[str]) -> str:
     return listed([*names[:MOST_NAMED], f"{others} more"])
 
 
-@dataclass(frozen=True)
-class WindowEstimate:
+class WindowEstimate(NamedTuple):
     """A parameter as one window of a record gives it, from ``start`` to ``end`` (s).
 
     The window is that of a step, from the rest before it to the next one; or the half of it that
@@ -117,8 +115,7 @@ class WindowSpread:
         )
 
 
-@dataclass(frozen=True)
-class RecorderAverages:
+class RecorderAverages(NamedTuple):
     """Averages over a ``window`` (s), which the record does not exclude.
 
     ``chi_square`` is by how much better they match than samples of single instants; ``given`` are

@@ -82,8 +82,7 @@ def drawn_responses(responses: IterationResponses, iterations: int) -> Iteration
     numbers = np.array(responses.numbers)
     nearest = np.argmin(np.abs(numbers[:, None] - wanted), axis=0)
     rows = distinct(nearest)
-    return replace(
-        responses,
+    return responses._replace(
         numbers=tuple(int(number) for number in numbers[rows]),
         samples=responses.samples[rows],
     )
@@ -104,7 +103,7 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
     rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
     if played is not None:
         driving = {
-            name: replace(signal, samples=rounded(signal.samples[rows]))
+            name: signal._replace(samples=rounded(signal.samples[rows]))
             for name, signal in played.driving.items()
         }
         left_out = {name: _at(rows, signal) for name, signal in played.left_out.items()}
@@ -113,8 +112,7 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
         responses = drawn_responses(responses, iterations)
         lines = [responses.measured, *responses.samples]
         at = _rows(lines, MOST_NUMBERS // len(lines))
-        responses = replace(
-            responses,
+        responses = responses._replace(
             time=_instants(responses.time, at),
             measured=rounded(responses.measured[at]),
             samples=np.stack([rounded(samples[at]) for samples in responses.samples]),
@@ -153,9 +151,9 @@ def _behaviour(behaviour: Behaviour | None) -> Behaviour | None:
     for of_tests in behaviour.small_signal:
         view = of_tests.view
         if view is not None:
-            view = replace(view, closed=_bode(view.closed), open=view.open and _bode(view.open))
-        views.append(replace(of_tests, view=view))
-    return replace(behaviour, small_signal=tuple(views))
+            view = view._replace(closed=_bode(view.closed), open=view.open and _bode(view.open))
+        views.append(of_tests._replace(view=view))
+    return behaviour._replace(small_signal=tuple(views))
 
 
 def _bode(bode: Bode) -> Bode:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import nan
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal, NamedTuple
 
 VerdictWords = Literal[
     "good", "matches, not all determined", "misses the record", "no match", "not converged"
@@ -24,8 +24,7 @@ NEGLIGIBLE = 1e-3  # of the variance of the scatter: what inputs carry is not te
 VISIBLE = 0.005  # of the range of a signal: the width of a line in its figure
 
 
-@dataclass(frozen=True)
-class Cause:
+class Cause(NamedTuple):
     """Why a fit may be as it is, and what to do about it."""
 
     cause: str
@@ -87,8 +86,7 @@ class ResidualTests:
         return not self.are_white and self.excess < REJECTED and self.share > VISIBLE
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """What a fit comes to, with the ``reason`` for it and the likeliest causes, the first first.
 
     ``residuals`` are the tests of each channel of each record, empty where none could be made.

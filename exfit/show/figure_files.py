@@ -1,9 +1,8 @@
 """Figures as files beside the numbers of their run."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from exfit.errors import ExfitError
 from exfit.util.files import write
@@ -17,8 +16,7 @@ Item = TypeVar("Item")
 Version = tuple[int, ...]  # of a file: what changes when it is replaced
 
 
-@dataclass(frozen=True)
-class PlannedFigure:
+class PlannedFigure(NamedTuple):
     """A figure to be drawn, and in a few words what it shows."""
 
     shows: str
@@ -29,8 +27,7 @@ PlannedFigures = Mapping[str, PlannedFigure]
 Announce = Callable[[PlannedFigures, str], None]  # takes all, and the name of the one written
 
 
-@dataclass(frozen=True)
-class FigureFiles:
+class FigureFiles(NamedTuple):
     """The figures of a run whose numbers are written; nothing is imported before they are drawn.
 
     ``main`` is the file of the numbers. Where another run replaces it meanwhile, that draws its

@@ -1,7 +1,6 @@
 """Derivatives of responses: their directions as the machine code takes them, and its runs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -42,8 +41,7 @@ class InputShape(NamedTuple):
         return at if self.instant else size
 
 
-@dataclass(frozen=True)
-class Moves:
+class Moves(NamedTuple):
     """Moves of the directions of some sets, all together.
 
     ``columns`` are the directions that need a run: that of a delay alone needs none; ``delayed``

@@ -2,8 +2,8 @@
 
 from collections.abc import Container, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +38,7 @@ BESIDE_JUMP = 2.0  # steps: as far as the B-splines of a smooth jump reach on bo
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+class Run(NamedTuple):
     """A simulation at every point of its grid: ``time`` (n,) in s, the outputs and inputs (n,).
 
     The instant of an exact step is there twice, before it and after it.
@@ -50,8 +49,7 @@ class Run:
     inputs: Mapping[str, Array]
 
 
-@dataclass(frozen=True)
-class Response:
+class Response(NamedTuple):
     """Simulated signals on one clock: ``time`` (M,) in s, each signal (M,) per unit."""
 
     time: Array

@@ -5,7 +5,7 @@ that is reached there has no gain.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from math import inf, log10, pi, sqrt
 from typing import Annotated, NamedTuple
@@ -54,8 +54,7 @@ class Pole(NamedTuple):
     states: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Bode:
+class Bode(NamedTuple):
     """A frequency response: ``frequency`` (M,) in Hz, ``response`` (M,) complex, pu per pu."""
 
     frequency: Array
@@ -77,8 +76,7 @@ class Margins(NamedTuple):
     phase_at: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class SmallSignal:
+class SmallSignal(NamedTuple):
     """A system near its state of rest.
 
     ``closed`` is the response of ``path[1]`` to ``path[0]``: of vt to vref, of efd where the
@@ -97,8 +95,7 @@ class SmallSignal:
     path: tuple[str, str]
 
 
-@dataclass(frozen=True, eq=False)
-class StateSpace:
+class StateSpace(NamedTuple):
     """A linear system dx/dt = A x + b u, y = c x + d u with one input and one output."""
 
     A: Array

@@ -5,7 +5,7 @@ recorded one. These are of the order that operators ask for: a tenth of the chan
 recorded, and less at rest (cf. AEMO, Power System Model Guidelines, on the accuracy of models).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 ORIGIN = (
     "The defaults are those of exfit, of the order that operators ask for: a tenth of the change "
@@ -14,8 +14,7 @@ ORIGIN = (
 )
 
 
-@dataclass(frozen=True)
-class Criteria:
+class Criteria(NamedTuple):
     """The largest differences between simulated and recorded response that meet a criterion.
 
     rmse           rms of the difference, % of the change that was recorded

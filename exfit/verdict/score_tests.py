@@ -1,7 +1,6 @@
 """Whether a record contradicts what its case holds fixed: a score test of each such value."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import erfc, exp, hypot, log, sqrt
 from typing import NamedTuple
 
@@ -41,8 +40,7 @@ SMALL = 0.1  # change of a logarithm that is given in per cent
 LARGEST_CHANGE = log(LARGEST_FACTOR)  # of a logarithm: no given value is farther off
 
 
-@dataclass(frozen=True)
-class Held:
+class Held(NamedTuple):
     """A value that a case holds fixed, or one that it takes from the record (``words`` empty).
 
     ``size`` is by how much it is changed for a derivative; without ``unit`` that is its own size.

@@ -356,7 +356,7 @@ def _parameters(
 def _iteration(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
     """Return a line of the log with the parameters' own values for the scaled ones."""
     values = residuals.values(line.x)
-    figures = {name: value for name, value in vars(line).items() if name != "x"}
+    figures = {name: value for name, value in line._asdict().items() if name != "x"}
     free = {parameter.name: values[parameter.name] for parameter in residuals.free}
     return Iteration(**figures, values=free)
 

@@ -1,10 +1,11 @@
 """The responses to values: beside records, after each iteration, at rest, before the test."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise, takewhile
 from math import isnan, nan
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,8 +106,7 @@ def validation_of(
     return judged(comparison, fitted, setup.channels, accept)
 
 
-@dataclass(frozen=True, eq=False)
-class LiveResponse:
+class LiveResponse(NamedTuple):
     """A signal of a record and the response to the values of now, (M,) each, per unit.
 
     ``time`` (M,) is in s. What is left out of the comparison is not among them.

@@ -339,4 +339,4 @@ def _described(validation: Validation, setups: Sequence[ExperimentSetup]) -> Ite
     for match, test in zip(matches, described, strict=True):
         done = "; ".join(step.text for step in match.steps) or test.done
         role = "validation" if match.validation else "fitted"
-        yield replace(test, name=match.name, role=role, done=done)
+        yield test._replace(name=match.name, role=role, done=done)

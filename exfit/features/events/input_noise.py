@@ -262,7 +262,7 @@ def weighted_search(
                     end = descent_near(unbiased, minimum.x)
                     minimum = LocalMinimum(end.x, end.cost, minimum.starts, end)
                 minima.append(minimum)
-            found = found._replace(minima=replace(found.minima, minima=tuple(minima)))
+            found = found._replace(minima=found.minima._replace(minima=tuple(minima)))
     except KeyboardInterrupt:
         return problem, found._replace(best=stopped(found.best, Stop.INTERRUPTED))
     weighted = FitProblem(unbiased, unbiased)

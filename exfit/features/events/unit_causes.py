@@ -60,7 +60,7 @@ def with_control(
     others = tuple(part for part in case.parts.all if part.kind != kind)
     added = () if model is None else (added_part(kind, prefix, model),)
     of_parts: dict[str, Any] = {kind: model, "all": (*others, *added)}
-    keys: dict[str, Any] = {kind: section, "parts": replace(case.parts, **of_parts)}
+    keys: dict[str, Any] = {kind: section, "parts": case.parts._replace(**of_parts)}
     return replace(case, **keys)
 
 

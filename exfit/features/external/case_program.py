@@ -185,7 +185,7 @@ def descent_by_twin(
         search = descent(OneByOne(functions.residuals, functions.jacobian))
         end = search.run(start, join)
         nfev, njev = (before.nfev, before.njev) if before else (0, 0)
-        return replace(end, history=tuple(lines), nfev=nfev + end.nfev, njev=njev + end.njev)
+        return end._replace(history=tuple(lines), nfev=nfev + end.nfev, njev=njev + end.njev)
 
     while True:
         with suppress(TwinDoubtedError):

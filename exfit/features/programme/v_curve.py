@@ -140,7 +140,7 @@ class FieldsOnLoad:
         quadrature = next(each for each in problem.free if each.name == "Xq")
         if quadrature.high < fit.values["Xd"]:
             return fit
-        parameters = {**fit.confidence.parameters, "Xq": replace(known, why=UP_TO_XD)}
+        parameters = {**fit.confidence.parameters, "Xq": known._replace(why=UP_TO_XD)}
         return replace(fit, confidence=replace(fit.confidence, parameters=parameters))
 
     def errors(self, values: Values) -> Array:

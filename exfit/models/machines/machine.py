@@ -11,7 +11,6 @@ A d axis has a field and a damper winding: T'd0 dE'q/dt = efd - ifd and T''d0 dp
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -48,8 +47,7 @@ class Source(NamedTuple):
     xq: Signal
 
 
-@dataclass(frozen=True)
-class Machine:
+class Machine(NamedTuple):
     """A machine: its data sheet, its states and its functions.
 
     ``drawing`` is a text: the block diagram of its axes, then remarks. Of the states ``d_axis``

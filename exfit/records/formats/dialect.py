@@ -7,7 +7,6 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import NamedTuple
@@ -51,8 +50,7 @@ class TextRow(NamedTuple):
         ]
 
 
-@dataclass(frozen=True)
-class Dialect:
+class Dialect(NamedTuple):
     """How a file is written: its rows, each of ``cells`` cells, begin at ``first_line``.
 
     ``comma`` is whether it is the decimal mark, None where there is no such mark. A last cell

@@ -40,4 +40,4 @@ def read_play_in(path: Path, memory: float | None = None) -> TextTable:
     units = {"t": "s", "frequency": "Hz" if hertz else "pu"}
     if PER_UNIT[0] <= voltage <= PER_UNIT[1]:
         units["vt"] = "pu"
-    return replace(table, dialect=replace(table.dialect, names=NAMES, units=units))
+    return replace(table, dialect=table.dialect._replace(names=NAMES, units=units))

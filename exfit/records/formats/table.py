@@ -6,9 +6,8 @@ will need is estimated before it is read.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +73,7 @@ class RecordTable(Protocol):
         """Return the place of a sample, counted from 0, as messages name it: record.csv:17."""
 
 
-@dataclass(frozen=True)
-class MemoryLimit:
+class MemoryLimit(NamedTuple):
     """How much memory, in bytes, reading a file may take."""
 
     path: Path

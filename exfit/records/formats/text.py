@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,7 @@ BYTE_ORDER_MARKS = (
 TEXT_BYTES = bytes({*b"\t\n\x0c\r", *range(0x20, 0x100)} - {0x7F, 0x81, 0x8D, 0x8F, 0x90, 0x9D})
 
 
-@dataclass(frozen=True)
-class Text:
+class Text(NamedTuple):
     r"""The bytes of a text in an encoding that keeps ASCII, with lines that end in \n."""
 
     data: bytes
@@ -301,7 +300,7 @@ def read_text_table(path: Path, memory: float | None = None) -> TextTable:
         raise RecordError(f"{path}: no samples below the column names")
     if dialect.comma is None and b"," in text.data:
         comma = has_comma(cells for _, cells in table.rows())
-        return replace(table, dialect=replace(dialect, comma=comma))
+        return replace(table, dialect=dialect._replace(comma=comma))
     return table
 
 

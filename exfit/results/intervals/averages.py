@@ -204,5 +204,5 @@ def allowing_for_averages(
             shift = free.scaled(with_them) - free.scaled(given)
             low, high = own.interval
             interval = moved(free, low, min(shift, 0.0)), moved(free, high, max(shift, 0.0))
-            parameters[free.name] = replace(own, interval=interval, method="averages")
+            parameters[free.name] = own._replace(interval=interval, method="averages")
     return replace(uncertainty, confidence=replace(uncertainty.confidence, parameters=parameters))

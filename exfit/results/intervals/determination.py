@@ -169,7 +169,7 @@ def without_linear_intervals(
     parameters = dict(uncertainty.confidence.parameters)
     for name in names:
         if parameters[name].interval is not None:
-            parameters[name] = replace(parameters[name], interval=None, why=why)
+            parameters[name] = parameters[name]._replace(interval=None, why=why)
     return without_limits_of_others(with_parameters(uncertainty, parameters))
 
 
@@ -184,9 +184,9 @@ def without_limits_of_others(uncertainty: UncertaintyAnalysis) -> UncertaintyAna
         if parameters[name].determined and parameters[name].method != "linear":
             continue  # a profile, in which the other may leave its bound, is closed
         why = f"has no interval: the record ties it to {listed(partners)}, on a bound"
-        parameters[name] = replace(parameters[name], interval=None, why=why)
+        parameters[name] = parameters[name]._replace(interval=None, why=why)
     for name, why in uncertainty.by_few_samples.items():
-        parameters[name] = replace(parameters[name], interval=None, why=why)
+        parameters[name] = parameters[name]._replace(interval=None, why=why)
     return with_parameters(uncertainty, parameters)
 
 
@@ -241,8 +241,7 @@ def of_profiles(
         for side, reason in (("lower", below), ("upper", above))
         if reason
     ]
-    return replace(
-        own,
+    return own._replace(
         interval=None if low is None and high is None else (low, high),
         why=" and ".join(open_sides) or None,
         method="profile" if hull == limits_of(profiles[:1]) else "hull",

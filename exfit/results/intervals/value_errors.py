@@ -156,12 +156,12 @@ def widened_by(
     share, value = hypot(linear or 0.0, shift) / size, parameter.value(scaled)
     std_error = None if own.std_error is None else hypot(own.std_error, shift)
     relative = std_error / abs(value) if std_error is not None and value else None
-    wider = replace(own, std_error=std_error, relative_error=relative)
+    wider = own._replace(std_error=std_error, relative_error=relative)
     if own.interval is None:
         return wider
     if share > UNDETERMINED:
         why = f"is not determined for the errors of {listed(names)}: standard error"
-        return replace(wider, interval=None, why=f"{why} {digits(100.0 * share)} %")
+        return wider._replace(interval=None, why=f"{why} {digits(100.0 * share)} %")
     beyond = NORMAL * shift / parameter.slope(scaled)
     bounds = parameter.scaled(parameter.low), parameter.scaled(parameter.high)
 
@@ -172,7 +172,7 @@ def widened_by(
         return parameter.value(float(np.clip(scaled + sign * hypot(side, beyond), *bounds)))
 
     low, high = own.interval
-    return replace(wider, interval=(moved(low, -1.0), moved(high, 1.0)))
+    return wider._replace(interval=(moved(low, -1.0), moved(high, 1.0)))
 
 
 def shifts_by_values(

@@ -113,7 +113,7 @@ def with_spread(
     if spread is None or not spread.moves or spread.interval is None:
         return uncertainty
     parameters = uncertainty.confidence.parameters
-    own: Uncertainty = replace(parameters[spread.name], interval=spread.hull, method="windows")
+    own: Uncertainty = parameters[spread.name]._replace(interval=spread.hull, method="windows")
     together = replace(uncertainty.confidence, parameters={**parameters, spread.name: own})
     return replace(uncertainty, confidence=together)
 

@@ -91,8 +91,7 @@ class Pace:
         return f"not tried as causes ({why}): {', '.join(self.untried)}"
 
 
-@dataclass(frozen=True, eq=False)
-class FittedRecord:
+class FittedRecord(NamedTuple):
     """A record of a fit: its test as the case has it and as simulated, and the match with it."""
 
     test: BumpTest
