@@ -18,6 +18,8 @@ algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10
 Iterative methods for optimization, chapters 2 and 3.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from exfit.estimate.problem import (
     STATUS,
     Functions,
@@ -28,7 +30,6 @@ from exfit.estimate.problem import (
     Stop,
     half_square,
 )
-from exfit.estimate.profiling import CostProfile, LowerMinimum, ProfileEnd, profile, profiles
 from exfit.estimate.searches import (
     ArmijoDamping,
     LineSearch,
@@ -40,6 +41,9 @@ from exfit.estimate.searches import (
 )
 from exfit.estimate.solver import Descent, least_squares
 from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
+
+if TYPE_CHECKING:
+    from exfit.estimate.profiling import CostProfile, LowerMinimum, ProfileEnd, profile, profiles
 
 __all__ = [
     "STATUS",
@@ -69,3 +73,11 @@ __all__ = [
     "to_half",
     "to_parabola",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:  # what many a fit does without
+        from exfit.estimate import profiling
+
+        return getattr(profiling, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

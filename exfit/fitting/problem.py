@@ -66,11 +66,11 @@ def residuals_of(
 
 def robust_of(case: Case) -> Robust | None:
     """Loss of a case in place of the squares."""
-    from exfit.dsp.robust_loss import LOSSES
-
     estimate = case.estimate
     if estimate.loss == "least-squares":
         return None
+    from exfit.dsp.robust_loss import LOSSES
+
     return Robust(LOSSES[estimate.loss], estimate.loss_scale)
 
 

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.step_detection import CHI_SQUARE, MEDIAN_SAMPLES, interval_below, running_median
 from exfit.fitting.experiment import Array, ExperimentSetup, Values, compared
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter
@@ -87,6 +86,8 @@ def _shown(
     low, high = instant.low, instant.high
     if freedom < 1:
         return instant
+    from exfit.dsp.step_detection import CHI_SQUARE, interval_below
+
     for _ in range(STAGES):
         tried = np.linspace(low, high, TRIED)
         sets = [{**values, instant.name: float(at)} for at in tried]
@@ -114,6 +115,8 @@ def _beginnings(
     setup: ExperimentSetup, values: Values, rest_until: float, before: float, after: float
 ) -> Iterator[Beginning]:
     """Yield the beginning of each compared channel that moves in an interval (s) after a rest."""
+    from exfit.dsp.step_detection import MEDIAN_SAMPLES, running_median
+
     time = setup.record.time
     for place, channel in enumerate(setup.channels):
         measured = compared(channel, setup.experiment.measured(channel, values))

@@ -18,7 +18,6 @@ from exfit.dsp.sampling import present_samples
 from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.nuisances import prefix_from
-from exfit.fitting.recorded_steps import is_table
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
 from exfit.plants import MACHINE, REFERENCES
@@ -101,7 +100,11 @@ def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
     for signal in REFERENCES:
         record = setup.references.get(signal, setup.record)
         given = test.reference(signal)
-        if isinstance(given, tuple | ReferenceTable) or is_table(record):
+        if isinstance(given, tuple | ReferenceTable):
+            continue
+        from exfit.fitting.recorded_steps import is_table
+
+        if is_table(record):
             continue
         samples = record.signals[signal]
         at_rest = np.count_nonzero(record.time < (setup.test.steady or np.inf))

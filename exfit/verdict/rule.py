@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,7 +25,9 @@ from exfit.util.text import digits, listed
 from exfit.verdict.causes import Evidence, causes_of
 from exfit.verdict.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.verdict.residual_tests import residual_tests
-from exfit.verdict.score_tests import Contradiction, contradictions
+
+if TYPE_CHECKING:
+    from exfit.verdict.score_tests import Contradiction
 
 MOST_CAUSES = 5  # that a reader is given
 VALUES = "values of the case"
@@ -50,6 +53,8 @@ def verdict_of(evidence: Evidence) -> Verdict:
     contradicted: list[Contradiction | RecorderAverages] = []
     try:
         if good_but_for_averages and not noise_is_carried:
+            from exfit.verdict.score_tests import contradictions
+
             contradicted += contradictions(evidence)
     except KeyboardInterrupt:
         words, reason = MATCHES, UNTESTED

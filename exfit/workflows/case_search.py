@@ -133,10 +133,10 @@ def lines(state: SearchState) -> SearchState:
     Before that search nothing tells them from a response. Raises KeyboardInterrupt where an
     interruption ends it.
     """
-    from exfit.fitting.sines import with_found_lines
-
     if not any(setup.automatic_sines for setup in state.setups):
         return state
+    from exfit.fitting.sines import with_found_lines
+
     first = in_turn((*WEIGHTED, samples_at_steps), replace(state, announce=_ignore))
     if first.interrupted:
         raise KeyboardInterrupt

@@ -62,8 +62,6 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> TestWithValue
     periodic disturbance that stands out of what is left then. The test has sub-steps enough, and
     bounds within which the record allows the instants. Raises KeyboardInterrupt at an interruption.
     """
-    from exfit.fitting.sines import with_found_lines
-
     fine, held = setup.with_enough_substeps(values), frozenset[str]()
     if not case.has_no_equations:  # whose every response is a run
         from exfit.fitting.shown_instants import instants_of, with_shown_instants
@@ -72,6 +70,8 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> TestWithValue
     own = fitted_to_record(case, fine, values, held)
     if not setup.automatic_sines:
         return fine, own
+    from exfit.fitting.sines import with_found_lines
+
     residuals = Residuals([fine.experiment], fine.free, own)
     (disturbed,), _ = with_found_lines([fine], residuals, scaled_values(fine.free, own))
     fine = disturbed.with_enough_substeps(values)

@@ -1,7 +1,5 @@
 """The search of a fit: which descents it makes, which end it returns, and the path to it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -73,11 +71,11 @@ class Scripted:
 
     def refined(self, result, announce):
         self.calls.append("refined")
-        lines = [replace(line, number=k, phase="lm", nfev=k + 1, njev=k + 1)
+        lines = [line._replace(number=k, phase="lm", nfev=k + 1, njev=k + 1)
                  for k, line in enumerate(result.history[-1:] * 3)]  # fmt: skip
         for line in lines:
             announce(line)
-        return replace(result, history=tuple(lines), nfev=3, njev=3)
+        return result._replace(history=tuple(lines), nfev=3, njev=3)
 
     def margin(self, lowest):
         return MARGIN * lowest.cost

@@ -50,7 +50,7 @@ def test_standard_errors_are_those_that_nist_certifies(name, logarithmic):
     # of Lanczos1, whose data have no noise
     factors = factored(lin, lin.free)
     (noise,) = confidence(lin).noise
-    white = replace(noise, std=noise.estimated, inflation=1.0, partial_autocorrelations=())
+    white = noise._replace(std=noise.estimated, inflation=1.0, partial_autocorrelations=())
     got = np.sqrt(np.diag(factors.covariance((white,)))) * lin.size
     assert got == pytest.approx(case.deviations, rel=1e-5)
 

@@ -139,7 +139,7 @@ def with_interval(result, method, interval):
         name: replace(parameter, interval=interval, interval_method=method)
         for name, parameter in result.parameters.items()
     }
-    verdict = replace(result.verdict, verdict=MATCHES)
+    verdict = result.verdict._replace(verdict=MATCHES)
     return replace(result, parameters=parameters, verdict=verdict)
 
 

@@ -162,7 +162,7 @@ def test_a_search_that_stalled_where_a_misfit_is_seen_misses(
     tmp_path, monkeypatch, stop, verdict_of_it
 ):
     def ended_by(evidence):
-        solution = replace(evidence.solution, stop=stop, success=False, message=stop.value)
+        solution = evidence.solution._replace(stop=stop, success=False, message=stop.value)
         return replace(evidence, solution=solution)
 
     judged = rule._judged

@@ -9,7 +9,7 @@ from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.verdict import rule
+from exfit.verdict import score_tests
 from exfit.verdict.causes.trials import freed_within, linear_model, refitted, with_freed
 from exfit.verdict.score_tests import Held, _linearised, _score, _spread
 from exfit.workflows import fit
@@ -29,7 +29,7 @@ def evidence(monkeypatch):
         return []
 
     def of(case):
-        monkeypatch.setattr(rule, "contradictions", watched)
+        monkeypatch.setattr(score_tests, "contradictions", watched)
         fit(case, search="local")
         monkeypatch.undo()
         return all_evidence[0]
@@ -52,7 +52,7 @@ def test_a_value_that_the_record_contradicts_is_not_good():
 def test_chi_square_is_by_how_much_the_value_set_free_lowers_the_cost(evidence):
     """To second order in the change, which is 20 %: a fifth of either."""
     fitted = evidence(drawn(*SATURATION).faulty)
-    (score,) = [each for each in rule.contradictions(fitted) if TPD0 in each.held.words]
+    (score,) = [each for each in score_tests.contradictions(fitted) if TPD0 in each.held.words]
     value = fitted.residuals.fixed[TPD0]
     trial = refitted(fitted, with_freed(fitted.residuals, [freed_within(TPD0, value, 4.0)]))
     variance = float(_spread(fitted)[0]) ** 2

@@ -43,7 +43,7 @@ def with_many(result, count):
     """Return a fit that took so many iterations more than it did."""
     kept = result.comparison.iteration_responses
     numbers = tuple(range(count))
-    many = replace(kept, numbers=numbers, samples=np.tile(kept.samples[:1], (count, 1)))
+    many = kept._replace(numbers=numbers, samples=np.tile(kept.samples[:1], (count, 1)))
     return replace(result, comparisons=(replace(result.comparison, iteration_responses=many),))
 
 

@@ -1,7 +1,6 @@
 """Profiles of a case's parameters, against linear theory where it holds and refits where not."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -171,7 +170,7 @@ def search_ends(monkeypatch):
 def test_profiles_are_about_a_lower_minimum_that_is_met_on_the_way(search_ends, nearly_linear):
     def beside(residuals, found):
         x = found.x + np.array([0.0, BESIDE])
-        return replace(found, x=x, cost=0.5 * float(np.sum(residuals(x) ** 2)))
+        return found._replace(x=x, cost=0.5 * float(np.sum(residuals(x) ** 2)))
 
     search_ends(beside)
     found = profile(case_of("first_order"))
@@ -186,13 +185,13 @@ def test_profiles_are_about_a_lower_minimum_that_is_met_on_the_way(search_ends, 
 
 
 def test_a_fit_that_did_not_end_at_a_minimum_is_noted(search_ends):
-    search_ends(lambda _, found: replace(found, success=False, message="no luck"))
+    search_ends(lambda _, found: found._replace(success=False, message="no luck"))
     found = profile(case_of("first_order"), ["a"])
     assert found.notes == ("the fit did not end at a minimum: no luck",)
 
 
 def test_an_interruption_of_the_fit_ends_all(search_ends):
-    search_ends(lambda _, found: replace(found, success=False, stop=Stop.INTERRUPTED))
+    search_ends(lambda _, found: found._replace(success=False, stop=Stop.INTERRUPTED))
     told = []
     with pytest.raises(KeyboardInterrupt):
         profile(case_of("first_order"), progress=told.append)

@@ -200,7 +200,7 @@ def with_parameters(
 def with_intervals(
     uncertainty: UncertaintyAnalysis,
     free: Sequence[FreeParameter],
-    profiles: Mapping[int, Sequence[estimate.CostProfile]],
+    profiles: "Mapping[int, Sequence[estimate.CostProfile]]",
 ) -> UncertaintyAnalysis:
     """Return the uncertainty with the intervals of complete profiles in place of its own.
 
@@ -229,7 +229,7 @@ def with_intervals(
 def of_profiles(
     own: Uncertainty,
     parameter: FreeParameter,
-    profiles: Sequence[estimate.CostProfile],
+    profiles: "Sequence[estimate.CostProfile]",
     data_does: str = THE_RECORD_DOES,
 ) -> Uncertainty:
     """Combine the profiles of a parameter to its uncertainty, by their hull."""
@@ -255,7 +255,7 @@ class ProfilesAboutMinima(NamedTuple):
     led to one: then all are about that one alone.
     """
 
-    by_index: Mapping[int, Sequence[estimate.CostProfile]]
+    by_index: "Mapping[int, Sequence[estimate.CostProfile]]"
     lower: Array | None = None
     interrupted: bool = False
 
@@ -316,12 +316,12 @@ def allowed(solution: FoundMinimum, other: FoundMinimum, rise: float) -> bool:
     return other.cost - solution.cost < rise
 
 
-def complete(profile: estimate.CostProfile) -> bool:
+def complete(profile: "estimate.CostProfile") -> bool:
     """Test whether both sides of a profile came to their ends."""
     return estimate.ProfileEnd.INTERRUPTED not in profile.ends
 
 
-def limits_of(profiles: Iterable[estimate.CostProfile]) -> tuple[float, float]:
+def limits_of(profiles: "Iterable[estimate.CostProfile]") -> tuple[float, float]:
     """Interval that encloses those of all profiles of a parameter, infinite where one is open."""
     low, high = inf, -inf
     for profile in profiles:
@@ -333,7 +333,7 @@ def limits_of(profiles: Iterable[estimate.CostProfile]) -> tuple[float, float]:
 
 def reasons(
     parameter: FreeParameter,
-    profiles: Sequence[estimate.CostProfile],
+    profiles: "Sequence[estimate.CostProfile]",
     data_does: str = THE_RECORD_DOES,
 ) -> tuple[str, str]:
     """Reasons for which profiles leave the lower and upper limit open; "" for one that they set."""

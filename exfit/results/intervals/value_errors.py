@@ -98,11 +98,11 @@ def allowing_for_bias(
 
     That bias was taken out: it is as uncertain as the variance of the noise.
     """
-    from exfit.inference.whitening import BIAS_KNOWN_TO
-
     residuals = problem.residuals
     if all(experiment.whitening is None for experiment in residuals.experiments):
         return uncertainty
+    from exfit.inference.whitening import BIAS_KNOWN_TO
+
     jacobian = residuals.errors(theta)[1]
     bias = np.linalg.lstsq(jacobian, -residuals.shift, rcond=UNSEEN)[0]
     sizes = linearisation(problem, theta, of_record).own_size

@@ -13,15 +13,7 @@ from math import inf, isfinite
 from exfit.case.case import Case
 from exfit.registry import parts
 from exfit.results.verdict import Cause
-from exfit.verdict.causes.channels import (
-    clipped_channel,
-    unsteady_record,
-    wrong_levels,
-    wrong_offset,
-    wrong_scale,
-    wrong_start,
-    wrong_voltage,
-)
+from exfit.verdict.causes.channels import unsteady_record, wrong_levels, wrong_voltage
 from exfit.verdict.causes.evidence import (
     Evidence,
     FittedRecord,
@@ -30,17 +22,7 @@ from exfit.verdict.causes.evidence import (
     Recogniser,
     Suspicion,
 )
-from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
-from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
-from exfit.verdict.causes.unit import (
-    fixed_values,
-    machine_data,
-    narrow_bound,
-    not_ended,
-    typical_values,
-    with_model,
-    wrong_limit,
-)
+from exfit.verdict.causes.unit import typical_values, with_model
 
 __all__ = ["Evidence", "FittedRecord", "Pace", "Recogniser", "Suspicion", "causes_of"]
 
@@ -50,31 +32,6 @@ ALWAYS: Mapping[str, Recogniser] = {
     "levels at rest": wrong_levels,
     "typical values": typical_values,
 }
-WITHOUT_TRIAL: Mapping[str, Recogniser] = {
-    "iterations": not_ended,
-    "unit of the time": other_clock,
-    "spikes": spiky_channel,
-    "ripple": ripple,
-    "drift": drift,
-    "level of vt": wrong_voltage,
-    "rest before the step": unsteady_record,
-    "typical values": typical_values,
-}
-BY_TRIAL: Mapping[str, Recogniser] = {
-    "sign of the step": wrong_sign,
-    "size of the step": wrong_size,
-    "instant of the step": wrong_instant,
-    "base of a channel": wrong_scale,
-    "zero of a channel": wrong_offset,
-    "vt0": wrong_start,
-    "clipped channel": clipped_channel,
-    "bounds": narrow_bound,
-    "machine data": machine_data,
-    "other fixed values": fixed_values,
-    "limits": wrong_limit,
-    "further step": further_step,
-}
-AFTER_TRIALS: Mapping[str, Recogniser] = {"recorder that averages": averaging}
 FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
 
 
@@ -85,9 +42,10 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     Where an interruption or its pace ends the search for them, they are those found by then.
     """
     nothing_to_explain = matched or evidence.interrupted
-    recognisers = recognisers_of(evidence.case)
     if nothing_to_explain:
         recognisers = {**ALWAYS, **_of_events("CAUSES_AT_REST", evidence.case)}
+    else:
+        recognisers = {**recognisers_of(evidence.case)}
     pace, found = evidence.pace, dict[Recogniser, list[Suspicion]]()
     try:
         for done, recognise in enumerate(recognisers.values()):
@@ -107,6 +65,8 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
 
 def recognisers_of(case: Case) -> Mapping[str, Recogniser]:
     """List what looks for the causes of a misfit in turn, the recorder's last."""
+    from exfit.verdict.causes.recognisers import AFTER_TRIALS, BY_TRIAL, WITHOUT_TRIAL
+
     at_rest = _of_events("CAUSES_AT_REST", case)
     of_events = _of_events("CAUSES_OF_EVENTS", case)
     return {**WITHOUT_TRIAL, **at_rest, **of_events, **BY_TRIAL, **AFTER_TRIALS}
@@ -125,11 +85,13 @@ def _credible(
 
     One device measures what drives the unit and what is compared, over the same windows.
     """
+    if not evidence.case.kind.finds_rest:
+        return [each for own in found.values() for each in own]
+    from exfit.verdict.causes.recorder import averaging
+
     others = [each for recognise, own in found.items() if recognise != averaging for each in own]
-    averages = found.get(averaging, ())
-    if evidence.case.kind.finds_rest:
-        most = max((each.likelihood for each in others if isfinite(each.likelihood)), default=-inf)
-        averages = [each for each in averages if each.likelihood > most]
+    most = max((each.likelihood for each in others if isfinite(each.likelihood)), default=-inf)
+    averages = [each for each in found.get(averaging, ()) if each.likelihood > most]
     return [*others, *averages]
 
 

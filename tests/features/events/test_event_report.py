@@ -113,7 +113,7 @@ def test_what_integrates_a_recorded_voltage_is_no_mode_that_fails_to_decay(resul
     (of_tests, *_) = result.behaviour.small_signal
     for value, passed in ((0.0, True), (0.01, False)):
         pole = Pole(complex(value), -float(value > 0.0), 0.0, ("VI",))
-        view = replace(of_tests.view, poles=(pole, *of_tests.view.poles))
-        behaviour = replace(result.behaviour, small_signal=(replace(of_tests, view=view),))
+        view = of_tests.view._replace(poles=(pole, *of_tests.view.poles))
+        behaviour = result.behaviour._replace(small_signal=(of_tests._replace(view=view),))
         damping = usability(replace(result, behaviour=behaviour))[2]
         assert damping.passed is passed

@@ -33,7 +33,7 @@ def with_errors(result, errors, unseen=None, more=0, **changes):
 
     def beside(errors):
         overlay = Overlay(np.zeros(len(errors)), errors)
-        channel = replace(result.comparison.channels["vt"], rmse=overlay.rmse)
+        channel = result.comparison.channels["vt"]._replace(rmse=overlay.rmse)
         return replace(result.comparison, channels={"vt": channel}, overlays={"vt": overlay})
 
     names = [f"extra{k}" for k in range(more)]
@@ -163,7 +163,7 @@ def test_a_search_that_has_not_ended_well_neither_refutes_nor_is_refuted(result)
 
 def test_models_none_of_which_matches_are_reported(result):
     errors = 1e-3 * white(1)
-    missed = replace(result.verdict, verdict="misses the record")
+    missed = result.verdict._replace(verdict="misses the record")
     fits = {
         "A": with_errors(result, errors, verdict=missed),
         "B": with_errors(result, 2.0 * errors, verdict=missed),

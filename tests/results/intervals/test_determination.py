@@ -174,7 +174,7 @@ def test_a_local_search_has_no_profiles_and_no_interval_where_linear_theory_does
 def test_a_search_that_ended_nowhere_has_no_intervals():
     setups, problem = fitted(case_of("first_order"))
     found = local_end(problem.compressed)
-    best = replace(found, success=False)
+    best = found._replace(success=False)
     uncertainty = determination(
         problem, SearchResult(best, None, (), best), setups, True, lambda _: None
     ).uncertainty
@@ -208,7 +208,7 @@ def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
         result = search(case, problem, *rest)
         x = result.best.x + np.array([0.0, 5e-7])
         cost = 0.5 * float(np.sum(problem.compressed(x) ** 2))
-        return result._replace(best=replace(result.best, x=x, cost=cost), minima=None, place=None)
+        return result._replace(best=result.best._replace(x=x, cost=cost), minima=None, place=None)
 
     monkeypatch.setattr(
         "exfit.results.intervals.determination.not_served_by_linear_theory", lambda *_: ("a",)

@@ -195,8 +195,8 @@ def test_what_weighs_most_comes_first(found):
         for name, times in value.matters_to.items():
             assert times == pytest.approx(abs(value.shifts[name]) / half_width(found, name))
             assert times > 1.0
-    moved = replace(
-        value, shifts={"a": 0.5, "b": -3.0, "c": 0.12345}, matters_to=dict.fromkeys("abc")
+    moved = value._replace(
+        shifts={"a": 0.5, "b": -3.0, "c": 0.12345}, matters_to=dict.fromkeys("abc")
     )
     fitted_values = {"a": 2.0, "b": 1.0, "c": 0.0}
     assert moved_parameters(moved, fitted_values) == "a by 25 %, b by more than 100 % and c by 0.12"

@@ -108,7 +108,7 @@ def test_without_errors_of_values_nothing_changes():
 def widened(uncertainty, interval, shift, case, method="profile"):
     """Return what is known of k with another interval, widened by an error that moves k."""
     problem, theta = minimum(case)
-    own = replace(uncertainty.confidence.parameters["k"], interval=interval, method=method)
+    own = uncertainty.confidence.parameters["k"]._replace(interval=interval, method=method)
     confidence = replace(uncertainty.confidence, parameters={"k": own})
     errors = ErrorsOfValues({"a": GivenError(A_ERROR, {"k": shift})})
     changed = replace(uncertainty, confidence=confidence)

@@ -13,8 +13,9 @@ from exfit.records.record import Record
 from exfit.registry import parts
 from exfit.results.verdict import MATCHES, MISSES, NOT_CONVERGED
 from exfit.verdict import rule
-from exfit.verdict.causes import WITHOUT_TRIAL, Pace, recognisers_of
+from exfit.verdict.causes import Pace, recognisers_of
 from exfit.verdict.causes.evidence import LEAST_TIME, TIMES_SEARCH, OutOfTime, time_for_causes
+from exfit.verdict.causes.recognisers import WITHOUT_TRIAL
 from exfit.verdict.rule import verdict_of
 from exfit.workflows import fit_run
 

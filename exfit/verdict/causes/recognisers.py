@@ -1,0 +1,49 @@
+"""What looks for the causes of a misfit in turn; a fit that matches does without them."""
+
+from collections.abc import Mapping
+
+from exfit.verdict.causes.channels import (
+    clipped_channel,
+    unsteady_record,
+    wrong_offset,
+    wrong_scale,
+    wrong_start,
+    wrong_voltage,
+)
+from exfit.verdict.causes.evidence import Recogniser
+from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
+from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
+from exfit.verdict.causes.unit import (
+    fixed_values,
+    machine_data,
+    narrow_bound,
+    not_ended,
+    typical_values,
+    wrong_limit,
+)
+
+WITHOUT_TRIAL: Mapping[str, Recogniser] = {
+    "iterations": not_ended,
+    "unit of the time": other_clock,
+    "spikes": spiky_channel,
+    "ripple": ripple,
+    "drift": drift,
+    "level of vt": wrong_voltage,
+    "rest before the step": unsteady_record,
+    "typical values": typical_values,
+}
+BY_TRIAL: Mapping[str, Recogniser] = {
+    "sign of the step": wrong_sign,
+    "size of the step": wrong_size,
+    "instant of the step": wrong_instant,
+    "base of a channel": wrong_scale,
+    "zero of a channel": wrong_offset,
+    "vt0": wrong_start,
+    "clipped channel": clipped_channel,
+    "bounds": narrow_bound,
+    "machine data": machine_data,
+    "other fixed values": fixed_values,
+    "limits": wrong_limit,
+    "further step": further_step,
+}
+AFTER_TRIALS: Mapping[str, Recogniser] = {"recorder that averages": averaging}
