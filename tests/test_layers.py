@@ -54,7 +54,7 @@ SLOW_TO_IMPORT = {
     "numpy.testing",
 }  # fmt: skip
 # what a process loads of exfit, at most: files, and the lines in them
-SIMULATE, LOCAL_FIT = (172, 22_500), (270, 40_000)
+SIMULATE, LOCAL_FIT = (126, 18_900), (190, 34_500)
 
 
 def package(name):

@@ -1,6 +1,6 @@
 """What holds for every run of the estimator: its calls, its log, its end, its failures."""
 
-from dataclasses import FrozenInstanceError, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -376,7 +376,7 @@ def test_unusable_arguments_are_refused(arguments, words):
 def test_neither_the_result_nor_its_log_can_be_changed():
     found = least_squares(line, [3.0])
     for frozen in (found, *found.history):
-        with pytest.raises(FrozenInstanceError):
+        with pytest.raises(AttributeError):
             frozen.cost = 0.0
 
 

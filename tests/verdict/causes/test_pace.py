@@ -12,7 +12,6 @@ from exfit.case.case import Case
 from exfit.records.record import Record
 from exfit.registry import parts
 from exfit.results.verdict import MATCHES, MISSES, NOT_CONVERGED
-from exfit.verdict import rule
 from exfit.verdict.causes import Pace, recognisers_of
 from exfit.verdict.causes.evidence import LEAST_TIME, TIMES_SEARCH, OutOfTime, time_for_causes
 from exfit.verdict.causes.recognisers import WITHOUT_TRIAL
@@ -130,13 +129,14 @@ def test_each_recogniser_may_be_interrupted(evidence, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("stage", "words"), [("residual_tests", NOT_CONVERGED), ("contradictions", MATCHES)]
+    ("stage", "words"),
+    [("rule.residual_tests", NOT_CONVERGED), ("score_tests.contradictions", MATCHES)],
 )
 def test_an_interruption_of_the_tests_never_leaves_a_good_fit(stage, words, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(rule, stage, interrupted)
+    monkeypatch.setattr(f"exfit.verdict.{stage}", interrupted)
     result = workflows.fit(late(0.5))
     assert result.verdict.verdict == words
     assert "interrupted" in result.verdict.reason
