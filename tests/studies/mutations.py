@@ -49,7 +49,7 @@ MODULES = {
         ),
     ),
     "ac8b": (
-        ("exfit/models/exciters/ac8.py", "exfit/models/ac8b.py"),
+        ("exfit/models/exciters/ac8.py", "exfit/models/exciters/ac8b.py"),
         ("tests/models", "tests/test_models.py tests/test_ac.py tests/test_ac_rotating.py"),
     ),
     "small_signal": (
