@@ -163,7 +163,7 @@ def module_of(root: Path, name: str) -> tuple[Path, list[str]]:
 def run(tree: Path, tests: list[str], arguments: list[str], limit: float) -> tuple[bool, float]:
     """Return whether the tests of a tree pass, and how long they took."""
     environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *arguments]
+    command = [sys.executable, "-m", "pytest", "-x", "-q", *arguments]
     begin = time.monotonic()
     try:
         done = subprocess.run(
