@@ -6,7 +6,6 @@ from exfit.models.blocks import (
     exciter,
     exciter_demand,
     field_demand,
-    inf,
     lag,
     limited_lag,
     pi_rest,
@@ -32,18 +31,22 @@ Limits = tuple[Signal, Signal]
 
 
 def regulated(
-    at_error: Limits, at_output: Limits, vb: Signal, s: Signal, u: Signal, p: Signal, d: Signal
+    gates: tuple[Limits, Limits] | None, vb: Signal, s: Signal, u: Signal, p: Signal, d: Signal
 ) -> Signal:
     """Write the slopes into d and return efd.
 
-    Limiters hold the error and the PID's output between two limits; ``vb`` is the supply of the
-    power stage.
+    Limiters hold the error and the PID's output between the limits of two ``gates``, if there are
+    any; ``vb`` is the supply of the power stage.
     """
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = clip(u.vref + u.vs + u.vsum - vc, *at_error)
+    error = u.vref + u.vs + u.vsum - vc
+    if gates is not None:
+        error = clip(error, *gates[0])
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
-    vr, d.VR = limited_lag(clip(vpid, *at_output), s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    if gates is not None:
+        vpid = clip(vpid, *gates[1])
+    vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     efd, d.VE = limited_alternator(vr * vb, vfe, s, u, p)
     return efd
 
@@ -72,7 +75,7 @@ def ac8b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     is at its limit. UEL and OEL are added at the summing point. PSS/E's ESAC8B is
     another model.
     """
-    return regulated((-inf, inf), (-inf, inf), 1.0, s, u, p, d)
+    return regulated(None, 1.0, s, u, p, d)
 
 
 def ac8b_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
@@ -148,7 +151,7 @@ def ac8c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     and the same where no limiter acts. The supply's data are not those of a sample.
     """
     vb = supply(p.KC1 * field_demand(s.VE, u.ifd, p), u, p)
-    return regulated((u.vuel, u.voel), (u.vuel_out, u.voel_out), vb, s, u, p, d)
+    return regulated(((u.vuel, u.voel), (u.vuel_out, u.voel_out)), vb, s, u, p, d)
 
 
 def ac8c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
