@@ -28,7 +28,7 @@ from exfit.fitting.recordings import phasors_of, record_of
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.show import figures, run_folder
-from exfit.util.strategies import STRATEGIES
+from exfit.util.vocabulary import STRATEGIES
 
 DOCS = ROOT / "docs"
 PAGES = {

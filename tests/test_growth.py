@@ -163,7 +163,7 @@ def test_a_plant_is_one_file_one_section_and_one_line(copy):
 
 
 def test_a_strategy_is_its_words_and_its_function(copy):
-    copy.add("exfit/util/strategies.py", '"auto": ', '"twice": "lm, then lm again",\n    ')
+    copy.add("exfit/util/vocabulary.py", '"auto": ', '"twice": "lm, then lm again",\n    ')
     copy.add(
         "exfit/estimate/solver.py",
         '"auto": ',

@@ -34,8 +34,8 @@ from exfit.errors import CaseError
 from exfit.models.sheet import Parameter
 from exfit.plants import KINDS, NETWORK, PlantKind
 from exfit.records.record import Record
-from exfit.util.sources import FITTED, NOT_STATED, TYPICAL, least_certain
 from exfit.util.text import near
+from exfit.util.vocabulary import FITTED, NOT_STATED, TYPICAL, least_certain
 
 
 class GivenValue(NamedTuple):

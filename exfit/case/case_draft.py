@@ -12,8 +12,8 @@ import yaml
 
 from exfit.case.yaml import QUESTION, read_yaml
 from exfit.models.sheet import Parameter
-from exfit.util.sources import SOURCES
 from exfit.util.text import Place, yaml_number
+from exfit.util.vocabulary import SOURCES
 
 COMMENTS_AT = 24  # the column of comments behind short lines
 WIDTH = 80  # columns of a case

@@ -24,7 +24,7 @@ from exfit.cli.options import (
 from exfit.cli.streams import echo, output_is_lost
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.runs.runner import FitSettings
-from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
+from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.case.case import Case

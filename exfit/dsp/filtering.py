@@ -10,8 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import even_step
-from exfit.util.arrays import Array, Mask, Places
-from exfit.util.sorting import median
+from exfit.util.arrays import Array, Mask, Places, median
 
 LOWEST_CUTOFF = 1e-6  # of the sampling rate: the coefficients for a lower one are rounded away
 BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice

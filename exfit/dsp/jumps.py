@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from exfit.dsp.noise import SECOND_DIFFERENCE, spread
-from exfit.util.arrays import Array, Places
-from exfit.util.sorting import distinct, median
+from exfit.util.arrays import Array, Places, distinct, median
 
 Jump = tuple[int, int]  # the samples before and after it
 

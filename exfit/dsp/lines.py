@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.dsp.sampling import even_step
-from exfit.util.arrays import Array, Mask
-from exfit.util.sorting import median
+from exfit.util.arrays import Array, Mask, median
 
 Range = tuple[float, float]
 

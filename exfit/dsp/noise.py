@@ -6,8 +6,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from exfit.util.arrays import Array
-from exfit.util.sorting import distinct, median
+from exfit.util.arrays import Array, distinct, median
 
 NEIGHBOURS = 3  # samples whose median is free of a lone spike
 SECOND_DIFFERENCE = sqrt(6.0)  # spread of x[k-1] - 2 x[k] + x[k+1] over that of white x

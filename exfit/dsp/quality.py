@@ -7,8 +7,7 @@ import numpy as np
 
 from exfit.dsp.filtering import OUTLIER_WINDOW, outliers
 from exfit.dsp.noise import noise
-from exfit.util.arrays import Array, Mask, Places
-from exfit.util.sorting import distinct, median
+from exfit.util.arrays import Array, Mask, Places, distinct, median
 
 EXCERPT, EXCERPT_PARTS = 200_000, 20  # samples that are enough to estimate noise; in parts
 JUMP_SHARE = 0.75  # of a spike's least size: it begins or ends with such a jump

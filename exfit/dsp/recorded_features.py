@@ -19,8 +19,7 @@ import numpy as np
 from exfit.dsp.features import TIMES, Features, RemovedLine, features, features_after, figures_of
 from exfit.dsp.lines import cosine_and_sine, largest_line
 from exfit.dsp.noise import noise
-from exfit.util.arrays import Array, Mask, Places
-from exfit.util.sorting import distinct, median
+from exfit.util.arrays import Array, Mask, Places, distinct, median
 
 SEED = 421  # any: what matters is that a run can be repeated
 DRAWS = 200  # of the noise: enough for the deviation to 5 %

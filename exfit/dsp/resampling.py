@@ -7,8 +7,7 @@ from math import ceil, floor
 import numpy as np
 
 from exfit.dsp.sampling import GAP_STEPS
-from exfit.util.arrays import Array
-from exfit.util.sorting import median
+from exfit.util.arrays import Array, median
 
 OFF_CLOCK = 0.01  # of a sampling step: an instant may lie so far off, as stamps are rounded
 PASSBAND = 0.8  # of half the new rate: up to here a signal stays as it is

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exfit.util.arrays import Array, Mask, Places
-from exfit.util.sorting import distinct, median
+from exfit.util.arrays import Array, Mask, Places, distinct, median
 
 GAP_STEPS = 3.0  # median steps: a longer one is a gap
 MOST_UNEVEN = 0.01  # of a sampling step: steps that differ by more are uneven

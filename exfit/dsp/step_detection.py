@@ -10,8 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import present_samples
-from exfit.util.arrays import Array
-from exfit.util.sorting import median
+from exfit.util.arrays import Array, median
 
 SAMPLES_AT_REST = 10  # before a step: fewer do not determine the level it starts from
 MEDIAN_SAMPLES = 7  # of a running median: three may be spikes

@@ -32,7 +32,7 @@ from exfit.estimate.problem import (
     norm,
 )
 from exfit.estimate.searches import BENDING, USUAL, FullStep, Move, Search, Searches
-from exfit.util.strategies import DEFAULT_STRATEGY
+from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 LULL = 10  # iterations
 CREEP = 1e-6  # of the cost: less than the noise of any record leaves open
@@ -445,7 +445,7 @@ def least_squares(
     in nfev. A trial that is not finite, or whose fun raises ArithmeticError, is rejected. fun is
     never called outside the bounds.
 
-    ``method`` is a name of `exfit.util.strategies.STRATEGIES`, where each is explained.
+    ``method`` is a name of `exfit.util.vocabulary.STRATEGIES`, where each is explained.
 
     x_scale      what counts as one unit of each variable; None or "jac" takes it from the columns
                  of J. Use 1 for logarithms

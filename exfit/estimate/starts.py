@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from exfit.estimate.lockstep import finish_all
 from exfit.estimate.problem import Array, Progress, Result, Steps, Stop, checked
 from exfit.estimate.solver import Descent, NotFinite
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 
 BITS = 30  # of each number
 

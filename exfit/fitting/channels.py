@@ -18,7 +18,7 @@ from exfit.errors import RecordError
 from exfit.fitting.experiment import Array, Channel, Experiment
 from exfit.fitting.recordings import column_of
 from exfit.records.record import Record
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Filtering

@@ -15,7 +15,7 @@ from exfit.fitting.residuals import Residuals, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.simulation.simulator import Simulator
-from exfit.util.strategies import DEFAULT_STRATEGY
+from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
 MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
 from exfit.fitting.descents import Announce, following, stopped
-from exfit.util.strategies import FROM_FURTHER_STARTS
+from exfit.util.vocabulary import FROM_FURTHER_STARTS
 
 Array = NDArray[np.float64]
 Way = Literal["strategy", "linear", "direct"]

@@ -42,7 +42,7 @@ from exfit.plants import REFERENCES
 from exfit.records.reading import read_record
 from exfit.records.record import Record
 from exfit.simulation.inputs import RecordedInput
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 from exfit.util.text import show
 
 Array = NDArray[np.float64]

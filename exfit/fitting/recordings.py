@@ -32,7 +32,7 @@ from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
 from exfit.records.units import base_of_own
 from exfit.signals import OF_EVENT, SIGNALS
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 from exfit.util.text import show
 
 if TYPE_CHECKING:

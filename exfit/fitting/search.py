@@ -32,12 +32,12 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import CENTRAL_STEP, ONE_SIDED_STEP, Residuals, SimulationCounter
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
-from exfit.util.strategies import (
+from exfit.util.text import near
+from exfit.util.vocabulary import (
     DEFAULT_STRATEGY,
     SEARCHES,
     STRATEGIES,
 )
-from exfit.util.text import near
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %

@@ -16,7 +16,7 @@ from exfit.fitting.experiment import Array, ExperimentSetup, Values, compared
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import BREAKER
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 
 TRIED, STAGES = 41, 2  # instants in an interval, first in that of the record, then about the best
 REST_BEFORE = 2.0  # s: so long a rest before a step is looked at

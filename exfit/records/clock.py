@@ -10,8 +10,7 @@ import numpy as np
 from exfit.errors import RecordError
 from exfit.records.formats.table import column_error
 from exfit.records.units import SECONDS, alike, bare, usual
-from exfit.util.arrays import Array
-from exfit.util.sorting import median
+from exfit.util.arrays import Array, median
 from exfit.util.text import LARGEST
 
 TIMESTAMP_NAME = re.compile(  # date and time of day in one column

@@ -9,7 +9,7 @@ import numpy as np
 from exfit.dsp.features import LABELS, TIMES, Features
 from exfit.results.comparisons import Comparison
 from exfit.results.validation_result import Reported
-from exfit.util.criteria import Criteria
+from exfit.util.vocabulary import Criteria
 
 NAMES = {name: (label, unit) for label, name, unit in LABELS}
 NOT_REACHED = "the simulated response does not show it"

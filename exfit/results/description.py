@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from exfit import __version__
 from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
 from exfit.simulation.small_signal import SmallSignal
-from exfit.util.sources import NOT_STATED, TYPICAL
+from exfit.util.vocabulary import NOT_STATED, TYPICAL
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
 # their parameters are named machine.Tpd0

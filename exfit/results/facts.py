@@ -8,8 +8,8 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from exfit.util.sources import NOT_STATED
 from exfit.util.text import show
+from exfit.util.vocabulary import NOT_STATED
 
 Facts = Mapping[str, float | str]
 

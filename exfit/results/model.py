@@ -26,10 +26,9 @@ from exfit.results.description import (
 )
 from exfit.results.influences import TypicalValue, WindowSpread
 from exfit.results.verdict import NO_MATCH, Verdict
-from exfit.util.criteria import Criteria
-from exfit.util.sources import TYPICAL
 from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE, KEY, plain
+from exfit.util.vocabulary import TYPICAL, Criteria
 
 if TYPE_CHECKING:
     from exfit.show.notebook import Figure

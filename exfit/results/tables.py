@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.results.comparisons import Comparison, IterationResponses
-from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import yaml_number
+from exfit.util.vocabulary import NOT_STATED, SOURCES
 
 if TYPE_CHECKING:
     from exfit.inference.identifiability import ParameterEffect

@@ -19,7 +19,7 @@ from exfit.results.description import Behaviour
 from exfit.results.model import FitResult
 from exfit.results.tables import DIGITS, clock_digits
 from exfit.simulation.small_signal import Bode
-from exfit.util.sorting import distinct
+from exfit.util.arrays import distinct
 
 if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult

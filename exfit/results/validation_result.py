@@ -16,8 +16,8 @@ from exfit.results.description import (
 )
 from exfit.results.influences import TypicalValue
 from exfit.results.model import FitResult, FittedParameter
-from exfit.util.criteria import Criteria
 from exfit.util.typed import IN_FILE, KEY
+from exfit.util.vocabulary import Criteria
 
 
 @dataclass(frozen=True, eq=False)

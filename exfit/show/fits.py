@@ -27,8 +27,8 @@ from exfit.show.blocks import (
     unresolved,
 )
 from exfit.show.validations import comparisons, in_a_line, played, rejections
-from exfit.util.sources import by_source
 from exfit.util.text import percentage
+from exfit.util.vocabulary import by_source
 
 if TYPE_CHECKING:
     from exfit.workflows.profiles import Profiles

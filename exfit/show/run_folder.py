@@ -27,8 +27,8 @@ from exfit.util.file_names import (
 )
 from exfit.util.files import read_json, write_together
 from exfit.util.interrupts import deferred_interrupts
-from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
+from exfit.util.vocabulary import PHASES
 
 if TYPE_CHECKING:
     from exfit.fitting.uncertainty import UncertaintyAnalysis

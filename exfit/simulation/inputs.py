@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.simulation.interpolation import ON_GRID, GridSegment
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from exfit.simulation.substeps import (
     substeps_for,
     why_unreachable,
 )
-from exfit.util.sorting import distinct
+from exfit.util.arrays import distinct
 
 if TYPE_CHECKING:
     from exfit.simulation.directions import Moves

@@ -1,9 +1,33 @@
-"""Arrays by what they hold."""
+"""Arrays by what they hold; medians and distinct values without the masked arrays of NumPy."""
+
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.intp]
+
+
+def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
+    """Return the median along an axis, nan where a sample is.
+
+    The same numbers as `np.median`, which imports numpy.ma: an eighth of the time of a short fit.
+    """
+    samples = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    count = samples.shape[-1]
+    low, high = (count - 1) // 2, count // 2
+    parted = np.partition(samples, (low, high, count - 1), axis=-1)
+    middle = 0.5 * (parted[..., low] + parted[..., high])
+    middle = np.where(np.isnan(parted[..., -1]), np.nan, middle)
+    return np.expand_dims(middle, axis) if keepdims else middle[()]
+
+
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the distinct values of an array in ascending order, as `np.unique` does."""
+    ordered = np.sort(values, axis=None)
+    first = np.ones(len(ordered), dtype=np.bool_)
+    first[1:] = ordered[1:] != ordered[:-1]
+    return ordered[first]

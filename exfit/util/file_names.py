@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from unicodedata import normalize
 
-from exfit.util.strategies import PHASES
+from exfit.util.vocabulary import PHASES
 
 # cf. Microsoft, "Naming Files, Paths, and Namespaces": reserved with any ending, also these digits
 PORTS = [f"{port}{digit}" for port in ("com", "lpt") for digit in "0123456789\u00b9\u00b2\u00b3"]

@@ -17,7 +17,7 @@ from exfit.fitting.noise import LEAST_NOISE, noise_shape, propagated_noise, scat
 from exfit.inference.noise import effective_samples, whiteness
 from exfit.inference.quantiles import chi_square_tail
 from exfit.results.verdict import ResidualTests
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 from exfit.verdict.causes import Evidence, FittedRecord
 
 Array = NDArray[np.float64]

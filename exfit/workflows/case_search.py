@@ -42,8 +42,8 @@ from exfit.results.intervals.determination import (
     without_linear_intervals,
 )
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
-from exfit.util.strategies import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
 from exfit.util.text import digits
+from exfit.util.vocabulary import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
 from exfit.workflows.responses import aligned, validation_of
 
 Array = NDArray[np.float64]

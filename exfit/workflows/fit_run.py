@@ -33,7 +33,7 @@ from exfit.results.intervals.value_errors import (
 )
 from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FitResult, FittedParameter, Iteration
-from exfit.util.criteria import Criteria
+from exfit.util.vocabulary import Criteria
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.causes.evidence import time_for_causes
 from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tolerance_notes

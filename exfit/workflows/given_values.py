@@ -14,8 +14,8 @@ from exfit.errors import CaseError
 from exfit.fitting.nuisances import names_of
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
-from exfit.util.sources import SOURCES
 from exfit.util.text import magnitude_fault, near
+from exfit.util.vocabulary import SOURCES
 
 if TYPE_CHECKING:
     from exfit.results.description import GivenInPlace

@@ -38,7 +38,7 @@ from exfit.simulation.inputs import Inputs
 from exfit.simulation.limits import limits_hit
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import small_signal
-from exfit.util.strategies import PHASES
+from exfit.util.vocabulary import PHASES
 from exfit.workflows.case_description import fixed_values
 
 Array = NDArray[np.float64]

@@ -25,9 +25,8 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
 from exfit.results.description import OtherProgram, RecordedTest
 from exfit.results.validation_result import ValidationResult
-from exfit.util.criteria import Criteria
 from exfit.util.file_names import folded
-from exfit.util.sources import NOT_STATED
+from exfit.util.vocabulary import NOT_STATED, Criteria
 from exfit.verdict.diagnostics import causes_before_fit
 from exfit.verdict.run_quality import (
     step_error_notes,

@@ -7,7 +7,7 @@ from places import ROOT
 from exfit.case.case import Case
 from exfit.case.json_schema import json_schema
 from exfit.errors import CaseError
-from exfit.util.sources import LEAST_CERTAIN_FIRST, NOT_STATED, SOURCES, least_certain
+from exfit.util.vocabulary import LEAST_CERTAIN_FIRST, NOT_STATED, SOURCES, least_certain
 
 NETWORK = {"f0": 60, "X": 0.3, "P": 0.5, "Q": 0.1}
 CONTENT = {

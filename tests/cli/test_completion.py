@@ -13,7 +13,7 @@ from commands import COMMANDS
 import exfit
 from exfit.models import GOVERNORS, LIMITERS, MACHINE_NAMES, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.util.strategies import STRATEGIES
+from exfit.util.vocabulary import STRATEGIES
 
 pytestmark = pytest.mark.long  # a shell is started for each answer
 

@@ -18,8 +18,8 @@ from exfit.estimate import least_squares
 from exfit.estimate.linear import bounded_minimum
 from exfit.estimate.searches import ArmijoDamping, FullStep, LineSearch, RatioDamping, TrustRegion
 from exfit.estimate.solver import STRATEGIES
-from exfit.util.strategies import PHASES
-from exfit.util.strategies import STRATEGIES as EXPLANATIONS
+from exfit.util.vocabulary import PHASES
+from exfit.util.vocabulary import STRATEGIES as EXPLANATIONS
 
 EVERY_METHOD = list(STRATEGIES)
 SAFE_METHODS = [method for method in STRATEGIES if method != "gn"]  # full steps may diverge

@@ -9,7 +9,7 @@ import pytest
 from exfit.dsp.features import features
 from exfit.results.comparisons import Comparison, Overlay, PlayedRecord, StepFeatures, match_of
 from exfit.results.criteria import judged_by_criteria
-from exfit.util.criteria import Criteria
+from exfit.util.vocabulary import Criteria
 
 TIME = np.arange(0.0, 10.0, 0.01)
 STEP = 0.05  # pu, at 1 s

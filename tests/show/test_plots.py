@@ -21,7 +21,7 @@ from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.results.verdict import GOOD, Verdict
 from exfit.show import figures as plots
 from exfit.simulation.simulator import Response
-from exfit.util.strategies import PHASES
+from exfit.util.vocabulary import PHASES
 
 TIME = np.linspace(0.0, 2.0, 41)
 RISE = np.where(TIME < 1.0, 1.0, 1.05)

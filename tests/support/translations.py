@@ -8,7 +8,7 @@ import exfit
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.util.sources import TYPICAL
+from exfit.util.vocabulary import TYPICAL
 
 MACHINE = {
     "Tpd0": 6.0, "Tppd0": 0.035, "Xd": 1.8, "Xpd": 0.3, "Xppd": 0.25, "Xl": 0.2, "S10": 0.12,

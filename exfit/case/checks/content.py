@@ -30,7 +30,7 @@ from exfit.case.parts import ANY_PLANT, Parts, kind_of, network_part, plants_of_
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
 from exfit.plants import KINDS, REFERENCES, PlantKind
-from exfit.util.strategies import DEFAULT_SEARCH
+from exfit.util.vocabulary import DEFAULT_SEARCH
 
 OF_EXCITER = ("model", "saturation", "efd_times_speed", "stabiliser", "governor")
 EQUIPMENT = ("stabiliser", "governor", "limiters")

@@ -31,8 +31,8 @@ from exfit.models import find
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
 from exfit.plants import GOVERNOR, PlantKind
-from exfit.util.sources import TYPICAL
 from exfit.util.text import Place, near, show, show_value
+from exfit.util.vocabulary import TYPICAL
 
 
 def bound_faults(section: ContentNode) -> Iterator[Fault]:

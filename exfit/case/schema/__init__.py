@@ -60,7 +60,7 @@ from exfit.case.schema.values import (
     nothing,
     start_value,
 )
-from exfit.util.criteria import Criteria
+from exfit.util.vocabulary import Criteria
 
 __all__ = [
     "MOST_ROWS",

@@ -22,7 +22,7 @@ from exfit.case.schema.values import (
     nothing,
     section_or_number,
 )
-from exfit.util.strategies import (
+from exfit.util.vocabulary import (
     DEFAULT_SEARCH,
     DEFAULT_STRATEGY,
     EXPLAINED,

@@ -37,8 +37,8 @@ from exfit.features.fleet.task import FurtherFiles
 from exfit.runs.runner import FitSettings
 from exfit.util.interrupts import endings_as_interruptions
 from exfit.util.processes import processors
-from exfit.util.strategies import SEARCHES, STRATEGIES
 from exfit.util.text import near
+from exfit.util.vocabulary import SEARCHES, STRATEGIES
 
 TIME_LIMIT = 3600.0  # s: of a case
 MOST_TABLES = 5  # until those are left to another run that goes on in the folder

@@ -10,7 +10,7 @@ import click
 
 from exfit.cli.options import NOT_CONVERGED, Interruption, print_json
 from exfit.errors import ExfitError
-from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
+from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.features.fleet.batch import CaseMaking

@@ -12,8 +12,8 @@ from exfit.cli.options import file_option, force_option, refuse_existing, warn, 
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
-from exfit.util.sources import FITTED
 from exfit.util.text import first_texts
+from exfit.util.vocabulary import FITTED
 
 if TYPE_CHECKING:
     from exfit.features.fleet.folder import Fleet

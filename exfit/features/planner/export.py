@@ -37,8 +37,8 @@ from exfit.models.sheet import DynamicsRecord
 from exfit.results.influences import by_weight, first_of
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
-from exfit.util.sources import NOT_STATED, TYPICAL, by_source
 from exfit.util.text import near, show
+from exfit.util.vocabulary import NOT_STATED, TYPICAL, by_source
 
 NAME = re.compile(r"[A-Za-z_][\w.]*")  # in a tie
 CODES = {signal: code for code, signal in SIGNALS.items()}

@@ -26,8 +26,8 @@ from exfit.features.planner.records import (
 from exfit.features.planner.units import DynamicsUnits, Unit, read_units
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
-from exfit.util.sources import TYPICAL
 from exfit.util.text import show
+from exfit.util.vocabulary import TYPICAL
 
 DIGITS = 6  # significant, of a number that is written: more than any interval resolves
 SAME = 1e-9  # of a value: written in decimals and read again

@@ -17,7 +17,7 @@ from exfit.features.planner.units import DynamicsUnits, Unit, read_unit, read_un
 from exfit.features.start.starting_case import PartData, UnitData, inputs_section
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.util.files import read_limited
-from exfit.util.sources import TYPICAL
+from exfit.util.vocabulary import TYPICAL
 
 LARGEST_FILE = 32_000_000  # bytes; that of a whole interconnection has fewer
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}

@@ -30,7 +30,7 @@ from exfit.records.units import alike
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.runs.runner import AS_CASES_SAY, FitSettings, run_in_turn
-from exfit.util.sources import FITTED, LEAST_CERTAIN_FIRST, NOT_STATED
+from exfit.util.vocabulary import FITTED, LEAST_CERTAIN_FIRST, NOT_STATED
 from exfit.workflows.case_description import parts_of
 from exfit.workflows.given_values import with_given_values
 from exfit.workflows.model_check import Check

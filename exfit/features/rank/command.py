@@ -15,7 +15,7 @@ from exfit.cli.options import (
     output_options,
     print_json,
 )
-from exfit.util.strategies import SEARCHES, SEARCHES_EXPLAINED
+from exfit.util.vocabulary import SEARCHES, SEARCHES_EXPLAINED
 
 if TYPE_CHECKING:
     from exfit.show.figure_files import FigureFiles

@@ -29,8 +29,8 @@ from exfit.show.blocks import (
     columns,
     row,
 )
-from exfit.util.sources import NOT_STATED, by_source
 from exfit.util.text import rounded, show
+from exfit.util.vocabulary import NOT_STATED, by_source
 
 TYPES = {"DC": "DC commutator exciter", "AC": "alternator exciter", "ST": "static exciter"}
 MACHINE_DATA = {  # by the letter that the symbols begin with

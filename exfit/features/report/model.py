@@ -30,7 +30,7 @@ from exfit.show.blocks import (
     remarks,
     row,
 )
-from exfit.util.criteria import ORIGIN, Criteria
+from exfit.util.vocabulary import ORIGIN_OF_CRITERIA, Criteria
 
 Row = tuple[Cell, ...]
 
@@ -264,7 +264,7 @@ def criteria(result: Reported) -> Iterator[Block]:
         heads = columns(*titles, numbers=("difference", "limit"))
         yield Table(heads, tuple(rows), "Criteria: simulated minus recorded")
     own = "The case gives limits of its own. " if result.criteria != Criteria() else ""
-    yield Note(f"{own}{ORIGIN}.")
+    yield Note(f"{own}{ORIGIN_OF_CRITERIA}.")
 
 
 def findings(result: Reported) -> Iterator[Block]:

@@ -41,8 +41,8 @@ from exfit.show.blocks import (
     row,
 )
 from exfit.signals import label_of
-from exfit.util.strategies import HISTORY_PHASES
 from exfit.util.text import show
+from exfit.util.vocabulary import HISTORY_PHASES
 
 Array = NDArray[np.float64]
 

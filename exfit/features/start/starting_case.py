@@ -45,8 +45,8 @@ from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.records.contradictions import shows_power
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import tests_of
-from exfit.util.sources import TYPICAL
 from exfit.util.text import first_texts
+from exfit.util.vocabulary import TYPICAL
 
 VALIDATION_TO_COME = Remark("""\
 validate:               # a record that the fit does not see, as the step down

@@ -22,8 +22,8 @@ from exfit.results.model import FitResult
 from exfit.results.tables import table
 from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.files import write_together
-from exfit.util.sources import FITTED, SOURCES
 from exfit.util.text import to_json
+from exfit.util.vocabulary import FITTED, SOURCES
 
 SAMPLES, TRANSLATION = FILES = ("translation.csv", "translation.json")
 TEST: Mapping[str, Any] = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}

@@ -7,8 +7,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.typed import IN_FILE, plain
+from exfit.util.vocabulary import NOT_STATED, TYPICAL
 
 Array = NDArray[np.float64]
 

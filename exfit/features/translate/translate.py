@@ -46,7 +46,7 @@ from exfit.results.io import load_result
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.simulation.small_signal import small_signal
-from exfit.util.sources import NOT_STATED, least_certain
+from exfit.util.vocabulary import NOT_STATED, least_certain
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

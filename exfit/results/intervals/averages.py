@@ -28,7 +28,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval
 from exfit.results.influences import STRONG, RecorderAverages
 from exfit.results.intervals.minima import own_values, variance_of
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 
 Array = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from exfit.show.figures.style import (
     tidy,
 )
 from exfit.signals import label_of
-from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE
+from exfit.util.vocabulary import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE
 from exfit.workflows.profiles import Profiles
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
-from exfit.util.sorting import median
+from exfit.util.arrays import median
 from exfit.verdict.causes.evidence import (
     CERTAIN,
     LAST,

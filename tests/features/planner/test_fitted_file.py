@@ -33,7 +33,7 @@ from exfit.features.planner.units import read_units
 from exfit.models.sheet import typical
 from exfit.results.comparisons import AsFound
 from exfit.results.model import FittedParameter
-from exfit.util.sources import FITTED, TYPICAL
+from exfit.util.vocabulary import FITTED, TYPICAL
 
 DEFINITIONS = {
     definition.record.name: definition

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.util.sorting import distinct, median
+from exfit.util.arrays import distinct, median
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 10, 101])

@@ -1,0 +1,82 @@
+"""What case, result and report share: words of sources, strategies and searches, criteria."""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+TYPICAL = "typical"
+FITTED = "fitted"
+NOT_STATED = "not stated"  # of a given value without a source
+SOURCES = ("nameplate", "maker", "test report", "measured", TYPICAL, FITTED)  # that a case may give
+# of several values the first of these is the source of what follows from them all
+LEAST_CERTAIN_FIRST = (TYPICAL, NOT_STATED, FITTED, "measured", "test report", "maker", "nameplate")
+
+# the functions of the strategies stand in `exfit.estimate.solver`
+PHASES: Mapping[str, str] = {
+    "lm": "Levenberg-Marquardt",
+    "dgn": "damped Gauss-Newton",
+    "gn": "Gauss-Newton",
+}
+FROM_FURTHER_STARTS = "search"  # in the history: the point that the search from them found
+WEIGHTED_BY_NOISE = "noise"  # in the history: the point where errors are weighted by its covariance
+HISTORY_PHASES: Mapping[str, str] = {
+    **PHASES,
+    FROM_FURTHER_STARTS: "found from further starts",
+    WEIGHTED_BY_NOISE: "weighted by the noise of the driving signals",
+}
+STRATEGIES: Mapping[str, str] = {
+    "gn": "Gauss-Newton with full steps (a first one that fails is shortened once)",
+    "dgn": "damped Gauss-Newton: each step capped, then shortened until Armijo's rule holds",
+    "lm": "Levenberg-Marquardt",
+    "lm-then-dgn": "lm to reach a better start, then dgn, and lm again where that stalls",
+    "auto": "dgn; where noise or validation casts doubt on its match lm-then-dgn",
+    "robust": "gn while it makes progress, then lm",
+}
+DEFAULT_STRATEGY = "lm-then-dgn"
+SEARCHES: Mapping[str, str] = {
+    "global": "the descent from the start of the case by its strategy, then further descents from "
+    "points distributed over the bounds; the lowest minimum is the result, or one that the records "
+    "do not tell from it if the validations hold on that one alone",
+    "local": "the descent from the start of the case alone",
+}
+DEFAULT_SEARCH = "global"
+EXPLAINED = "; ".join(f"{name}: {words}" for name, words in STRATEGIES.items())
+SEARCHES_EXPLAINED = "; ".join(f"{name}: {words}" for name, words in SEARCHES.items())
+
+ORIGIN_OF_CRITERIA = (
+    "The defaults are those of exfit, of the order that operators ask for: a tenth of the change "
+    "that was recorded, and less at rest (cf. AEMO, Power System Model Guidelines, on the accuracy "
+    "of models). The standard itself gives none (cf. NERC MOD-026-1)"
+)
+
+
+class Criteria(NamedTuple):
+    """The largest differences between simulated and recorded response that meet a criterion.
+
+    rmse           rms of the difference, % of the change that was recorded
+    final_value    % of that change
+    overshoot      % of that change
+    rise_time      % of the recorded time, as are peak_time and settling_time
+    time           s: a time that differs by no more meets its criterion
+    """
+
+    rmse: float = 5.0
+    final_value: float = 2.0
+    overshoot: float = 5.0
+    rise_time: float = 10.0
+    peak_time: float = 10.0
+    settling_time: float = 20.0
+    time: float = 0.02
+
+
+def least_certain(sources: Iterable[str]) -> str:
+    """Return the source of a value that follows from others, given theirs."""
+    among = set(sources)
+    return next((source for source in LEAST_CERTAIN_FIRST if source in among), NOT_STATED)
+
+
+def by_source(names: Iterable[str], sources: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return names by the source of their values, in the order in which these first appear."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(sources.get(name, NOT_STATED), []).append(name)
+    return groups
