@@ -45,7 +45,7 @@ def faults(environment: Mapping[str, str]) -> Iterator[str]:
         from exfit.engine.kernel import target
 
         if target() != (cpu, ""):
-            yield f"machine code is made for {target().cpu}, not for {cpu}"
+            yield f"machine code is made for {target()[0]}, not for {cpu}"
 
 
 def openblas_cores() -> set[str]:
