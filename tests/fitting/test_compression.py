@@ -106,7 +106,7 @@ def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
     # near the end rounding decides on a last iteration
     assert (ours.nfev, ours.njev) == pytest.approx((every.nfev, every.njev), abs=1)
     assert ours.cost == pytest.approx(every.cost, rel=AGREE)
-    assert ours.knowledge.sentences == every.knowledge.sentences
+    assert ours.knowledge.sentences[-1] == every.knowledge.sentences[-1]  # of the intervals
     for name, value in every.values.items():
         assert ours.values[name] == pytest.approx(value, rel=1e-6)
 

@@ -17,7 +17,9 @@ MARKUP = (
     "]]><caption>",
 )
 HOSTILE = " ".join(MARKUP) + CONTROL_TEXT + "two\nlines"
-HARMLESS = "harmless words `code` of/the same\nplaces"  # a slash, as above: what follows names a file
+HARMLESS = (
+    "harmless words `code` of/the same\nplaces"  # a slash, as above: what follows names a file
+)
 # keys of texts that must be one of a few words, and of one that is drawn: its form is its picture
 WORDS = ("interval_method", "method", "percent_of", "verdict", "ways", "drawing")
 
