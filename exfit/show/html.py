@@ -127,6 +127,16 @@ def _of_column(column: TableColumn) -> Iterator[str]:
     yield "aside" if column.expendable else ""
 
 
+def _of_cell(column: TableColumn, cell: Cell) -> Iterator[str]:
+    if column.folds:
+        yield "text"
+        yield "break" if any(len(word) > LONG_WORD for word in cell.text.split()) else ""
+    if cell.mark == "faint":
+        yield CLASSES[cell.mark]
+    if cell.shade is not None:
+        yield f"{'plus' if cell.shade >= 0 else 'minus'}{abs(cell.shade)}"
+
+
 def _row(table: Table, cells: tuple[Cell, ...]) -> str:
     """Write a row; one that begins with a doubt is shaded."""
     whole = all(cell.mark == "doubt" for cell in cells)
@@ -136,15 +146,9 @@ def _row(table: Table, cells: tuple[Cell, ...]) -> str:
             style = _class(*_of_column(column))
             shown.append(f'<th scope="row"{style}>{_lines(cell.text)}</th>')
             continue
-        styles = [*_of_column(column), "text" if column.folds else ""]
+        styles = [*_of_column(column), *_of_cell(column, cell)]
         if cell.mark == "doubt" and not whole:
             styles[0] = "why"
-        if column.folds and any(len(word) > LONG_WORD for word in cell.text.split()):
-            styles.append("break")
-        if cell.mark == "faint":
-            styles.append(CLASSES[cell.mark])
-        if cell.shade is not None:
-            styles.append(f"{'plus' if cell.shade >= 0 else 'minus'}{abs(cell.shade)}")
         see = _link(cell.see) if cell.see else ""
         shown.append(f"<td{_class(*styles)}>{_marked(cell)}{see}</td>")
     return f"<tr{_class('vague' if cells[0].mark == 'doubt' else '')}>{''.join(shown)}</tr>"

@@ -555,6 +555,7 @@ def stepped_up(**currents):
     return {action.name: action.spans for action in actions}, simulator.response(values).signals
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("oel", "scl", "acting"),
     # the one that waits is far from its limit, or would act if it were alone

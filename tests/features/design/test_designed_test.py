@@ -58,6 +58,7 @@ def test_the_planned_response_keeps_every_limit(design, content):
     assert design.best.steps[-1].at < design.best.duration
 
 
+@pytest.mark.long
 def test_every_addition_lowers_the_criterion(design):
     assert len(design.stages) >= 4
     assert all(after.criterion < before.criterion for before, after in pairwise(design.stages))

@@ -93,6 +93,7 @@ def test_the_intervals_hold_the_truth_and_the_output_says_why(fitted):
     assert "the bias by that noise is taken out" in notes
 
 
+@pytest.mark.long
 def test_weighed_errors_are_white_and_as_large_as_foretold(fitted):
     """Twice the 6 % by which the noise of one signal is known."""
     assert "noise" not in fitted.verdict.reason

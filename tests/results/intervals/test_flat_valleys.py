@@ -38,6 +38,7 @@ def test_nothing_is_said_to_move_to_where_its_profile_or_its_bound_does_not_let_
             assert "orders of magnitude" not in combination.sentence
 
 
+@pytest.mark.long
 def test_minima_in_one_flat_valley_are_named_once_with_what_moves_along_it(vague):
     along = [minimum for minimum in vague.minima.minima if minimum.valley == 0]
     assert len(along) > 1
