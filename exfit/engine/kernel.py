@@ -22,9 +22,8 @@ from exfit.engine.sampling import (
     function,
 )
 from exfit.engine.system import System, trace
+from exfit.util.arrays import Array
 from exfit.util.cache import keep_private, private_cache, read_private
-
-Array = NDArray[np.float64]
 
 SIDE_BY_SIDE = 16  # parameter sets: two vectors of 512 bits hide each other's waiting
 DIRECTIONS = 8  # of differentiation in one run

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
+
 Table = NDArray[np.int64]
 
 # rows of eight bytes each, addresses and counts, of the tables that the loops of `driver` work on

@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.engine.kernel import DIRECTIONS, Array, compiled, text_of
+from exfit.engine.kernel import DIRECTIONS, compiled, text_of
 from exfit.engine.sampling import Courses, Sampler, Sizes
 from exfit.engine.system import System, Trace, trace
 from exfit.engine.trace import TRUTHS, Node, in_order
+from exfit.util.arrays import Array
 
 PARTIAL = ("/", "sqrt", "log", "exp")  # what makes infinity or no number of a number
 

@@ -11,7 +11,6 @@ from exfit.estimate.problem import (
     EPS,
     TINY,
     UNSEEN,
-    Array,
     Box,
     Point,
     Problem,
@@ -20,6 +19,7 @@ from exfit.estimate.problem import (
     TriangleOf,
     norm,
 )
+from exfit.util.arrays import Array
 
 
 def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float = UNSEEN) -> Array:

@@ -19,7 +19,6 @@ import numpy as np
 
 from exfit.estimate.problem import (
     Answer,
-    Array,
     Functions,
     JacobianAt,
     Request,
@@ -28,6 +27,7 @@ from exfit.estimate.problem import (
     Steps,
     TriangleOf,
 )
+from exfit.util.arrays import Array
 from exfit.util.processes import processors
 
 Done = TypeVar("Done")

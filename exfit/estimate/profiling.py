@@ -22,7 +22,6 @@ from exfit.estimate.lockstep import finish, finish_all
 from exfit.estimate.problem import (
     TINY,
     UNSEEN,
-    Array,
     Box,
     Function,
     Functions,
@@ -35,6 +34,7 @@ from exfit.estimate.problem import (
     half_square,
 )
 from exfit.estimate.solver import Descent
+from exfit.util.arrays import Array
 
 FINE = 2e-3  # of the rise: what a refit may leave, a thousandth of the way to the crossing
 MOST_CORRECTIONS = 15  # of a refit: it starts near its end

@@ -12,7 +12,8 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 
 from exfit.estimate.linear import DampedStep, LinearModel, bounded_minimum, solve, step_to
-from exfit.estimate.problem import EPS, TINY, Array, Point, Problem, Steps, Stop, norm
+from exfit.estimate.problem import EPS, TINY, Point, Problem, Steps, Stop, norm
+from exfit.util.arrays import Array
 
 ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
 MOST_TRIALS = 60

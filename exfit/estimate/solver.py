@@ -15,12 +15,10 @@ from exfit.estimate.problem import (
     RELATIVE_STEP,
     STATUS,
     TINY,
-    Array,
     Box,
     Differences,
     EvaluationLimit,
     Functions,
-    Mask,
     OneByOne,
     Point,
     Problem,
@@ -32,6 +30,7 @@ from exfit.estimate.problem import (
     norm,
 )
 from exfit.estimate.searches import BENDING, USUAL, FullStep, Move, Search, Searches
+from exfit.util.arrays import Array, Mask
 from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 LULL = 10  # iterations

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exfit.estimate.lockstep import finish_all
-from exfit.estimate.problem import Array, Progress, Result, Steps, Stop, checked
+from exfit.estimate.problem import Progress, Result, Steps, Stop, checked
 from exfit.estimate.solver import Descent, NotFinite
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 
 BITS = 30  # of each number
 

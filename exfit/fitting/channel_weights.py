@@ -17,10 +17,11 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from exfit.fitting.descents import descent_near
-from exfit.fitting.experiment import Array, Channel, Experiment, ExperimentSetup
+from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals, SimulationCounter
+from exfit.util.arrays import Array
 
 MOST_REWEIGHTINGS = 20  # a handful is enough, unless two channels contradict each other
 MOST_SEARCHES = 3  # with weights of another minimum each: two are rare

@@ -15,10 +15,10 @@ from exfit.case.schema import (
     RecordFile,
 )
 from exfit.errors import RecordError
-from exfit.fitting.experiment import Array, Channel, Experiment
+from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.recordings import column_of
 from exfit.records.record import Record
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Filtering

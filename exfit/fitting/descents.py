@@ -3,15 +3,12 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from exfit.errors import SimulationError
 from exfit.estimate import STATUS, Descent, OneByOne, Result, SolverIteration, Stop
 from exfit.estimate.solver import NotFinite
 from exfit.fitting.residuals import Residuals
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Announce = Callable[[SolverIteration], None]
 
 

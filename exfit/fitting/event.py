@@ -14,13 +14,14 @@ from exfit.dsp.jumps import FEWEST_SAMPLES, jumps_while_moving, rest_end
 from exfit.dsp.sampling import MOST_UNEVEN
 from exfit.errors import RecordError
 from exfit.fitting.channels import with_filter
-from exfit.fitting.experiment import Array, Switching
+from exfit.fitting.experiment import Switching
 from exfit.fitting.nuisances import TURN, Found, Nuisance, prefix_from
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recordings import deviation, record_of
 from exfit.records.record import Record
 from exfit.signals import RESTING
 from exfit.simulation.inputs import InputStep, RecordedInput, SplinedInput
+from exfit.util.arrays import Array
 from exfit.util.text import show
 
 Input = RecordedInput | SplinedInput

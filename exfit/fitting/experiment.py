@@ -16,13 +16,13 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.records.record import Record
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Response, Simulator
+from exfit.util.arrays import Array
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Averages, Filtering
     from exfit.fitting.sines import Sine
     from exfit.inference.whitening import Whitening
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 from exfit.errors import SimulationError
 from exfit.estimate import Descent, spread
-from exfit.fitting.experiment import Array, Experiment
+from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import Way
 from exfit.fitting.problem import FitProblem, compressed
 from exfit.fitting.residuals import Residuals, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.simulation.simulator import Simulator
+from exfit.util.arrays import Array
 from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met

@@ -10,13 +10,13 @@ from math import nan
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
 from exfit.fitting.descents import Announce, following, stopped
+from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS
 
-Array = NDArray[np.float64]
 Way = Literal["strategy", "linear", "direct"]
 Doubt = Callable[[Result], str]  # what speaks against an end; "" where nothing does
 

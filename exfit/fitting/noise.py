@@ -8,8 +8,9 @@ import numpy as np
 
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.errors import SimulationError
-from exfit.fitting.experiment import Array, Channel, ExperimentSetup
+from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.simulation.simulator import Simulator
+from exfit.util.arrays import Array
 
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 WHITE_NOISE_SEED = 0

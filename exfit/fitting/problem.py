@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.experiment import Array, Channel, ExperimentSetup, Values
+from exfit.fitting.experiment import Channel, ExperimentSetup, Values
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.simulation.interpolation import NEIGHBOURS, Interpolation
+from exfit.util.arrays import Array
 
 
 class FitProblem(NamedTuple):

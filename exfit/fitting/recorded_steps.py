@@ -10,7 +10,6 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import (
@@ -42,10 +41,8 @@ from exfit.plants import REFERENCES
 from exfit.records.reading import read_record
 from exfit.records.record import Record
 from exfit.simulation.inputs import RecordedInput
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 from exfit.util.text import show
-
-Array = NDArray[np.float64]
 
 INSIDE_INTERVAL = 1e-6  # of it: a sample at its end would be on the other side of the jump
 LEVEL_WITHIN = 0.02  # of the mean of a record at rest: how far the voltage there may be from it

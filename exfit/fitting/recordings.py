@@ -6,7 +6,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.checks.record import BEFORE_RECORD
@@ -32,14 +31,13 @@ from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
 from exfit.records.units import base_of_own
 from exfit.signals import OF_EVENT, SIGNALS
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 from exfit.util.text import show
 
 if TYPE_CHECKING:
     from exfit.records.phasors import Phasors, Status
 
 
-Array = NDArray[np.float64]
 Span = tuple[float, float]
 
 OTHER_CLOCK = 50.0  # between a record and a step: ms, or cycles of the mains, are taken for s

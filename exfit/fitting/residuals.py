@@ -15,10 +15,11 @@ import numpy as np
 from exfit.case.ties import TieError, Ties
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
-from exfit.fitting.experiment import Array, Channel, Experiment
+from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.simulation.substeps import NO_SUBSTEPS
+from exfit.util.arrays import Array
 
 if TYPE_CHECKING:
     from exfit.dsp.robust_loss import Loss

@@ -13,7 +13,7 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import Announce
-from exfit.fitting.experiment import Array, ExperimentSetup
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import (
     METHODS_OF_AUTO,
     NO_JUDGE,
@@ -32,6 +32,7 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import CENTRAL_STEP, ONE_SIDED_STEP, Residuals, SimulationCounter
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
+from exfit.util.arrays import Array
 from exfit.util.text import near
 from exfit.util.vocabulary import (
     DEFAULT_STRATEGY,

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.fitting.experiment import Array, ExperimentSetup, Values, compared
+from exfit.fitting.experiment import ExperimentSetup, Values, compared
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import BREAKER
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 
 TRIED, STAGES = 41, 2  # instants in an interval, first in that of the record, then about the best
 REST_BEFORE = 2.0  # s: so long a rest before a step is looked at

@@ -12,7 +12,7 @@ from exfit.case.schema import RecordFile, Unknown
 from exfit.dsp.lines import Line, cosine_and_sine, largest_line
 from exfit.errors import RecordError
 from exfit.fitting.descents import descent_near
-from exfit.fitting.experiment import Array, Channel, ExperimentSetup, Values
+from exfit.fitting.experiment import Channel, ExperimentSetup, Values
 from exfit.fitting.noise import noise_of
 from exfit.fitting.nuisances import (
     COSINE,
@@ -26,6 +26,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slices
 from exfit.inference.noise import SURPRISING, is_white, whiteness
+from exfit.util.arrays import Array
 from exfit.util.text import digits
 
 

@@ -11,7 +11,7 @@ from exfit.dsp.quality import quantum
 from exfit.dsp.rounding import is_coarse, noise_before_rounding, rounding_waves
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
-from exfit.fitting.experiment import Array, Channel
+from exfit.fitting.experiment import Channel
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference.confidence import (
@@ -29,6 +29,7 @@ from exfit.inference.identifiability import (
     identifiability,
 )
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
+from exfit.util.arrays import Array
 from exfit.util.text import listed
 from exfit.util.typed import IN_FILE, KEY
 

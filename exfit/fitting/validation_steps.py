@@ -21,7 +21,7 @@ from exfit.case.schema import (
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.experiment import Array, ExperimentSetup, Values
+from exfit.fitting.experiment import ExperimentSetup, Values
 from exfit.fitting.recordings import clock_of, read_section
 from exfit.plants import REFERENCES
 from exfit.records.formats import open_table
@@ -34,6 +34,7 @@ from exfit.records.steps import (
     steps_of_record,
     with_sizes,
 )
+from exfit.util.arrays import Array
 from exfit.util.text import show
 
 Test = Mapping[str, Any]  # keys of a test with what they become

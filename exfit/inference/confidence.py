@@ -8,9 +8,10 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from exfit.inference.linear import Array, Factors, Linearisation, factored
+from exfit.inference.linear import Factors, Linearisation, factored
 from exfit.inference.noise import Noise, noise_of
 from exfit.inference.quantiles import student_quantile, wave_quantile
+from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 from exfit.util.typed import IN_FILE
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.inference.confidence import Confidence
-from exfit.inference.linear import Array, Factors, Linearisation, Mask, factored, tall_svd
+from exfit.inference.linear import Factors, Linearisation, factored, tall_svd
 from exfit.inference.noise import Noise
+from exfit.util.arrays import Array, Mask
 from exfit.util.text import digits, listed
 from exfit.util.typed import KEY
 

@@ -10,15 +10,13 @@ from math import exp
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from exfit.util.arrays import Array, Mask
 from exfit.util.text import digits
 
 if TYPE_CHECKING:
     from exfit.inference.noise import Noise
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SMALL = 0.1  # of the interval: bounds usually lie a decade off what a linear parameter may be
 OF_EACH_PARAMETER = (

@@ -6,8 +6,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from exfit.inference.linear import Array, Factors, ResidualBlock
+from exfit.inference.linear import Factors, ResidualBlock
 from exfit.inference.quantiles import chi_square_tail
+from exfit.util.arrays import Array
 from exfit.util.text import digits
 
 SURPRISING = 0.01  # of tests of what is true reject it

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.inference.linear import Array
+from exfit.util.arrays import Array
 
 LEVEL = 0.05  # probability that any of the estimates is called an outlier where there is none
 FEWEST = 4  # estimates: of fewer, nothing says by how much they usually differ

@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from exfit.inference.linear import Array
+from exfit.util.arrays import Array
 
 NODES = 40  # of the quadrature: it is exact to rounding
 NEWTON_ROUNDING = 1e-14  # of the angle: a smaller step changes no digit

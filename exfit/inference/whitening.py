@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.inference.linear import Array
+from exfit.util.arrays import Array
 
 Rows = NDArray[np.intp]
 

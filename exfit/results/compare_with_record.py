@@ -5,7 +5,6 @@ from dataclasses import replace
 from math import nan, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, RemovedLine, features
 from exfit.dsp.recorded_features import FoundByRecord, RecordedResponse, recorded_features
@@ -24,8 +23,8 @@ from exfit.results.comparisons import (
 from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limit_hits import limiter_actions
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 FREQUENCY, HERTZ = "frequency", "Hz"

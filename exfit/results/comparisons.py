@@ -6,14 +6,12 @@ from math import nan
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.features import Features
 from exfit.simulation.limit_hits import LimiterAction
+from exfit.util.arrays import Array
 from exfit.util.text import rounded
 from exfit.util.typed import IN_FILE, KEY
-
-Array = NDArray[np.float64]
 
 POWERS = ("p", "q")  # what a unit gives to the grid
 REFERENCE = "vref, from where vt rests"  # how figures call the reference beside vt

@@ -3,14 +3,12 @@
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison, PlayedRecord
 from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported, ValidationResult
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 UNEVEN = "not one sample for each instant"
 

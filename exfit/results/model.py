@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval, IntervalMethod, closed
@@ -26,6 +25,7 @@ from exfit.results.description import (
 )
 from exfit.results.influences import TypicalValue, WindowSpread
 from exfit.results.verdict import NO_MATCH, Verdict
+from exfit.util.arrays import Array
 from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE, KEY, plain
 from exfit.util.vocabulary import TYPICAL, Criteria
@@ -33,7 +33,6 @@ from exfit.util.vocabulary import TYPICAL, Criteria
 if TYPE_CHECKING:
     from exfit.show.notebook import Figure
 
-Array = NDArray[np.float64]
 
 NEAR = 2.0  # times a cost: below it another one is given to a thousandth
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names

@@ -7,9 +7,9 @@ from math import floor, log10
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.results.comparisons import Comparison, IterationResponses
+from exfit.util.arrays import Array
 from exfit.util.text import yaml_number
 from exfit.util.vocabulary import NOT_STATED, SOURCES
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from exfit.results.comparisons import PhaseEnd
     from exfit.results.model import FitResult
 
-Array = NDArray[np.float64]
 
 HISTORY = (
     "iteration", "phase", "f", "gradient_norm", "step_norm", "damping", "inner", "nfev", "njev",

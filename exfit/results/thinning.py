@@ -19,12 +19,11 @@ from exfit.results.description import Behaviour
 from exfit.results.model import FitResult
 from exfit.results.tables import DIGITS, clock_digits
 from exfit.simulation.small_signal import Bode
-from exfit.util.arrays import distinct
+from exfit.util.arrays import Array, distinct
 
 if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Lines = TypeVar("Lines", Overlay, LeftOut)
 

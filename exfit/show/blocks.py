@@ -8,15 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from exfit.util.arrays import Array
 from exfit.util.text import rounded
 
 if TYPE_CHECKING:
     from exfit.inference.confidence import Interval, Uncertainty
 
-Array = NDArray[np.float64]
 Range = tuple[float, float]
 
 NO_BREAK = "\N{NO-BREAK SPACE}"  # between words that stay in one line

@@ -24,9 +24,9 @@ from exfit.results.verdict import MATCHES, MISSES
 from exfit.runs.fits import FitRun, PlannedFit
 from exfit.runs.fits import Progress as ProgressOfFit
 from exfit.show.terminal import paragraph
+from exfit.util.arrays import Array
 from exfit.workflows.responses import LiveResponse
 
-Array = NDArray[np.float64]
 Dots = NDArray[np.bool_]
 
 MOST_ITERATIONS = 12  # shown at a time

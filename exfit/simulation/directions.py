@@ -13,12 +13,12 @@ from exfit.engine.tangents import tangent_kernel
 from exfit.simulation.inputs import Direction, Inputs
 from exfit.simulation.interpolation import GridSegment
 from exfit.simulation.substeps import NO_SUBSTEPS
+from exfit.util.arrays import Array
 from exfit.util.processes import in_threads
 
 if TYPE_CHECKING:
     from exfit.simulation.simulator import Simulator
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 

@@ -8,13 +8,10 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.simulation.interpolation import ON_GRID, GridSegment
-from exfit.util.arrays import median
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array, median
 
 MOST_STEPS = 1e7  # three hours at 1 ms
 PAUSE = 1e-9  # s: steps and ramps that follow one another sooner are one move

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.sampling import SampleRows
+from exfit.util.arrays import Array
 
 ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
-Array = NDArray[np.float64]
 BLOCK = 1 << 16  # samples that are read at a time
 NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
 

@@ -12,8 +12,8 @@ from exfit.engine.system import System, Trace, trace
 from exfit.engine.trace import Node, Signal, evaluate, in_order, larger, smaller
 from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
 from exfit.simulation.simulator import Run, Simulator
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Spans = tuple[tuple[float, float], ...]
 

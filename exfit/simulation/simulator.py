@@ -22,12 +22,11 @@ from exfit.simulation.substeps import (
     substeps_for,
     why_unreachable,
 )
-from exfit.util.arrays import distinct
+from exfit.util.arrays import Array, distinct
 
 if TYPE_CHECKING:
     from exfit.simulation.directions import Moves
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]

@@ -20,9 +20,8 @@ from exfit.errors import SimulationError
 from exfit.plants import MEASURED
 from exfit.simulation.limits import at_rest, limits_passed
 from exfit.simulation.substeps import REST_TOLERANCE, STATE_ROUNDING, spectral_radii
-from exfit.util.arrays import distinct
+from exfit.util.arrays import Array, distinct
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Values = Mapping[str, float]
 

@@ -13,9 +13,8 @@ from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.plants import VT0
 from exfit.simulation.interpolation import ON_GRID
+from exfit.util.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 

@@ -6,7 +6,6 @@ from itertools import product
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -26,6 +25,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, Overlay
 from exfit.results.verdict import Cause
 from exfit.signals import POSITIVE_AT_REST
+from exfit.util.arrays import Array, Mask
 from exfit.util.text import listed, show
 from exfit.verdict.run_quality import (
     FAR_FROM_BASE,
@@ -40,8 +40,6 @@ from exfit.verdict.run_quality import (
 )
 
 Values = Mapping[str, float]
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 COARSE = 0.2  # of the error of the fit: what halving the step may move
 NEAR_MINIMUM = 0.1  # standard errors: what errors and intervals in two digits do not show

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from exfit.dsp.noise import MEDIAN_DEVIATION, spread
 from exfit.fitting.experiment import Channel
@@ -17,10 +16,9 @@ from exfit.fitting.noise import LEAST_NOISE, noise_shape, propagated_noise, scat
 from exfit.inference.noise import effective_samples, whiteness
 from exfit.inference.quantiles import chi_square_tail
 from exfit.results.verdict import ResidualTests
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 from exfit.verdict.causes import Evidence, FittedRecord
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 # variance of the logarithm of a standard deviation, times the number of samples it is taken from

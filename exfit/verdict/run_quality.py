@@ -6,7 +6,6 @@ And what its reader must know: typical values, the levels and the drift of its r
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.dsp.noise import drift_at_rest
@@ -20,8 +19,8 @@ from exfit.signals import unit_of_signal
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.limit_hits import limiter_actions
 from exfit.simulation.simulator import Response, Simulator
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 LEAST_GROWTH = 1e-3  # 1/s: what grows slower doubles in more than ten minutes

@@ -5,7 +5,6 @@ from math import erfc, exp, hypot, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.fitting.noise import LEAST_NOISE
@@ -17,6 +16,7 @@ from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
 from exfit.results.verdict import REJECTED, Cause
+from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
@@ -31,8 +31,6 @@ from exfit.verdict.causes.trials import (
     with_opened,
 )
 from exfit.verdict.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
-
-Array = NDArray[np.float64]
 
 SAME = 1e-6  # of a direction: what other parameters leave of it is rounding below
 LEAST_SHARE = 0.5  # of the largest chi-square: what has less is explained by that

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -42,11 +41,11 @@ from exfit.results.intervals.determination import (
     without_linear_intervals,
 )
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
+from exfit.util.arrays import Array
 from exfit.util.text import digits
 from exfit.util.vocabulary import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
 from exfit.workflows.responses import aligned, validation_of
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 UNKNOWN = Determination(None)

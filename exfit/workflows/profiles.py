@@ -6,7 +6,6 @@ from math import inf, isinf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -30,13 +29,12 @@ from exfit.results.intervals.determination import (
     reasons,
 )
 from exfit.results.verdict import Verdict
+from exfit.util.arrays import Array
 from exfit.util.text import error_of_interval, near, rounded_value
 from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.diagnostics import search_range_notes
 from exfit.verdict.rule import verdict_alone
 from exfit.workflows.case_search import SEARCH, SearchState, in_turn
-
-Array = NDArray[np.float64]
 
 LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
 LOWER_BY_TWIN = (

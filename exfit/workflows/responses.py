@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import AsFoundSection
@@ -38,10 +37,10 @@ from exfit.simulation.inputs import Inputs
 from exfit.simulation.limits import limits_hit
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import small_signal
+from exfit.util.arrays import Array
 from exfit.util.vocabulary import PHASES
 from exfit.workflows.case_description import fixed_values
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 TestWithValues = tuple[ExperimentSetup, Values]
 

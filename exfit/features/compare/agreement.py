@@ -8,7 +8,6 @@ from string import ascii_uppercase
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
 from exfit.dsp.recorded_features import RecordedResponse, recorded_features
@@ -28,10 +27,9 @@ from exfit.results.comparisons import judged_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
 from exfit.signals import COMPARED
+from exfit.util.arrays import Array
 from exfit.util.file_names import WHOLE_FIT
 from exfit.util.typed import plain
-
-Array = NDArray[np.float64]
 
 STEPS_APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
 MATCHED = 1e-5  # s: how closely the time between two steps is matched

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.features import TAIL
 from exfit.errors import RecordError
@@ -16,9 +15,8 @@ from exfit.records.formats.table import listed, refuse_uneven
 from exfit.records.units import needs_base
 from exfit.results.comparisons import Overlay
 from exfit.signals import COMPARED
+from exfit.util.arrays import Array
 from exfit.util.file_names import WHOLE_FIT
-
-Array = NDArray[np.float64]
 
 SIMULATED, MEASURED = "_simulated", "_measured"  # behind a signal in the table of a fit
 RECORD = "record"  # the name of the curve that was measured

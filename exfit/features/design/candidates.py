@@ -6,7 +6,6 @@ from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
@@ -14,9 +13,9 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slopes_of
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Run, Simulator
+from exfit.util.arrays import Array
 from exfit.util.text import near
 
-Array = NDArray[np.float64]
 Extremes = Mapping[str, tuple[float, float]]
 
 REST = 1.0  # s before the first step: the rest that a record must show

@@ -14,7 +14,6 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.dsp.noise import noise as noise_of
@@ -34,8 +33,6 @@ from exfit.util.text import near
 from exfit.util.typed import plain
 from exfit.verdict.diagnostics import search_range_notes
 from exfit.workflows import loaded
-
-Array = NDArray[np.float64]
 
 STEPS = (0.02, 0.05, 0.10)  # pu, of the reference
 

@@ -35,6 +35,7 @@ from exfit.inference.whitening import PropagatedNoise, whitening
 from exfit.plants.parts import initial
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
+from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
 ORDER = 4  # of the differences that show the noise of a signal which swings
@@ -42,7 +43,6 @@ PULSE = 1e-5  # pu or rad: the response to it is linear, and far above rounding
 LONGEST_BETWEEN_PULSES = 1.0  # s: the response changes little while the unit swings
 FEWEST_PULSES, MOST_PULSES = 9, 33
 SAMPLES_AT_ENDS = 4  # of a record, where a spline through them is another: each has a pulse
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Values = Mapping[str, float]
 SEED = 0

@@ -10,7 +10,6 @@ from math import hypot, pi, sqrt
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import Recording
@@ -25,9 +24,8 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.verdict import Cause
 from exfit.signals import SIGNALS
+from exfit.util.arrays import Array
 from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion
-
-Array = NDArray[np.float64]
 
 RATED_VOLTAGES = (0.85, 1.15)  # pu: a unit on load rests between these
 ROOT = sqrt(3.0)

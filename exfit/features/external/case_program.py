@@ -32,12 +32,13 @@ from exfit.features.external.responders import (
     RunResponder,
 )
 from exfit.fitting.descents import Announce, following
-from exfit.fitting.experiment import Array, ExperimentSetup, Values
+from exfit.fitting.experiment import ExperimentSetup, Values
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Differences, Setups
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import jacobian_error
 from exfit.simulation.simulator import Simulator
+from exfit.util.arrays import Array
 from exfit.util.files import on_disk
 from exfit.util.text import near
 

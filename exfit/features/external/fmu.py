@@ -17,6 +17,8 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.util.arrays import Array
+
 Interface = Literal["co-simulation", "model-exchange"]
 Use = Literal["parameter", "input", "output"]  # set before the start, set at any time, read
 
@@ -130,8 +132,6 @@ _PROGRAM = (
     "import sys; sys.path[:] = {places!r}; from exfit.features.external.fmu import main; main()"
 )
 
-
-Array = NDArray[np.float64]
 
 LONGEST_STEP = 1e-3  # s: of communication
 TOLERANCE = 1e-8  # relative, of the integration

@@ -19,12 +19,10 @@ from threading import Thread
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from exfit.util.arrays import Array
 from exfit.util.processes import ending, last_lines
 from exfit.util.text import show_value
-
-Array = NDArray[np.float64]
 
 NAME = "the program"
 # a program that hangs does not see that its input has ended, where exfit itself is killed

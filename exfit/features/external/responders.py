@@ -16,8 +16,8 @@ from exfit.features.external.program import ExternalProgram, ExternalRun
 from exfit.simulation.inputs import Direction
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.substeps import NO_SUBSTEPS
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 Tests = Sequence[Simulator] | None

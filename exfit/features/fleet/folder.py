@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.errors import ExfitError
 from exfit.results.facts import UNIT, Facts, stated
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.runs.runner import distinct_names
 from exfit.runs.store import read_kept, text_of
+from exfit.util.arrays import Array
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import prepare, write, write_quickly, write_together
 from exfit.util.text import error_of_interval, rounded_value
@@ -36,7 +36,6 @@ from exfit.util.typed import IN_FILE, plain
 if TYPE_CHECKING:
     from exfit.results.model import FitResult
 
-Array = NDArray[np.float64]
 CaseStatus = Literal[
     "done", "failed", "timed out", "crashed", "refused", "no record", "not run"
 ]  # fmt: skip

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.sampling import kept_rows
 from exfit.features.fleet.folder import FAILED, CaseSummary, Fleet, SummaryCurve, SummaryParameter
@@ -18,6 +17,7 @@ from exfit.features.report.page import TEMPLATES, environment
 from exfit.inference.outliers import FEWEST, LEVEL
 from exfit.results.side_by_side import NOT_ACCEPTED
 from exfit.results.verdict import GOOD, MATCHES, VerdictWords
+from exfit.util.arrays import Array
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 
 REPORT = "report.html"
@@ -28,7 +28,6 @@ VERDICTS: Sequence[str] = (*get_args(VerdictWords), NOT_ACCEPTED, "interrupted")
 STYLES: Mapping[str, str] = {GOOD: "good", MATCHES: "fair", "no record": "none", "not run": "none"}
 
 
-Array = NDArray[np.float64]
 Point = tuple[int, int]
 
 WIDTH, HEIGHT = 240, 64  # units of a picture, two to a pixel

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.cli.options import refuse_existing
@@ -13,8 +12,7 @@ from exfit.cli.streams import echo
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
 from exfit.simulation.inputs import SplinedInput
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 DIGITS = 9  # significant, of every number
 TURN = 2.0 * np.pi

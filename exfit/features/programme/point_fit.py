@@ -6,7 +6,6 @@ from math import hypot, isfinite
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
@@ -16,9 +15,9 @@ from exfit.inference.identifiability import Identifiability, identifiability
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
 from exfit.results.intervals.determination import of_profiles
 from exfit.results.intervals.value_errors import first_order_shifts, widened_by
+from exfit.util.arrays import Array
 from exfit.util.text import listed
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 DIFFERENCE = 6e-6  # of a scaled parameter: where the error of a central difference is least

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.features.programme.result import Array, SaturationResult, VCurve
+from exfit.features.programme.result import SaturationResult, VCurve
 from exfit.show.figures.style import (
     COLORS,
     GREEN,
@@ -15,6 +15,7 @@ from exfit.show.figures.style import (
     panels,
     tidy,
 )
+from exfit.util.arrays import Array
 
 BRANCHES = ((1.0, "rising", "^", START), (-1.0, "falling", "v", GREEN))
 MARGIN = 0.025  # of an axis, beside what it holds

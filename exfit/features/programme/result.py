@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.inference.confidence import Interval
 from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, Verdict
+from exfit.util.arrays import Array
 from exfit.util.text import ERRORS_IN_INTERVAL, error_of_interval, listed, rounded_value
 from exfit.util.typed import IN_FILE, KEY, plain
 
-Array = NDArray[np.float64]
 SaturationForm = Literal["quadratic", "exponential", "exponential-se"]
 WithValues = TypeVar("WithValues", "FittedCurve", "SaturationResult")
 

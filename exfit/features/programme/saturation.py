@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from exfit.errors import ExfitError
 from exfit.estimate import OneByOne, ProfileEnd, half_square, least_squares, profiles
 from exfit.features.programme.result import (
-    Array,
     FittedCurve,
     MeasuredValue,
     SaturationForm,
@@ -29,6 +28,7 @@ from exfit.inference.confidence import LEVEL, Interval
 from exfit.inference.quantiles import student_quantile
 from exfit.models.blocks import exponential_se
 from exfit.models.machines.machine import curve, power_curve
+from exfit.util.arrays import Array
 from exfit.util.text import listed
 
 EXCESS: Mapping[SaturationForm, Callable[[Array, float, float], Array]] = {

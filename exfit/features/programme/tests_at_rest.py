@@ -7,7 +7,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.schema import Unknown
 from exfit.errors import CaseError, RecordError
@@ -33,8 +32,8 @@ from exfit.records.formats import open_table
 from exfit.records.formats.table import column_error
 from exfit.records.units import alike, needs_base
 from exfit.signals import FIELDS, TERMINALS
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 FARTHEST_BASE = 4.0  # times the base that fits best at the start: as far as one without bounds goes

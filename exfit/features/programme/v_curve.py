@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from exfit.errors import ModelError, RecordError
 from exfit.estimate.solver import NotFinite
@@ -32,9 +32,9 @@ from exfit.plants.parts import Names
 from exfit.results.model import FittedParameter
 from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, NOT_CONVERGED, Cause, Verdict
 from exfit.signals import NOISE
+from exfit.util.arrays import Array
 from exfit.util.text import show
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 SALIENCY = "saliency"  # (1 - Xq / Xd)^2, in which the field current is smooth up to Xq = Xd

@@ -14,7 +14,6 @@ from math import log, nan, sqrt
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.inference.noise import effective_samples, is_white, whiteness
@@ -22,9 +21,9 @@ from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import NOT_ACCEPTED, outcome_of
 from exfit.results.verdict import GOOD, MATCHES, MISSES
+from exfit.util.arrays import Array
 from exfit.util.text import listed
 
-Array = NDArray[np.float64]
 Records = Literal["fit", "validation"]
 
 # difference of the criterion from which on a model is refuted: a rival with as many parameters

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from math import ceil, floor, log10
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.show.blocks import Chart, Panel, Range, Rule, Series
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array
 
 MILLI = 1e3
 TALL, HALF, LOW = 170.0, 120.0, 72.0  # of panels: of signals, of gain and phase, of errors

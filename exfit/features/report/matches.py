@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.features import LABELS
 from exfit.dsp.sampling import envelope, kept_rows
@@ -32,9 +31,8 @@ from exfit.show.blocks import (
     row,
 )
 from exfit.signals import label_of
+from exfit.util.arrays import Array
 from exfit.util.text import percentage, show
-
-Array = NDArray[np.float64]
 
 FEWEST_BINS = 50  # a step can still be seen
 PER_BIN = 8  # points of an overlay: the least and the greatest of its four lines

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.features.report.charts import (
     BINS,
@@ -41,10 +40,9 @@ from exfit.show.blocks import (
     row,
 )
 from exfit.signals import label_of
+from exfit.util.arrays import Array
 from exfit.util.text import show
 from exfit.util.vocabulary import HISTORY_PHASES
-
-Array = NDArray[np.float64]
 
 SHADES = 9  # of the style sheet, from the start to the fit
 MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper

@@ -4,13 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from exfit.util.arrays import Array
 from exfit.util.typed import IN_FILE, plain
 from exfit.util.vocabulary import NOT_STATED, TYPICAL
-
-Array = NDArray[np.float64]
 
 POOR = 5.0  # % of the step: an error beyond it changes what a study shows
 EXACT = 1e-4  # % of the step: what differs by less differs by rounding and sub-steps

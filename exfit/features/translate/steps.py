@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.other_model import ALONE
 from exfit.case.peek import section_of, stabiliser_inputs
@@ -36,8 +35,8 @@ from exfit.results.model import FitResult
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limits import at_rest, equation_limits, limits_hit, traced
 from exfit.simulation.simulator import Simulator
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 STEPS = (0.01, 0.05, 0.10)  # pu of the reference, up and down, with the breaker open

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.errors import ExfitError, SimulationError
@@ -46,9 +45,9 @@ from exfit.results.io import load_result
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.simulation.small_signal import small_signal
+from exfit.util.arrays import Array
 from exfit.util.vocabulary import NOT_STATED, least_certain
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Watch = Callable[[estimate.Progress], None]
 

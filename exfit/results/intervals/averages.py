@@ -14,7 +14,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.errors import SimulationError
@@ -28,9 +27,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval
 from exfit.results.influences import STRONG, RecorderAverages
 from exfit.results.intervals.minima import own_values, variance_of
-from exfit.util.arrays import median
-
-Array = NDArray[np.float64]
+from exfit.util.arrays import Array, median
 
 USUAL = (0.02, 0.05, 0.1, 0.2, 0.5)  # s: windows of recorders, beside the time between samples
 LONGEST = 0.1  # of the record: a longer window hides the response

@@ -11,7 +11,6 @@ from math import inf, isinf
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.errors import SimulationError
@@ -31,9 +30,9 @@ from exfit.fitting.uncertainty import (
 )
 from exfit.inference.confidence import Uncertainty
 from exfit.signals import SIGNALS
+from exfit.util.arrays import Array
 from exfit.util.text import listed
 
-Array = NDArray[np.float64]
 Watch = Callable[[estimate.Progress], object]
 
 POINTS = 3  # of a side: only its end is asked for

@@ -14,6 +14,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.model import Minima, Minimum, multiple
+from exfit.util.arrays import Array
 from exfit.util.text import rounded_value
 
 Values = Mapping[str, float]
@@ -22,7 +23,6 @@ TINY = float(np.finfo(float).tiny)
 REMARKABLE = 0.1  # difference between values of a parameter, as a share, that is worth a word
 WITHIN = 2.0  # standard errors: an interval says it already
 MOST_VALUES = 6  # of a minimum, in a sentence
-Array = NDArray[np.float64]
 STEPS = 8  # of a way from one minimum to another
 JUMP = 2.5  # steps: what moves by more at once has left the valley
 MOST_ITERATIONS = 10  # down to the floor of a valley, from a point that lies nearly on it

@@ -22,8 +22,8 @@ from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import prefix_from
 from exfit.fitting.problem import FitProblem, problem_of
 from exfit.signals import SIGNALS
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 AT_GIVEN_INSTANT = 1e-3  # of a step of the simulation: so near, rounding decides on the side

@@ -18,9 +18,8 @@ from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisa
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
 from exfit.results.influences import DEVIATION, TypicalValue
 from exfit.results.intervals.determination import with_parameters, without_linear_intervals
+from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
-
-Array = NDArray[np.float64]
 
 IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
 UNSEEN = 1e-9  # of the largest singular value: rounding

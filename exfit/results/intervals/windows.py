@@ -29,8 +29,8 @@ from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
 from exfit.records.record import Record, read_only
 from exfit.results.influences import WindowEstimate, WindowKind, WindowSpread
+from exfit.util.arrays import Array
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 TPD0 = MACHINE + "Tpd0"

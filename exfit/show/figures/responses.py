@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from exfit.dsp.sampling import PIXELS, envelope
 from exfit.results.comparisons import REFERENCE, Comparison
@@ -27,6 +26,7 @@ from exfit.show.figures.style import (
 )
 from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.simulator import Response
+from exfit.util.arrays import Array
 from exfit.util.text import percentage
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from exfit.records.inspection import Inspection
     from exfit.runs.fits import FitSeries
 
-Array = NDArray[np.float64]
 
 FAINT = 0.4  # opacity of what is not compared
 LONGEST = 40  # letters of a record's name

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from exfit.dsp.sampling import envelope
 from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -30,10 +29,9 @@ from exfit.show.figures.style import (
     tidy,
 )
 from exfit.signals import label_of
+from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE
 from exfit.workflows.profiles import Profiles
-
-Array = NDArray[np.float64]
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {

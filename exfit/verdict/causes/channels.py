@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.filtering import Filtering
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.plants import VT0
 from exfit.results.verdict import Cause
+from exfit.util.arrays import Array, Mask
 from exfit.verdict.causes.evidence import (
     CERTAIN,
     LAST,
@@ -32,9 +32,6 @@ from exfit.verdict.causes.trials import (
     with_opened,
 )
 from exfit.verdict.run_quality import levels_at_rest, other_levels, unsteady_signals
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LEAST_CHANGE = 0.02  # of vt's scale: no base is wrong by less
 LEAST_ERROR_OF_BASE = 1e-3  # of another channel: less is no base, and no instrument's error

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.dsp.lines import MAINS, Ripple
 from exfit.dsp.noise import NEIGHBOURS, noise
@@ -15,7 +14,7 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
-from exfit.util.arrays import median
+from exfit.util.arrays import Array, median
 from exfit.verdict.causes.evidence import (
     CERTAIN,
     LAST,
@@ -32,8 +31,6 @@ from exfit.verdict.causes.trials import (
     with_experiment,
     with_opened,
 )
-
-Array = NDArray[np.float64]
 
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FEWEST_AT_REST = 20  # samples from which a drift at rest is taken

@@ -6,7 +6,6 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.errors import SimulationError
@@ -16,15 +15,13 @@ from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.results.verdict import Cause
+from exfit.util.arrays import Array, Mask
 from exfit.util.text import yaml_number
 from exfit.verdict.causes.evidence import Evidence, Suspicion, suspected
-
-Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 25  # of each phase: to compare causes, not to print digits
 AT_NOISE = 1.2  # times the cost of the noise: a descent that ends so low needs no other
 TOLERANCE = 1e-3  # of a step and of the gradient, in the units of the search
-Mask = NDArray[np.bool_]
 DIGITS = 3  # of a number in a line for the case
 DEPENDENT = 1e-9  # of the longest column: a column that is shorter without the others is none
 
