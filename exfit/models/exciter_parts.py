@@ -3,6 +3,7 @@
 from exfit.models.blocks import (
     Limited,
     Signal,
+    clip,
     compound_source,
     field_ceiling,
     field_demand,
@@ -29,6 +30,14 @@ ALTERNATOR_SUPPLY = sheet(
 )
 # a PI with a small derivative, in front of the gain of the edition of 2005, which then stays fixed
 PID = shared(KPR=1.0, KIR=0.5, KDR=0.02, TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0)
+
+
+Gate = tuple[Signal, Signal] | None  # its lower and upper limit
+
+
+def gated(x: Signal, gate: Gate) -> Signal:
+    """Hold a signal between the limits of a gate, where there is one."""
+    return x if gate is None else clip(x, *gate)
 
 
 def regulated(

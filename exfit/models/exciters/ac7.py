@@ -2,7 +2,6 @@
 
 from exfit.models.blocks import (
     Signal,
-    clip,
     field_demand,
     lag,
     larger,
@@ -15,7 +14,9 @@ from exfit.models.blocks import (
 )
 from exfit.models.exciter_parts import (
     ALTERNATOR_SUPPLY,
+    Gate,
     alternator_rest,
+    gated,
     limited_alternator,
     supply,
 )
@@ -38,27 +39,21 @@ from exfit.models.sheet import (
     with_typical,
 )
 
-Limits = tuple[Signal, Signal]
-
 
 def inner_loop(
-    gates: tuple[Limits, Limits] | None, vs: Signal, s: Signal, u: Signal, p: Signal, d: Signal
+    at_error: Gate, at_output: Gate, vs: Signal, s: Signal, u: Signal, p: Signal, d: Signal
 ) -> Signal:
     """Write the slopes into d and return efd.
 
-    Limiters hold the error and the PID's output between the limits of two ``gates``, if there are
-    any; ``vs`` is the supply of the amplifier.
+    Limiters hold the error and the PID's output at two gates; ``vs`` is the supply of
+    the amplifier.
     """
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
-    error = u.vref + u.vs + u.vsum - vc - vf
-    if gates is not None:
-        error = clip(error, *gates[0])
+    error = gated(u.vref + u.vs + u.vsum - vc - vf, at_error)
     vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
-    if gates is not None:
-        vr = clip(vr, *gates[1])
-    inner = vr - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
+    inner = gated(vr, at_output) - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
     va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
     efd, d.VE = limited_alternator(larger(vs * va, -p.KL * vfe), vfe, s, u, p)
     return efd
@@ -97,7 +92,7 @@ def ac7b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     integrates, 1/sTE: the 1/(1+sTE) in the figure of 2005 is a misprint. An UEL is
     added at the first summing point.
     """
-    return inner_loop(None, p.KP * u.vt, s, u, p, d)
+    return inner_loop(None, None, p.KP * u.vt, s, u, p, d)
 
 
 def ac7b_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
@@ -180,7 +175,7 @@ def ac7c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """
     vfe = field_demand(s.VE, u.ifd, p)
     vs = amplifier_supply(rectifier(s.VE, p.KC * u.ifd), vfe, u, p)
-    return inner_loop(((u.vuel, u.voel), (u.vuel_out, u.voel_out)), vs, s, u, p, d)
+    return inner_loop((u.vuel, u.voel), (u.vuel_out, u.voel_out), vs, s, u, p, d)
 
 
 def ac7c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:

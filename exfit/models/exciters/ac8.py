@@ -2,7 +2,6 @@
 
 from exfit.models.blocks import (
     Signal,
-    clip,
     exciter,
     exciter_demand,
     field_demand,
@@ -13,7 +12,9 @@ from exfit.models.blocks import (
 )
 from exfit.models.exciter_parts import (
     ALTERNATOR_SUPPLY,
+    Gate,
     alternator_rest,
+    gated,
     limited_alternator,
     supply,
 )
@@ -27,26 +28,20 @@ from exfit.models.sheet import (
     sheet,
 )
 
-Limits = tuple[Signal, Signal]
-
 
 def regulated(
-    gates: tuple[Limits, Limits] | None, vb: Signal, s: Signal, u: Signal, p: Signal, d: Signal
+    at_error: Gate, at_output: Gate, vb: Signal, s: Signal, u: Signal, p: Signal, d: Signal
 ) -> Signal:
     """Write the slopes into d and return efd.
 
-    Limiters hold the error and the PID's output between the limits of two ``gates``, if there are
-    any; ``vb`` is the supply of the power stage.
+    Limiters hold the error and the PID's output at two gates;
+    ``vb`` is the supply of the power stage.
     """
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = u.vref + u.vs + u.vsum - vc
-    if gates is not None:
-        error = clip(error, *gates[0])
+    error = gated(u.vref + u.vs + u.vsum - vc, at_error)
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
-    if gates is not None:
-        vpid = clip(vpid, *gates[1])
-    vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    vr, d.VR = limited_lag(gated(vpid, at_output), s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     efd, d.VE = limited_alternator(vr * vb, vfe, s, u, p)
     return efd
 
@@ -75,7 +70,7 @@ def ac8b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     is at its limit. UEL and OEL are added at the summing point. PSS/E's ESAC8B is
     another model.
     """
-    return regulated(None, 1.0, s, u, p, d)
+    return regulated(None, None, 1.0, s, u, p, d)
 
 
 def ac8b_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
@@ -151,7 +146,7 @@ def ac8c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     and the same where no limiter acts. The supply's data are not those of a sample.
     """
     vb = supply(p.KC1 * field_demand(s.VE, u.ifd, p), u, p)
-    return regulated(((u.vuel, u.voel), (u.vuel_out, u.voel_out)), vb, s, u, p, d)
+    return regulated((u.vuel, u.voel), (u.vuel_out, u.voel_out), vb, s, u, p, d)
 
 
 def ac8c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
