@@ -200,24 +200,22 @@ class Kinds(Mapping[str, PlantKind]):
         "fmu": "outside:FMU",
     }
 
-    @property
-    def parts(self) -> dict[str, LazyPart]:
-        """All kinds, those of features last."""
-        of_core = {name: LazyPart(f"{__name__}.{path}") for name, path in self.CORE.items()}
-        return {**of_core, **parts_of_features("PLANTS")}
-
     def __getitem__(self, name: str) -> PlantKind:
-        kind: PlantKind = self.parts[name].load()
+        if name in self.CORE:
+            part = LazyPart(f"{__name__}.{self.CORE[name]}")
+        else:
+            part = parts_of_features("PLANTS")[name]
+        kind: PlantKind = part.load()
         return kind
 
     def __contains__(self, name: object) -> bool:
-        return name in self.parts
+        return name in self.CORE or name in parts_of_features("PLANTS")
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.parts)
+        return iter([*self.CORE, *parts_of_features("PLANTS")])
 
     def __len__(self) -> int:
-        return len(self.parts)
+        return len(self.CORE) + len(parts_of_features("PLANTS"))
 
 
 KINDS = Kinds()
