@@ -1,11 +1,16 @@
 """The command inspect, and the options of commands that inspect a record."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options
+
+if TYPE_CHECKING:
+    from exfit.show.blocks import Block
 
 time_option = click.option(
     "--time",
@@ -67,6 +72,9 @@ def inspect_(
     folder = output.folder(f"{file.name}-inspect", run_folder.OF_INSPECTION)
     inspection = RecordSettings(clock, unit, sheet, memory=memory).inspect(file)
     figures = run_folder.write_inspection(inspection, folder)
-    suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
-    blocks = inspections.inspection(inspection, suggested.lines())
-    output.show(inspection.as_json(), blocks, folder, figures)
+
+    def blocks() -> "Iterator[Block]":
+        suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
+        yield from inspections.inspection(inspection, suggested.lines())
+
+    output.show(inspection.as_json(), blocks(), folder, figures)

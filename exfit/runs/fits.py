@@ -144,8 +144,9 @@ def planned(
         """Read the records of a case; raises ExfitError where no fit could begin."""
         case = load(source)
         fitted(case)
+        values = case.values()
         for recording in case.validations:
-            build_experiment(case, recording, case.values())
+            build_experiment(case, recording, values)
         read.append(case)
 
     files = [case for case in cases if not isinstance(case, Case)]

@@ -54,7 +54,6 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
     """
     from exfit.features.rank.ranked_cases import planned_models, ranking_of
     from exfit.features.rank.ranking_output import FILES, ranking_blocks, write_ranking
-    from exfit.show import terminal
 
     loaded = load(case)
     names = [] if models is None else [name.strip() for name in models.split(",")]
@@ -69,6 +68,8 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
         if output.as_json:
             print_json(ranking.to_dict())
         elif output.shown:
+            from exfit.show import terminal
+
             console = terminal.console()
             console.print()
             terminal.show(console, ranking_blocks(ranking))
