@@ -14,7 +14,7 @@ from writers import prepare
 from exfit import cli
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.show import figures
+from exfit.output import figures
 
 CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
 # one of each family: without a plant; commutators; rotating rectifiers; static; compound; a round

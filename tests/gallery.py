@@ -31,8 +31,8 @@ from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
 from exfit.cli import main
-from exfit.show import figures as plots
-from exfit.show import live, terminal
+from exfit.output import figures as plots
+from exfit.output import live, terminal
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "gallery.md"

@@ -15,7 +15,7 @@ from places import ROOT
 
 import exfit
 from exfit.fitting.recordings import record_of
-from exfit.show import run_folder
+from exfit.output import run_folder
 
 CASE = ROOT / "configs" / "first_order.yaml"
 HEAVY = {"numpy", "scipy", "pydantic", "yaml", "matplotlib", "rich", "click", "llvmlite"}

@@ -27,7 +27,7 @@ from exfit.errors import CaseError
 from exfit.fitting.recordings import phasors_of, record_of
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.show import figures, run_folder
+from exfit.output import figures, run_folder
 from exfit.util.vocabulary import STRATEGIES
 
 DOCS = ROOT / "docs"

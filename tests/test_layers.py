@@ -14,7 +14,7 @@ BASE = {"util", "errors", "registry"}  # what every package may import
 IN_ORDER = (  # each of the core may import those above it, the leaves nothing
     "signals", "dsp", "estimate", "inference", "engine", "models", "plants", "simulation",
     "records",
-    "case", "fitting", "results", "verdict", "workflows", "runs", "show", "cli", "__main__",
+    "case", "fitting", "results", "verdict", "workflows", "runs", "output", "cli", "__main__",
 )  # fmt: skip
 LEAVES = {"signals", "dsp", "estimate", "inference", "engine"}
 # beside the core, and another feature only as here
@@ -28,13 +28,13 @@ OTHER_FEATURES = {
     "translate": {"planner"},
 }
 # a result draws itself: inside the call, so that nothing is imported before
-EXCEPTIONS = {("exfit.results.model", "exfit.show.notebook")}
+EXCEPTIONS = {("exfit.results.model", "exfit.output.notebook")}
 
 ONLY_IN = {  # where a library may be imported, inside functions too
     "yaml": {"case"},
     "pydantic": {"case", "programme"},
-    "matplotlib": {"show", "compare", "design", "programme", "rank", "translate"},
-    "rich": {"show", "cli", "compare", "design", "fleet", "programme", "rank", "translate"},
+    "matplotlib": {"output", "compare", "design", "programme", "rank", "translate"},
+    "rich": {"output", "cli", "compare", "design", "fleet", "programme", "rank", "translate"},
     "jinja2": {"report", "drawings"},
     "weasyprint": {"report"},
     "click": {

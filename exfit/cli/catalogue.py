@@ -29,8 +29,8 @@ def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
     from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
-    from exfit.show import models as shown
-    from exfit.show import terminal
+    from exfit.output import models as shown
+    from exfit.output import terminal
 
     exciters, machines = MODELS.values(), MACHINES.values()
     added = {
@@ -40,8 +40,8 @@ def models(name: str | None, folder: Path | None) -> None:
     }
     every: Iterable[Model | Machine] = chain(exciters, machines, *added.values())
     if folder is not None:
+        from exfit.output import run_folder
         from exfit.registry import parts
-        from exfit.show import run_folder
 
         overview = parts("PICTURES").get("overview")
         if overview is None:

@@ -39,7 +39,7 @@ def check(case: Path) -> None:
     """
     from exfit import workflows
     from exfit.case.peek import keys_of
-    from exfit.show import models, terminal
+    from exfit.output import models, terminal
 
     keys = keys_of(case)
     for key, checked in parts("CHECKS").items():
@@ -68,9 +68,9 @@ def show(result: Path, everything: bool) -> None:
     RESULT is the result.json of a fit, the validation.json of a validation, or the folder that
     holds one of them.
     """
+    from exfit.output import fits, run_folder, terminal, validations
+    from exfit.output.blocks import Table, columns, paragraph, row
     from exfit.results.io import load_result, load_validation, result_file
-    from exfit.show import fits, run_folder, terminal, validations
-    from exfit.show.blocks import Table, columns, paragraph, row
     from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
 
     console, source = terminal.console(), result_file(result)
@@ -116,12 +116,12 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
     to runs/CASE-profile, or to DIR. Ctrl-C keeps the profiles found so far.
     """
     from exfit import workflows
-    from exfit.show import fits, run_folder
+    from exfit.output import fits, run_folder
 
     loaded = load(case)
     folder = output.folder_of(loaded, "profile", run_folder.OF_PROFILES)
     if output.shown:
-        from exfit.show import live, terminal
+        from exfit.output import live, terminal
 
         console = terminal.console()
         with live.ProgressBar(console).running() as progress:
@@ -187,9 +187,9 @@ def validate(
     accepted.
     """
     from exfit import workflows
+    from exfit.output import run_folder, validations
+    from exfit.output.blocks import paragraph
     from exfit.records.reading import file_hash
-    from exfit.show import run_folder, validations
-    from exfit.show.blocks import paragraph
     from exfit.util.typed import plain
     from exfit.workflows.given_values import read_parameters, sources_in
 
@@ -225,7 +225,7 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
 
     Raises CaseError where it was not fitted.
     """
-    from exfit.show import run_folder
+    from exfit.output import run_folder
     from exfit.workflows.given_values import fitted_code
 
     source = parameters or run_folder.last_fit(path)

@@ -28,9 +28,9 @@ from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRAT
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.output.figure_files import FigureFiles
     from exfit.results.model import FitResult
     from exfit.runs.fits import FitRun, FitSeries, PlannedFit
-    from exfit.show.figure_files import FigureFiles
 
 SERIES = "fits"  # the folder of a series by default
 
@@ -92,7 +92,7 @@ def fit(
     --parameters changes, and shows the former values beside the new ones; a case with a fault
     waits for the next change. Ctrl-C ends that with exit code 0.
     """
-    from exfit.show import run_folder
+    from exfit.output import run_folder
 
     given = Given(parameters, changes)
     several = len(cases) > 1 or len(strategies) > 1
@@ -133,13 +133,13 @@ def fit_one(
     The figures come last: the result is written and shown before they are drawn.
     """
     from exfit import workflows
-    from exfit.show import run_folder
+    from exfit.output import run_folder
 
     strategy, search = settings
     if not output.shown:
         result = workflows.fit(case, strategy, search=search)
     else:
-        from exfit.show import fits, live, terminal
+        from exfit.output import fits, live, terminal
 
         console, most = terminal.console(), case.estimate.most_iterations
         title = live.task(case, strategy)
@@ -172,7 +172,7 @@ def fit_again_and_again(
     """
     from exfit.case.peek import changed, stamps_of
     from exfit.case.yaml import read_text
-    from exfit.show import run_folder, terminal
+    from exfit.output import run_folder, terminal
 
     read_text(case)
     run_folder.refuse_unwritable(folder, run_folder.OF_FIT)
@@ -208,8 +208,8 @@ def fit_several(
     Raises ExfitError with the faults of all cases before the first fit begins, and with those of
     fits that failed when all else is done; SystemExit where not all fits are done and well.
     """
+    from exfit.output import run_folder
     from exfit.runs.fits import planned
-    from exfit.show import run_folder
 
     folder = output.folder(SERIES, run_folder.OF_SERIES)
     plan = planned(cases, strategies, given.load, search)
@@ -222,8 +222,8 @@ def fit_several(
         if output.as_json:
             print_json(series.to_dict())
         elif output.shown:
-            from exfit.show import terminal
-            from exfit.show.series import fit_series
+            from exfit.output import terminal
+            from exfit.output.series import fit_series
 
             console = terminal.console()
             console.print()
@@ -245,12 +245,12 @@ def run_planned(
 
     Raises Interruption where none is done.
     """
+    from exfit.output import run_folder
     from exfit.runs.fits import run_all
-    from exfit.show import run_folder
 
     progress = None
     if output.shown:
-        from exfit.show import live, terminal
+        from exfit.output import live, terminal
 
         progress = live.SeriesProgress(terminal.console(), plan)
 
@@ -276,7 +276,7 @@ def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
             warn(of_fit.draw())
             left.remove(name)
             if output.shown:
-                from exfit.show import terminal
+                from exfit.output import terminal
 
                 terminal.figures_of_fit(terminal.console(), name)
     except KeyboardInterrupt as interruption:
@@ -289,7 +289,7 @@ def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, files: Seq
 
     ``files`` are those that are written beside the folders of the fits.
     """
-    from exfit.show import run_folder
+    from exfit.output import run_folder
 
     faults: dict[str, None] = {}
     for fit in plan:

@@ -16,8 +16,8 @@ from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.show.blocks import Block
-    from exfit.show.figure_files import FigureFiles
+    from exfit.output.blocks import Block
+    from exfit.output.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
 LONGEST_LINE = 1000  # characters of a message: a longer one quotes what is no name of a file
@@ -68,7 +68,7 @@ class Output(NamedTuple):
 
         Raises ExfitError where it cannot take them: before a run is spent on it.
         """
-        from exfit.show import run_folder
+        from exfit.output import run_folder
 
         folder = self.given or Path("runs") / default
         run_folder.refuse_unwritable(folder, files)
@@ -96,7 +96,7 @@ class Output(NamedTuple):
         if self.as_json:
             print_json(content)
         elif self.shown:
-            from exfit.show import terminal
+            from exfit.output import terminal
 
             console = terminal.console()
             terminal.show(console, blocks)
@@ -109,7 +109,7 @@ class Output(NamedTuple):
         if not self.figures:
             return
         if self.shown and listed:
-            from exfit.show import terminal
+            from exfit.output import terminal
 
             warn(figures.draw(partial(terminal.figure, terminal.console())))
         else:
@@ -170,7 +170,7 @@ def refuse_own_files(
     case: "Case", folder: Path, written: Iterable[str], after_records: bool = False
 ) -> None:
     """Raise ExfitError where the results of a command would write over the files of its case."""
-    from exfit.show import run_folder
+    from exfit.output import run_folder
 
     recordings = (*case.recordings, *case.validations)
     files = [

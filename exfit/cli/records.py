@@ -10,7 +10,7 @@ from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options
 
 if TYPE_CHECKING:
-    from exfit.show.blocks import Block
+    from exfit.output.blocks import Block
 
 time_option = click.option(
     "--time",
@@ -66,7 +66,7 @@ def inspect_(
     """
     from exfit.case.case_draft import CaseDraft
     from exfit.case.suggestion import RecordSettings, suggested_sections
-    from exfit.show import inspections, run_folder
+    from exfit.output import inspections, run_folder
 
     # files of one record in several formats have one stem
     folder = output.folder(f"{file.name}-inspect", run_folder.OF_INSPECTION)

@@ -33,7 +33,7 @@ def simulate(
     parameter of the machine is named as in --set machine.Tpd0=6.
     """
     from exfit import workflows
-    from exfit.show import run_folder
+    from exfit.output import run_folder
     from exfit.workflows.given_values import changed_values, fitted_code, read_parameters
 
     loaded = load(case, *(fitted_code(parameters) if parameters else ()))
@@ -43,8 +43,8 @@ def simulate(
     simulation = workflows.simulate(loaded, values)
     figures = run_folder.write_simulation(simulation, case.stem, folder)
     if output.shown:
-        from exfit.show import terminal, validations
-        from exfit.show.blocks import notes, paragraph
+        from exfit.output import terminal, validations
+        from exfit.output.blocks import notes, paragraph
 
         console, compared = terminal.console(), simulation.comparison
         if compared is not None:

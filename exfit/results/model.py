@@ -31,7 +31,7 @@ from exfit.util.typed import IN_FILE, KEY, plain
 from exfit.util.vocabulary import TYPICAL, Criteria
 
 if TYPE_CHECKING:
-    from exfit.show.notebook import Figure
+    from exfit.output.notebook import Figure
 
 
 NEAR = 2.0  # times a cost: below it another one is given to a thousandth
@@ -414,13 +414,13 @@ class FitResult:
 
         ``record`` is its name, by default the first. Raises ExfitError for a name of none.
         """
-        from exfit.show.notebook import fit_figure
+        from exfit.output.notebook import fit_figure
 
         return fit_figure(self, record)
 
     def _repr_html_(self) -> str:
         """Return the table that a notebook shows."""
-        from exfit.show.notebook import fit_html
+        from exfit.output.notebook import fit_html
 
         return fit_html(self)
 

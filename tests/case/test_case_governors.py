@@ -8,9 +8,9 @@ from exfit.case.load import load_case
 from exfit.case.peek import free_of
 from exfit.errors import CaseError
 from exfit.fitting.system import system_of
+from exfit.output.run_folder import write_fit
 from exfit.plants import BREAKER
 from exfit.results.io import load_result
-from exfit.show.run_folder import write_fit
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.verdict.run_quality import speed_notes, typical_notes
 from exfit.workflows import fit, simulate

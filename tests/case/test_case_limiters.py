@@ -12,8 +12,8 @@ from exfit.errors import CaseError, ExfitError
 from exfit.features.planner.export import export
 from exfit.fitting.system import system_of
 from exfit.models import MODELS
+from exfit.output.run_folder import write_fit
 from exfit.results.io import load_result
-from exfit.show.run_folder import write_fit
 from exfit.workflows import fit, simulate
 
 OEL = "{IINST: 1.9, TEN: 0.0, ITFPU: 99.0, ILIM: 0.1, KPOEL: 20.0}"

@@ -11,7 +11,7 @@ from exfit.case.load import load_case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import input_steps
 from exfit.fitting.system import inputs_of, system_of
-from exfit.show.run_folder import PARAMETERS, write_fit
+from exfit.output.run_folder import PARAMETERS, write_fit
 from exfit.verdict.run_quality import typical_notes
 from exfit.workflows import fit, simulate
 from exfit.workflows.given_values import changed_values, read_parameters

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
-from exfit.show import live
+from exfit.output import live
 
 
 @pytest.fixture

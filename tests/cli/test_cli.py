@@ -29,10 +29,10 @@ from exfit.engine.kernel import kernel, linear_kernel
 from exfit.engine.tangents import tangent_kernel
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
+from exfit.output import figures as plots
+from exfit.output import live
+from exfit.output.figure_files import FigureFiles
 from exfit.results.model import Iteration
-from exfit.show import figures as plots
-from exfit.show import live
-from exfit.show.figure_files import FigureFiles
 from exfit.util import files
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
@@ -738,7 +738,7 @@ INTERRUPTED = """\
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
-from exfit.show import live, terminal
+from exfit.output import live, terminal
 show = live.LiveIterations.__call__
 def interrupted(self, line):
     show(self, line)

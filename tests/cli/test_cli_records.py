@@ -9,7 +9,7 @@ import pytest
 import yaml
 from places import ROOT
 
-from exfit.show import figures as plots
+from exfit.output import figures as plots
 
 SAMPLE = ROOT / "sample_data" / "ac1a_up.csv"
 WIDTH = 80

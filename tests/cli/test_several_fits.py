@@ -17,9 +17,9 @@ from tiers import few_of
 
 from exfit import workflows
 from exfit.errors import ExfitError
+from exfit.output import figures as plots
+from exfit.output import run_folder, terminal
 from exfit.results.verdict import GOOD, MATCHES, NOT_CONVERGED
-from exfit.show import figures as plots
-from exfit.show import run_folder, terminal
 
 BOTH = ("--strategy", "dgn", "--strategy", "lm")
 WIDTH = 80
@@ -220,7 +220,7 @@ INTERRUPTED = """\
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
-from exfit.show import live
+from exfit.output import live
 show = live.SeriesProgress.__call__
 def interrupted(self, fit, progress):
     show(self, fit, progress)

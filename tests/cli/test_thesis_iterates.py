@@ -18,7 +18,7 @@ from places import CONFIGS, SAMPLES
 from tiers import few_of
 from typed_thesis import Typed, residuals_of
 
-from exfit.show import figures as plots
+from exfit.output import figures as plots
 
 SAME = 1e-8
 H = 0.01

@@ -25,7 +25,7 @@ from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.system import values_of
-from exfit.show.run_folder import write_fit
+from exfit.output.run_folder import write_fit
 from exfit.workflows import fit, simulate, validate
 from exfit.workflows.given_values import changed_values, read_parameters
 from exfit.workflows.model_check import check

@@ -28,10 +28,10 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.search import fitted
 from exfit.models import MODELS
 from exfit.models.families import without_doubles
+from exfit.output import fits, terminal
 from exfit.records.record import Record
 from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
-from exfit.show import fits, terminal
 from exfit.workflows import check, fit, profile, simulate
 from exfit.workflows.given_values import changed_values, read_parameters, with_given_values
 

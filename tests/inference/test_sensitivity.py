@@ -17,9 +17,9 @@ from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.inference.identifiability import effects
 from exfit.inference.linear import ResidualBlock
+from exfit.output.fits import ranking
 from exfit.results.io import result_text
 from exfit.results.tables import effects_table
-from exfit.show.fits import ranking
 from exfit.workflows import fit, simulate
 
 SMALL = 1e-4  # relative: a central difference over it is off by about its square

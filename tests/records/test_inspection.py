@@ -24,12 +24,12 @@ from exfit.case.suggestion import (
 )
 from exfit.dsp.step_detection import DetectedStep
 from exfit.errors import RecordError
+from exfit.output import figures as plots
 from exfit.records.channel_names import connection_of, guess_signals, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.steps import combined_steps
 from exfit.records.units import unit_in
-from exfit.show import figures as plots
 
 FIELD = "field_record"
 WITHIN = 0.02  # s

@@ -11,8 +11,8 @@ from rich.console import Console
 import exfit
 from exfit.dsp.features import TIMES
 from exfit.dsp.recorded_features import EITHER, RecordedResponse, recorded_features
-from exfit.show.terminal import show
-from exfit.show.validations import comparisons
+from exfit.output.terminal import show
+from exfit.output.validations import comparisons
 
 RECORDS = 20
 WAYS = {

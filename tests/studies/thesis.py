@@ -54,8 +54,8 @@ from thesis_runs import (
 
 import exfit
 from exfit.models import MODELS
-from exfit.show.figures import style
-from exfit.show.figures.style import SIMULATED, START
+from exfit.output.figures import style
+from exfit.output.figures.style import SIMULATED, START
 
 PAGE = ROOT / "docs" / "thesis.md"
 FOLDER = PAGE.parent / "img"

@@ -43,10 +43,10 @@ from gallery import smaller
 from places import ROOT
 
 from exfit.errors import ExfitError
+from exfit.output.figures.style import GREEN, LIMIT, MEASURED, SIMULATED, WIDTH
 from exfit.results.comparisons import Overlay
 from exfit.results.model import FitResult
 from exfit.results.verdict import Cause
-from exfit.show.figures.style import GREEN, LIMIT, MEASURED, SIMULATED, WIDTH
 from exfit.workflows import fit
 
 SEED = 2026

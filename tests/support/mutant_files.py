@@ -134,7 +134,7 @@ def _parameters(rng: Random, changes: Changes) -> Files:
 def _of_a_fit(name: str = "first_order") -> Mapping[str, bytes]:
     """Return the numbers that a fit of a case leaves."""
     from exfit import fit
-    from exfit.show.run_folder import write_fit
+    from exfit.output.run_folder import write_fit
 
     with tempfile.TemporaryDirectory() as folder:
         write_fit(fit(CONFIGS / f"{name}.yaml", search="local"), Path(folder))

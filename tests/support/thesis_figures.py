@@ -10,8 +10,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 import exfit
+from exfit.output.figures.style import COLORS, MEASURED, SIMULATED, START, tidy
 from exfit.results.comparisons import Comparison
-from exfit.show.figures.style import COLORS, MEASURED, SIMULATED, START, tidy
 
 Array = NDArray[np.float64]
 

@@ -31,8 +31,8 @@ from exfit.case.case import Case
 from exfit.features.compare.agreement import compare
 from exfit.features.compare.curves import Difference
 from exfit.fitting.search import fitted
+from exfit.output import run_folder
 from exfit.results.comparisons import Comparison
-from exfit.show import run_folder
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

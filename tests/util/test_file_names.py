@@ -7,7 +7,7 @@ from exfit.features.design import files as design
 from exfit.features.rank import ranking_output as rank
 from exfit.features.report.writing import PAGE, PRINT
 from exfit.features.translate import files as translate
-from exfit.show import run_folder
+from exfit.output import run_folder
 from exfit.util.file_names import (
     OWN_NAMES,
     WHOLE_PROGRAMME,

@@ -16,10 +16,10 @@ from exfit.features.fleet.page import fleet_page
 from exfit.features.fleet.sisters import sisters
 from exfit.features.fleet.table import fleet_table, parameter_table
 from exfit.features.report.page import html as report_html
+from exfit.output import fits, terminal
+from exfit.output.figures import profiles as profile_figure
+from exfit.output.notebook import fit_html
 from exfit.results.verdict import MISSES, NO_MATCH
-from exfit.show import fits, terminal
-from exfit.show.figures import profiles as profile_figure
-from exfit.show.notebook import fit_html
 
 IN_PLACE = {MISSES: "none: misses", NO_MATCH: "none: no match"}
 

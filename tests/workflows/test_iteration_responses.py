@@ -11,9 +11,9 @@ from tiers import few_of
 
 from exfit import workflows
 from exfit.fitting.experiment import Experiment
+from exfit.output import figures as plots
+from exfit.output import run_folder
 from exfit.results.tables import DIGITS
-from exfit.show import figures as plots
-from exfit.show import run_folder
 from exfit.workflows import fit_run, responses
 
 

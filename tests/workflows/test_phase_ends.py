@@ -7,8 +7,8 @@ from places import ROOT
 import exfit
 from exfit.case.load import load_case
 from exfit.features.report.page import html
+from exfit.output import run_folder
 from exfit.results.io import load_result
-from exfit.show import run_folder
 from exfit.workflows.given_values import read_parameters
 
 CASE = ROOT / "configs" / "ac1a_low.yaml"

@@ -10,7 +10,7 @@ import click
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options
 from exfit.errors import ExfitError
-from exfit.show.blocks import Block, Table, columns, notes, number, paragraph, row
+from exfit.output.blocks import Block, Table, columns, notes, number, paragraph, row
 from exfit.util.text import percentage, rounded
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def compare(
     from exfit.features.compare.agreement import compare as compared
     from exfit.features.compare.curves import ColumnChoice
     from exfit.features.compare.files import FILES, write_agreement
-    from exfit.show import run_folder
+    from exfit.output import run_folder
 
     folder = output.folder("compare", FILES)
     run_folder.refuse_inputs(FILES, [*curves, *([record] if record else ())], folder)
@@ -130,7 +130,7 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
     """Yield the differences of responses and a record, features of their step, fitted values."""
     from exfit.dsp.features import LABELS
     from exfit.features.compare.curves import RECORD
-    from exfit.show.series import rows_table, side_by_side
+    from exfit.output.series import rows_table, side_by_side
 
     files = []
     for curve in result.curves:

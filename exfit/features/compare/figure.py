@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from exfit.dsp.sampling import envelope
 from exfit.features.compare.curves import RECORD
-from exfit.show.figures.style import (
+from exfit.output.figures.style import (
     COLORS,
     MEASURED,
     MILLI,

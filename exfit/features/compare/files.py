@@ -5,8 +5,8 @@ from pathlib import Path
 
 from exfit.features.compare.agreement import Agreement
 from exfit.features.compare.curves import RECORD
+from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.results.tables import table
-from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.files import write_together
 from exfit.util.text import to_json
 

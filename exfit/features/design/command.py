@@ -8,7 +8,7 @@ import click
 
 from exfit.cli import completion
 from exfit.cli.options import Output, assignments, case_argument, load, output_options
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     NO_BREAK,
     Block,
     Table,

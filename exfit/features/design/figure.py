@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.features.design.designed_test import DesignedTest
-from exfit.show.figures.style import LIMIT, MEASURED, SIMULATED, new_figure, panels, tidy
+from exfit.output.figures.style import LIMIT, MEASURED, SIMULATED, new_figure, panels, tidy
 from exfit.signals import label_of
 
 

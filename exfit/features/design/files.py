@@ -7,9 +7,9 @@ from pathlib import Path
 from exfit.case.case_draft import CaseDraft
 from exfit.features.design.designed_test import DesignedTest
 from exfit.features.design.experiment_design import Design
+from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
+from exfit.output.run_folder import figures_of_uncertainty
 from exfit.results.tables import effects_table
-from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
-from exfit.show.run_folder import figures_of_uncertainty
 from exfit.util.file_names import SENSITIVITIES
 from exfit.util.files import write_together
 from exfit.util.text import to_json

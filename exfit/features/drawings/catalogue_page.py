@@ -71,7 +71,7 @@ def sample_response(model: Model) -> Response:
 
 def write_overview(folder: Path, models: Iterable[Model | Machine]) -> list[Path]:
     """Write the diagram of every model, a figure of every exciter, and a page that shows them."""
-    from exfit.show import figures as plots
+    from exfit.output import figures as plots
 
     written, sections = [], []
     for model in models:

@@ -136,7 +136,7 @@ def batch(
     shown: AbstractContextManager[BatchProgress | None] = nullcontext()
     if not (quiet or as_json):
         from exfit.features.fleet import terminal
-        from exfit.show.terminal import console
+        from exfit.output.terminal import console
 
         shown = terminal.BatchProgress(console()).running()
     with shown as observer:

@@ -14,9 +14,9 @@ from rich.text import Text
 
 from exfit.features.fleet.batch import BatchObserver
 from exfit.features.fleet.folder import CaseSummary, Fleet
+from exfit.output.blocks import Block, Mark, Note, Table, columns, row
+from exfit.output.terminal import STYLES, paragraph, show, written
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.show.blocks import Block, Mark, Note, Table, columns, row
-from exfit.show.terminal import STYLES, paragraph, show, written
 
 FIRST_LINE, BETWEEN_LINES = 10.0, 60.0  # s: when a file or pipe gets its lines
 REFRESHES = 2.0  # a second

@@ -47,7 +47,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
     programme_folder.refuse_inputs(inputs, names, folder)
     if output.shown:
         from exfit.features.programme.programme_terminal import ProgrammeProgress
-        from exfit.show import terminal
+        from exfit.output import terminal
 
         with ProgrammeProgress(terminal.console(), steps).running() as shown:
             result = run_programme(
@@ -86,7 +86,7 @@ def check(path: Path) -> bool:
     from exfit.features.programme import programme_blocks
     from exfit.features.programme.programme import load_programme
     from exfit.features.programme.run import check_programme
-    from exfit.show import terminal
+    from exfit.output import terminal
 
     sound, console = True, terminal.console()
     for checked in check_programme(load_programme(path)):

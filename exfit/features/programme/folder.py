@@ -22,13 +22,13 @@ from exfit.features.programme.result import (
     StepResult,
     VCurve,
 )
+from exfit.output import run_folder
+from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.results.io import load_result, result_text
 from exfit.results.model import FitResult
 from exfit.results.tables import table
 from exfit.runs import store
 from exfit.runs.runner import AS_CASES_SAY, FitSettings
-from exfit.show import run_folder
-from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.signals import TERMINALS
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
 from exfit.util.files import read_json, write, write_together

@@ -12,9 +12,8 @@ from exfit.features.programme.result import (
     VCurve,
 )
 from exfit.features.programme.run import CheckedStep
-from exfit.results.model import FitResult
-from exfit.show import fits, models
-from exfit.show.blocks import (
+from exfit.output import fits, models
+from exfit.output.blocks import (
     Block,
     Heading,
     Table,
@@ -28,6 +27,7 @@ from exfit.show.blocks import (
     row,
     unresolved,
 )
+from exfit.results.model import FitResult
 from exfit.signals import TERMINALS
 from exfit.workflows.model_check import Check
 

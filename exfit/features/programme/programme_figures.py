@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.features.programme.result import SaturationResult, VCurve
-from exfit.show.figures.style import (
+from exfit.output.figures.style import (
     COLORS,
     GREEN,
     LIMIT,

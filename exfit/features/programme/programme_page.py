@@ -24,7 +24,7 @@ from exfit.features.report.form import (
 from exfit.features.report.matches import fitted_matches
 from exfit.features.report.model import findings, parameters
 from exfit.features.report.page import FORM, Headline, Page, ReportSection, fit_page
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Chart,

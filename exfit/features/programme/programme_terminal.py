@@ -6,9 +6,9 @@ from rich.console import Console
 
 from exfit.estimate import Progress
 from exfit.features.programme.result import FinishedTest, ProgrammeStep
+from exfit.output.live import BRIEF, RunLines, progress_words
 from exfit.results.model import FitResult, Iteration
 from exfit.results.verdict import NOT_CONVERGED
-from exfit.show.live import BRIEF, RunLines, progress_words
 from exfit.util.text import percentage
 
 KIND, VERDICT, SECONDS = 10, 27, 7  # characters of the columns behind the name

@@ -18,7 +18,7 @@ from exfit.cli.options import (
 from exfit.util.vocabulary import SEARCHES, SEARCHES_EXPLAINED
 
 if TYPE_CHECKING:
-    from exfit.show.figure_files import FigureFiles
+    from exfit.output.figure_files import FigureFiles
 
 
 @click.command(short_help="Fit the records of a case under several models, and compare these.")
@@ -68,7 +68,7 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
         if output.as_json:
             print_json(ranking.to_dict())
         elif output.shown:
-            from exfit.show import terminal
+            from exfit.output import terminal
 
             console = terminal.console()
             console.print()

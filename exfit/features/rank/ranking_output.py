@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from exfit.features.rank.ranked_cases import Ranking
 from exfit.features.rank.ranking import RankedModel
+from exfit.output.blocks import Block, Table, columns, notes, number, paragraph, remarks, row
+from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.results.tables import DIGITS, csv_text
-from exfit.show.blocks import Block, Table, columns, notes, number, paragraph, remarks, row
-from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.files import write_together
 from exfit.util.text import to_json
 
@@ -100,8 +100,8 @@ def _figures(ranking: Ranking) -> PlannedFigures:
 
 def ranking_figure(ranking: Ranking) -> "Figure":
     """Return the first fitted record and the first unseen one with the responses of the best."""
-    from exfit.show.figures.responses import responses_beside
-    from exfit.show.figures.style import new_figure
+    from exfit.output.figures.responses import responses_beside
+    from exfit.output.figures.style import new_figure
 
     least = min(result.rmse for result in ranking.results.values())
     near = {k: fit for k, fit in ranking.results.items() if fit.rmse <= FARTHEST * least}

@@ -15,10 +15,7 @@ from exfit.features.report.words import (
     number,
     values_of,
 )
-from exfit.results.description import SmallSignalView
-from exfit.results.model import FitResult
-from exfit.results.validation_result import Reported
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Chart,
@@ -33,6 +30,9 @@ from exfit.show.blocks import (
     columns,
     row,
 )
+from exfit.results.description import SmallSignalView
+from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 from exfit.simulation.small_signal import Bode, Margins, Pole, SmallSignal
 
 NOT_HELD = "not stated: the fit was interrupted"

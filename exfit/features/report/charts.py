@@ -10,7 +10,7 @@ from math import ceil, floor, log10
 
 import numpy as np
 
-from exfit.show.blocks import Chart, Panel, Range, Rule, Series
+from exfit.output.blocks import Chart, Panel, Range, Rule, Series
 from exfit.util.arrays import Array
 
 MILLI = 1e3

@@ -11,13 +11,7 @@ from exfit.features.programme.result import ProgrammeResult
 from exfit.features.report.behaviour import UsabilityCheck, no_usability, usability
 from exfit.features.report.words import DASH, number
 from exfit.models.families import family_of
-from exfit.results import facts
-from exfit.results.criteria import judged_by_criteria
-from exfit.results.description import PartDescription, RecordedTest, values_of_part
-from exfit.results.facts import AskedFact, answer, stated
-from exfit.results.model import FitResult
-from exfit.results.validation_result import Reported, ValidationResult
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Facts,
@@ -29,6 +23,12 @@ from exfit.show.blocks import (
     columns,
     row,
 )
+from exfit.results import facts
+from exfit.results.criteria import judged_by_criteria
+from exfit.results.description import PartDescription, RecordedTest, values_of_part
+from exfit.results.facts import AskedFact, answer, stated
+from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.util.text import rounded, show
 from exfit.util.vocabulary import NOT_STATED, by_source
 

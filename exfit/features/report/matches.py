@@ -9,14 +9,7 @@ from exfit.dsp.features import LABELS
 from exfit.dsp.sampling import envelope, kept_rows
 from exfit.features.report.charts import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.features.report.words import DASH, number
-from exfit.results.comparisons import REFERENCE, Comparison, Excursion
-from exfit.results.criteria import judged_by_criteria
-from exfit.results.facts import PLANT, REVISION, UNIT, stated
-from exfit.results.model import FitResult
-from exfit.results.side_by_side import ParameterValue, outcome_of, parameters_beside
-from exfit.results.tables import clock_digits
-from exfit.results.validation_result import Reported, ValidationResult
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Chart,
@@ -30,6 +23,13 @@ from exfit.show.blocks import (
     columns,
     row,
 )
+from exfit.results.comparisons import REFERENCE, Comparison, Excursion
+from exfit.results.criteria import judged_by_criteria
+from exfit.results.facts import PLANT, REVISION, UNIT, stated
+from exfit.results.model import FitResult
+from exfit.results.side_by_side import ParameterValue, outcome_of, parameters_beside
+from exfit.results.tables import clock_digits
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.signals import label_of
 from exfit.util.arrays import Array
 from exfit.util.text import percentage, show

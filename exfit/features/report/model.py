@@ -10,12 +10,7 @@ from exfit.features.drawings.letters import diagram_and_remarks
 from exfit.features.planner.export import export, place_of
 from exfit.features.report.form import command_of
 from exfit.features.report.words import DASH, has_no_equations, number
-from exfit.results.criteria import judged_by_criteria
-from exfit.results.description import SheetRow
-from exfit.results.influences import DEVIATION, by_weight, moved_parameters
-from exfit.results.model import FitResult, FittedParameter
-from exfit.results.validation_result import Reported
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Diagram,
@@ -30,6 +25,11 @@ from exfit.show.blocks import (
     remarks,
     row,
 )
+from exfit.results.criteria import judged_by_criteria
+from exfit.results.description import SheetRow
+from exfit.results.influences import DEVIATION, by_weight, moved_parameters
+from exfit.results.model import FitResult, FittedParameter
+from exfit.results.validation_result import Reported
 from exfit.util.vocabulary import ORIGIN_OF_CRITERIA, Criteria
 
 Row = tuple[Cell, ...]

@@ -24,15 +24,15 @@ from exfit.features.report.matches import (
 from exfit.features.report.model import criteria, dynamics, findings, model, parameters
 from exfit.features.report.search import identifiability, search
 from exfit.features.report.words import number
+from exfit.output.blocks import Block, Chart
+from exfit.output.html import html as blocks_html
+from exfit.output.html import sentence
 from exfit.results.comparisons import Comparison
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.validation_result import Reported, ValidationResult
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.show.blocks import Block, Chart
-from exfit.show.html import html as blocks_html
-from exfit.show.html import sentence
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -19,12 +19,7 @@ from exfit.features.report.charts import (
 from exfit.features.report.matches import line, range_of
 from exfit.features.report.words import DASH, number
 from exfit.fitting.uncertainty import Sensitivity
-from exfit.results.comparisons import IterationResponses
-from exfit.results.influences import by_weight
-from exfit.results.model import FitResult, FittedParameter, Iteration, Minima
-from exfit.results.tables import yes_or_no
-from exfit.results.thinning import drawn_responses
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Chart,
@@ -39,6 +34,11 @@ from exfit.show.blocks import (
     columns,
     row,
 )
+from exfit.results.comparisons import IterationResponses
+from exfit.results.influences import by_weight
+from exfit.results.model import FitResult, FittedParameter, Iteration, Minima
+from exfit.results.tables import yes_or_no
+from exfit.results.thinning import drawn_responses
 from exfit.signals import label_of
 from exfit.util.arrays import Array
 from exfit.util.text import show

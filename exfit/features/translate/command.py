@@ -10,7 +10,7 @@ from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import NOT_CONVERGED, Output, output_options
 from exfit.errors import ExfitError
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     NO_BREAK,
     Block,
     Table,
@@ -66,8 +66,8 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     from exfit.features.translate.files import FILES, write_translation
     from exfit.features.translate.translate import target_model
     from exfit.features.translate.translate import translate as translated
+    from exfit.output import run_folder
     from exfit.results.io import load_result, result_file
-    from exfit.show import run_folder
 
     source = result_file(result)
     fit = load_result(source)
@@ -76,7 +76,7 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     run_folder.refuse_inputs(FILES, [source], folder)
     try:
         if output.shown:
-            from exfit.show import live, terminal
+            from exfit.output import live, terminal
 
             with live.ProgressBar(terminal.console()).running() as progress:
                 translation = translated(fit, target, steps, progress)

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.sampling import envelope
-from exfit.show.figures.style import SIMULATED, START, new_figure, panels, tidy
+from exfit.output.figures.style import SIMULATED, START, new_figure, panels, tidy
 from exfit.signals import label_of
 
 if TYPE_CHECKING:

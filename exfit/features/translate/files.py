@@ -15,12 +15,12 @@ from exfit.features.planner.records import alternatives
 from exfit.features.translate.result import TranslatedParameter, Translation
 from exfit.features.translate.steps import network_of
 from exfit.models.sheet import Model, Parameter
+from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.plants import MACHINE, NETWORK
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.results.model import FitResult
 from exfit.results.tables import table
-from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.files import write_together
 from exfit.util.text import to_json
 from exfit.util.vocabulary import FITTED, SOURCES

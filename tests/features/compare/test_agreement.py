@@ -15,8 +15,8 @@ from exfit.errors import RecordError
 from exfit.features.compare.agreement import compare
 from exfit.features.compare.curves import ColumnChoice
 from exfit.features.compare.figure import agreement as agreement_figure
-from exfit.show import figures as plots
-from exfit.show import run_folder
+from exfit.output import figures as plots
+from exfit.output import run_folder
 
 BY_NAME = ColumnChoice()
 LAG = 0.25  # s

@@ -8,7 +8,7 @@ from exfit.features.drawings import catalogue_page
 from exfit.features.drawings.catalogue_page import sample_response
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.show import figures as plots
+from exfit.output import figures as plots
 
 
 @pytest.mark.parametrize(

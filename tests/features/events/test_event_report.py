@@ -10,9 +10,9 @@ from pages import Page
 
 from exfit.features.report.behaviour import usability
 from exfit.features.report.page import html
+from exfit.output.terminal import GuardedConsole, show
+from exfit.output.validations import comparisons
 from exfit.results.io import load_result, result_text
-from exfit.show.terminal import GuardedConsole, show
-from exfit.show.validations import comparisons
 from exfit.simulation.small_signal import Pole
 from exfit.workflows import fit
 

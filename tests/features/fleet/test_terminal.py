@@ -13,7 +13,7 @@ from exfit.features.fleet.terminal import (
     BatchProgress,
 )
 from exfit.features.fleet.terminal import batch as show_batch
-from exfit.show.terminal import GuardedConsole
+from exfit.output.terminal import GuardedConsole
 
 
 class Clock:

@@ -24,8 +24,8 @@ from exfit.features.planner.records import definition_of
 from exfit.features.planner.units import read_unit
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.sheet import record, typical
+from exfit.output.run_folder import write_fit
 from exfit.plants import MACHINE
-from exfit.show.run_folder import write_fit
 from exfit.verdict import rule
 from exfit.workflows import fit
 

@@ -6,8 +6,8 @@ from rich.console import Console
 from exfit.features.programme import programme_figures
 from exfit.features.programme.programme_blocks import saturation
 from exfit.features.programme.saturation import saturation_curve
-from exfit.show import figures as plots
-from exfit.show import terminal
+from exfit.output import figures as plots
+from exfit.output import terminal
 
 
 def test_the_numbers_of_a_saturation_test_fit_a_narrow_terminal(monkeypatch):

@@ -18,8 +18,8 @@ from exfit.features.programme.v_curve import (
 from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.show import figures as plots
-from exfit.show import terminal
+from exfit.output import figures as plots
+from exfit.output import terminal
 from exfit.util.text import to_json
 from exfit.util.typed import plain
 from exfit.util.typed_reading import read

@@ -10,7 +10,7 @@ from places import CONFIGS
 
 from exfit import workflows
 from exfit.cli.completion import several_exciters
-from exfit.show import figures as plots
+from exfit.output import figures as plots
 
 CASE = CONFIGS / "ac8b_unit1.yaml"
 TWO = ("--models", "AC8B,sexs", "--search", "local")

@@ -12,9 +12,9 @@ from rich.console import Console
 import exfit
 from exfit.features.rank.ranking import STRONG, Likelihood, ranked, ranking_sentences
 from exfit.features.rank.ranking_output import ranking_blocks as blocks_of
+from exfit.output import terminal
 from exfit.results.comparisons import Overlay
 from exfit.results.verdict import NOT_CONVERGED, Verdict
-from exfit.show import terminal
 
 SAMPLES = 2000
 NO_SERIES = SimpleNamespace(failed={}, not_run=())

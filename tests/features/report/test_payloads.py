@@ -12,10 +12,10 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.features.drawings.diagram import block_diagram
 from exfit.features.report.page import html
+from exfit.output import fits, terminal
+from exfit.output.notebook import fit_html
+from exfit.output.terminal import GuardedConsole
 from exfit.results.io import load_result, result_text
-from exfit.show import fits, terminal
-from exfit.show.notebook import fit_html
-from exfit.show.terminal import GuardedConsole
 
 SHAPES = {"svg", "title", "desc", "path", "g", "text", "tspan"}
 

@@ -30,10 +30,10 @@ from exfit.features.report.matches import fitted_matches, live_data
 from exfit.features.report.page import headline, html
 from exfit.features.report.writing import write_report
 from exfit.models import from_file
+from exfit.output import run_folder
+from exfit.output.blocks import Chart, Panel, Series
 from exfit.results.comparisons import AsFound
 from exfit.results.io import load_result, result_file
-from exfit.show import run_folder
-from exfit.show.blocks import Chart, Panel, Series
 from exfit.util.text import rounded, rounded_value
 
 MOST = 3_000_000  # bytes of a page

@@ -8,8 +8,8 @@ from records import TEST, TIME, case_of, one, synthetic
 from exfit import cli, workflows
 from exfit.features.report.matches import against
 from exfit.features.report.page import html
-from exfit.show import run_folder
-from exfit.show.blocks import Chart
+from exfit.output import run_folder
+from exfit.output.blocks import Chart
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from records import config, recording, several
 from exfit import workflows
 from exfit.case.load import parse_case
 from exfit.features.report.writing import write_report
-from exfit.show import run_folder
+from exfit.output import run_folder
 
 pytestmark = pytest.mark.long  # a browser is started for each page
 

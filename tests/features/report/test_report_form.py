@@ -13,8 +13,8 @@ from exfit.features.report.behaviour import usability
 from exfit.features.report.form import form, form_without_bumps, rated, signatures
 from exfit.features.report.matches import as_found
 from exfit.features.report.page import fit_page, html
+from exfit.output.blocks import Chart, Note, Table
 from exfit.results import facts
-from exfit.show.blocks import Chart, Note, Table
 
 QUICK = ("first_order", "machine_playback")  # the others are fitted in the long run
 SAMPLES = [

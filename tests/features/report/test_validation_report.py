@@ -11,8 +11,8 @@ from pages import Page
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.report.writing import write_report
+from exfit.output.run_folder import write_validation
 from exfit.results.io import load_validation
-from exfit.show.run_folder import write_validation
 from exfit.workflows import validation_result
 
 WRONG = {"K": 40.0}  # in the planner's base: half the gain of the unit

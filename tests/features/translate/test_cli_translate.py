@@ -9,7 +9,7 @@ from places import ROOT
 from exfit import workflows
 from exfit.case.load import load_case
 from exfit.features.planner.units import read_unit
-from exfit.show.run_folder import write_fit
+from exfit.output.run_folder import write_fit
 
 WIDTH = 80
 FILES = {"ac1a_good-EXAC1.yaml", "ac1a_good-EXAC1.dyr", "translation.csv", "translation.json"}

@@ -14,10 +14,10 @@ from exfit.features.report.page import html
 from exfit.fitting.search import fitted
 from exfit.fitting.system import typical_values_used
 from exfit.fitting.uncertainty import uncertainty_at
+from exfit.output.blocks import Table
 from exfit.results.influences import DEVIATION, by_weight, first_of, moved_parameters
 from exfit.results.intervals.value_errors import influence_of_typical_values
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.show.blocks import Table
 from exfit.workflows import fit
 
 NOISE = 1e-3  # of the response of the smallest model, which ends at 2

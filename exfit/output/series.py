@@ -2,15 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from exfit.results.model import FitResult
-from exfit.results.side_by_side import (
-    ParameterValue,
-    explanation_of,
-    outcome_of,
-    parameters_beside,
-)
-from exfit.runs.fits import FitSeries
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Heading,
     Note,
@@ -22,6 +14,14 @@ from exfit.show.blocks import (
     remarks,
     row,
 )
+from exfit.results.model import FitResult
+from exfit.results.side_by_side import (
+    ParameterValue,
+    explanation_of,
+    outcome_of,
+    parameters_beside,
+)
+from exfit.runs.fits import FitSeries
 from exfit.util.text import percentage
 
 COST = "f"  # label of its row

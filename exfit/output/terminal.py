@@ -15,7 +15,7 @@ from rich.segment import Segment, Segments
 from rich.table import Table as Grid
 from rich.text import Text
 
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     NO_BREAK,
     Block,
     Facts,
@@ -29,7 +29,7 @@ from exfit.show.blocks import (
 from exfit.util.text import printable
 
 if TYPE_CHECKING:
-    from exfit.show.figure_files import PlannedFigures
+    from exfit.output.figure_files import PlannedFigures
 
 NARROW = 80  # columns where the width is unknown
 DEEPEST_INDENT = 14  # characters: more would leave a sentence a narrow column

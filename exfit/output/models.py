@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING
 
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
-from exfit.show.blocks import Block, Note, Table, Verbatim, columns, notes, paragraph, remarks, row
+from exfit.output.blocks import (
+    Block,
+    Note,
+    Table,
+    Verbatim,
+    columns,
+    notes,
+    paragraph,
+    remarks,
+    row,
+)
 
 if TYPE_CHECKING:
     from exfit.workflows.model_check import Check

@@ -3,8 +3,8 @@
 from pages import Page
 from payloads import MARKUP, Structure
 
-from exfit.show.blocks import Cell, Facts, Heading, Note, Table, Verbatim, columns, row
-from exfit.show.html import html
+from exfit.output.blocks import Cell, Facts, Heading, Note, Table, Verbatim, columns, row
+from exfit.output.html import html
 
 
 def page_of(text):

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from exfit.dsp.sampling import PIXELS, envelope
-from exfit.results.comparisons import REFERENCE, Comparison
-from exfit.show.figures.style import (
+from exfit.output.figures.style import (
     COLORS,
     LIMIT,
     MEASURED,
@@ -24,6 +23,7 @@ from exfit.show.figures.style import (
     short,
     tidy,
 )
+from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.simulator import Response
 from exfit.util.arrays import Array

@@ -3,10 +3,10 @@
 from matplotlib.figure import Figure
 
 from exfit.errors import ExfitError
+from exfit.output.blocks import Block, Cell, Note, Table, columns, interval, number, row
+from exfit.output.figures import overlay
+from exfit.output.html import html
 from exfit.results.model import FitResult, FittedParameter
-from exfit.show.blocks import Block, Cell, Note, Table, columns, interval, number, row
-from exfit.show.figures import overlay
-from exfit.show.html import html
 from exfit.util.text import near, percentage
 
 __all__ = ["Figure", "fit_figure", "fit_html"]

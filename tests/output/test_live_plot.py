@@ -13,8 +13,8 @@ from rich.text import Text
 
 from exfit import workflows
 from exfit.fitting.experiment import Experiment
+from exfit.output import live
 from exfit.results.model import Iteration
-from exfit.show import live
 from exfit.workflows.responses import LiveResponse
 
 TIME = np.linspace(0.0, 10.0, 1001)

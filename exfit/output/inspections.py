@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 
 from exfit.dsp.sampling import Sampling
+from exfit.output.blocks import Block, Table, Verbatim, columns, notes, number, paragraph, row
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 from exfit.records.pmu_recognition import PmuContent
-from exfit.show.blocks import Block, Table, Verbatim, columns, notes, number, paragraph, row
 
 NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
 MOST_ROWS = 40  # channels, steps or notes of a file that someone reads through

@@ -1,6 +1,6 @@
 """Figures of results: functions that return one, and touch nothing else."""
 
-from exfit.show.figures.responses import (
+from exfit.output.figures.responses import (
     fit_series,
     inspection,
     overlay,
@@ -8,7 +8,7 @@ from exfit.show.figures.responses import (
     overview,
     response,
 )
-from exfit.show.figures.search import (
+from exfit.output.figures.search import (
     convergence,
     correlation,
     iterations,
@@ -17,7 +17,7 @@ from exfit.show.figures.search import (
     trajectories,
     waterfall,
 )
-from exfit.show.figures.style import drawn, encoded, png
+from exfit.output.figures.style import drawn, encoded, png
 
 __all__ = [
     "convergence",

@@ -10,8 +10,8 @@ from places import ROOT
 
 from exfit import workflows
 from exfit.case.load import load_case
-from exfit.show import figures as plots
-from exfit.show import run_folder
+from exfit.output import figures as plots
+from exfit.output import run_folder
 
 ROUNDING = 1.5  # dots: letters begin at whole ones
 # the starts of a search in one, two signals and ten parameters in the other

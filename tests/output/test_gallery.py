@@ -24,9 +24,9 @@ from gallery import (
 
 from exfit import workflows
 from exfit.case.load import load_case
+from exfit.output import figures as plots
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
-from exfit.show import figures as plots
 
 pytestmark = pytest.mark.long  # every figure of the documentation is drawn
 

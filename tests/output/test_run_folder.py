@@ -18,11 +18,11 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.report.page import html
+from exfit.output import figure_files, run_folder
+from exfit.output import figures as plots
 from exfit.results import io
 from exfit.results.io import load_result
 from exfit.results.tables import DIGITS, parameter_file, table
-from exfit.show import figure_files, run_folder
-from exfit.show import figures as plots
 from exfit.util.files import write
 from exfit.util.text import to_json
 from exfit.workflows.given_values import read_parameters

@@ -1,6 +1,6 @@
 """What is shown of a result, as data: each part yields blocks, and a renderer shows them.
 
-Nothing here knows a terminal, a page or a picture: `exfit.show.terminal` writes blocks to
+Nothing here knows a terminal, a page or a picture: `exfit.output.terminal` writes blocks to
 a terminal, the report writes the same ones as HTML.
 """
 

@@ -17,13 +17,13 @@ from rich.text import Text
 
 from exfit.case.case import Case
 from exfit.estimate import Progress
+from exfit.output.terminal import paragraph
 from exfit.results.model import Iteration
 from exfit.results.side_by_side import outcome_of
 from exfit.results.tables import yes_or_no
 from exfit.results.verdict import MATCHES, MISSES
 from exfit.runs.fits import FitRun, PlannedFit
 from exfit.runs.fits import Progress as ProgressOfFit
-from exfit.show.terminal import paragraph
 from exfit.util.arrays import Array
 from exfit.workflows.responses import LiveResponse
 

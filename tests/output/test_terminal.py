@@ -16,11 +16,11 @@ from exfit.features.fleet.folder import Fleet, summary_of
 from exfit.features.fleet.page import fleet_page
 from exfit.features.fleet.sisters import sisters
 from exfit.features.report.page import html as report_html
+from exfit.output import fits, terminal
+from exfit.output.blocks import interval, notes
+from exfit.output.notebook import fit_html
+from exfit.output.series import side_by_side
 from exfit.results.verdict import MATCHES, MISSES, Cause, Verdict
-from exfit.show import fits, terminal
-from exfit.show.blocks import interval, notes
-from exfit.show.notebook import fit_html
-from exfit.show.series import side_by_side
 
 SENTENCE = (
     "KD, TE and KA can move together (KD +51 %, TE +10 %, KA +9.7 %): vt changes by 3.2e-6 pu rms, "

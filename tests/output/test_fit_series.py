@@ -6,8 +6,8 @@ import pytest
 from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
-from exfit.show import figures as plots
-from exfit.show.figures.responses import MOST_CASES
+from exfit.output import figures as plots
+from exfit.output.figures.responses import MOST_CASES
 
 STRATEGIES = ["dgn", "lm", "gn"]
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
+from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.results.tables import DIGITS, whole_table
-from exfit.show.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.util.cache import keep_private, private_cache, read_private
 from exfit.util.file_names import (
     HISTORY,
@@ -119,7 +119,7 @@ def write_fit(result: "FitResult", folder: Path) -> FigureFiles:
 
 def figures_of_fit(result: "FitResult") -> PlannedFigures:
     """Return the figures of a fit."""
-    from exfit.show import figures as plots
+    from exfit.output import figures as plots
 
     plan: dict[str, PlannedFigure] = {}
     title, several = f"{result.name}: {result.model} fitted to ", result.comparisons
@@ -155,7 +155,7 @@ def figures_of_fit(result: "FitResult") -> PlannedFigures:
 
 def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> PlannedFigures:
     """Plan the figures of the sensitivities over time and of the correlations."""
-    from exfit.show import figures as plots
+    from exfit.output import figures as plots
 
     moves = partial(plots.sensitivity, uncertainty, name)
     together = partial(plots.correlation, uncertainty, name)
@@ -167,7 +167,7 @@ def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> Pla
 
 def figures_of_comparisons(comparisons: "Iterable[Comparison]") -> PlannedFigures:
     """Return the overlay of each comparison under its name."""
-    from exfit.show import figures as plots
+    from exfit.output import figures as plots
 
     return {
         f"{match.name}.png": PlannedFigure(
@@ -187,7 +187,7 @@ def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
     from exfit.results.tables import parameter_file
 
     def planned() -> PlannedFigures:
-        from exfit.show import figures as plots
+        from exfit.output import figures as plots
 
         draw = PlannedFigure(
             "responses, errors and costs of all fits", partial(plots.fit_series, series)
@@ -222,7 +222,7 @@ def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:
     """Write the profiles of parameters as JSON and as a table; return their figure."""
 
     def planned() -> PlannedFigures:
-        from exfit.show import figures as plots
+        from exfit.output import figures as plots
 
         draw = partial(plots.profiles, profiles)
         return {"profile.png": PlannedFigure("the cost along each parameter", draw)}
@@ -243,7 +243,7 @@ def write_inspection(inspection: "Inspection", folder: Path) -> FigureFiles:
     """Write what a recorder's file holds as JSON; return its figure."""
 
     def planned() -> PlannedFigures:
-        from exfit.show import figures as plots
+        from exfit.output import figures as plots
 
         draw = partial(plots.inspection, inspection, inspection.path.name)
         return {"inspect.png": PlannedFigure("the channels, with steps, gaps and spikes", draw)}
@@ -256,7 +256,7 @@ def write_simulation(simulation: "SimulationResult", name: str, folder: Path) ->
     """Write a response; return its figures, beside its record where there is one."""
 
     def planned() -> PlannedFigures:
-        from exfit.show import figures as plots
+        from exfit.output import figures as plots
 
         draw, match = partial(plots.response, response, name), simulation.comparison
         plan = {"response.png": PlannedFigure("every signal and state", draw)}

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from itertools import groupby
 
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Chart,

@@ -6,9 +6,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from exfit.inference.identifiability import ParameterEffect
-from exfit.results.model import FitResult, FittedParameter
-from exfit.results.verdict import GOOD, MATCHES
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     NO_BREAK,
     Block,
     Mark,
@@ -26,7 +24,9 @@ from exfit.show.blocks import (
     row,
     unresolved,
 )
-from exfit.show.validations import comparisons, in_a_line, played, rejections
+from exfit.output.validations import comparisons, in_a_line, played, rejections
+from exfit.results.model import FitResult, FittedParameter
+from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.text import percentage
 from exfit.util.vocabulary import by_source
 

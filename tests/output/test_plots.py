@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from tiers import few_of
 
+from exfit.output import figures as plots
 from exfit.results.compare_with_record import driving_signals
 from exfit.results.comparisons import (
     Comparison,
@@ -19,7 +20,6 @@ from exfit.results.comparisons import (
 )
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.results.verdict import GOOD, Verdict
-from exfit.show import figures as plots
 from exfit.simulation.simulator import Response
 from exfit.util.vocabulary import PHASES
 

@@ -11,9 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from exfit.dsp.sampling import envelope
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.results.comparisons import IterationResponses
-from exfit.results.model import FitResult, Minima
-from exfit.show.figures.style import (
+from exfit.output.figures.style import (
     COLORS,
     GREEN,
     LIMIT,
@@ -28,6 +26,8 @@ from exfit.show.figures.style import (
     short,
     tidy,
 )
+from exfit.results.comparisons import IterationResponses
+from exfit.results.model import FitResult, Minima
 from exfit.signals import label_of
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE

@@ -102,7 +102,7 @@ def _encoded(figure: PlannedFigure, pool: "ThreadPoolExecutor") -> "Future[bytes
     """Draw a figure, and have a thread encode it; what hinders that is raised by the result."""
     from concurrent.futures import Future
 
-    from exfit.show import figures as plots
+    from exfit.output import figures as plots
 
     try:
         return pool.submit(plots.encoded, plots.drawn(figure.draw()))

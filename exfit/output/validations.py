@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from exfit.dsp.features import LABELS
-from exfit.results.comparisons import Comparison, Excursion, StepFeatures
-from exfit.show.blocks import (
+from exfit.output.blocks import (
     Block,
     Cell,
     Note,
@@ -16,6 +15,7 @@ from exfit.show.blocks import (
     remarks,
     row,
 )
+from exfit.results.comparisons import Comparison, Excursion, StepFeatures
 from exfit.util.text import percentage
 
 FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interval
