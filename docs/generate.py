@@ -389,10 +389,12 @@ def with_key_tables(page: str) -> str:
 
 
 def with_contents(_app: Any, name: str, source: list[str]) -> None:
-    """Add to an index its table of contents, which is that of its links or of its folder."""
+    """Add to an index its table of contents: its groups of links, or the pages of its folder."""
     if name == "index":
-        pages = "\n".join(re.findall(r"^\* .*?\]\((.+?)\.(?:md|ipynb)\)", source[0], re.MULTILINE))
-        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
+        groups = re.findall(r"^## (.+)\n\n((?:\* .+\n)+)", source[0], re.MULTILINE)
+        for group, links in groups:
+            pages = "\n".join(re.findall(r"\]\((.+?)\.(?:md|ipynb)\)", links))
+            source[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {group}\n\n{pages}\n```\n"
     elif name == "models/index":
         source[0] += "\n## All models\n\n```{toctree}\n:maxdepth: 1\n:glob:\n\n[A-Z]*\n```\n"
 
