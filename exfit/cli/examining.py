@@ -62,7 +62,12 @@ def check(case: Path) -> None:
     is_flag=True,
     help="Print everything: sensitivities, what moves together, steps, sources, figures.",
 )
-def show(result: Path, everything: bool) -> None:
+@click.option(
+    "--history",
+    is_flag=True,
+    help="Print the iterations: cost f, gradient norm, step, damping, Armijo halvings.",
+)
+def show(result: Path, everything: bool, history: bool) -> None:
     """Print the RESULT of a fit or a validation again, as the run printed it.
 
     RESULT is the result.json of a fit, the validation.json of a validation, or the folder that
@@ -79,11 +84,20 @@ def show(result: Path, everything: bool) -> None:
         raise ExfitError(f"{result}: a programme; `exfit report` makes a page of it")
     validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
     if source == validated or (validated.is_file() and not source.exists()):
+        if history:
+            raise ExfitError(f"{result}: a validation has no iterations: give the result of a fit")
         validation = load_validation(validated)
         terminal.show(console, [paragraph(validation.origin)])
         terminal.show(console, validations.validation(validation.matches))
         return
     fit, folder = load_result(source), source.parent
+    if history:
+        from exfit.output.iterations import iterations
+
+        terminal.show(console, iterations(fit.history))
+        if not everything:
+            return
+        console.print()
     if not everything:
         terminal.show_shortest(console, fits.briefs(fit, folder))
         return

@@ -17,10 +17,10 @@ from rich.text import Text
 
 from exfit.case.case import Case
 from exfit.estimate import Progress
+from exfit.output.iterations import COLUMNS, IterationColumn
 from exfit.output.terminal import paragraph
 from exfit.results.model import Iteration
 from exfit.results.side_by_side import outcome_of
-from exfit.results.tables import yes_or_no
 from exfit.results.verdict import MATCHES, MISSES
 from exfit.runs.fits import FitRun, PlannedFit
 from exfit.runs.fits import Progress as ProgressOfFit
@@ -31,14 +31,13 @@ Dots = NDArray[np.bool_]
 
 MOST_ITERATIONS = 12  # shown at a time
 FEWEST_ITERATIONS = 4  # beside a plot
-HISTORY_WIDTH = 70  # characters of the history
+HISTORY_WIDTH = 72  # characters of the history beside a plot
 BETWEEN_COLUMNS = 2  # characters between the history and a plot beside it
-OTHER_LINES = 5  # beside the history: title, what is hidden, names of columns, progress, cursor
+OTHER_LINES = 6  # beside the history: title, what is hidden, two of names, progress, cursor
 PLOT_HEIGHTS = (20, 14)  # lines of a plot beside the history and below it
 PLOT_WIDTH = 100  # characters at most
 SHARE_OF_TIME = 0.03  # of the time of a fit: so much may be spent on showing it
 QUIET = 5.0  # s: after so long without a line one says that the fit goes on
-FORMATS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>6}", "{:>5}", "{:>5}")
 STAGES = {
     "screening": ("screening", "points"),
     "refining": ("search", "further starts"),
@@ -46,7 +45,6 @@ STAGES = {
     "weighing": ("weighing by noise", "passes"),
     "causes": ("causes", "tried"),
 }  # in words, and what is counted
-HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "capped", "inner", "nfev")
 
 BRAILLE = 0x2800  # the cell without dots
 DOT_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # by row and column
@@ -168,7 +166,7 @@ class LiveIterations:
             plot = sketched(self._sketch, min(beside, PLOT_WIDTH), min(free, PLOT_HEIGHTS[0]))
             table = [
                 Text(line.plain.ljust(HISTORY_WIDTH + BETWEEN_COLUMNS), line.style)
-                for line in self._table(free)
+                for line in self._table(free, HISTORY_WIDTH)
             ]
             blank = Text(" " * (HISTORY_WIDTH + BETWEEN_COLUMNS))
             both = zip_longest(table, plot)
@@ -176,36 +174,27 @@ class LiveIterations:
             return _joined([*lines, self._progress()])
         if self._sketch is not None and below >= LEAST_HEIGHT and width > LEAST_WIDTH:
             plot = sketched(self._sketch, min(width - 1, PLOT_WIDTH), min(below, PLOT_HEIGHTS[1]))
-            return _joined([*self._table(free - len(plot)), self._progress(), *plot])
-        return _joined([*self._table(max(free, 1)), self._progress()])
+            return _joined([*self._table(free - len(plot), width), self._progress(), *plot])
+        return _joined([*self._table(max(free, 1), width), self._progress()])
 
-    def _table(self, room: int) -> list[Text]:
+    def _table(self, room: int, width: int) -> list[Text]:
         """Return the last lines of the history, in no more than so many beside its head.
 
-        It has the columns that the terminal has room for: none is cut in two.
+        It has the columns that there is room for: none is cut in two.
         """
-        rows, columns = min(room, MOST_ITERATIONS), 1
-        while columns < len(HISTORY) and len(_row(HISTORY[: columns + 1])) <= self.console.width:
-            columns += 1
-        hidden = len(self.lines) - rows
-        lines = [
+        rows, count = min(room, MOST_ITERATIONS), 1
+        while count < len(COLUMNS) and _width(COLUMNS[: count + 1]) <= width:
+            count += 1
+        hidden, columns = len(self.lines) - rows, COLUMNS[:count]
+        titles = [["", *column.heading.splitlines()][-2:] for column in columns]
+        return [
             Text(f"({hidden} earlier iterations)" if hidden > 0 else "", style="dim"),
-            Text(_row(HISTORY[:columns]), style="bold"),
+            *(Text(_row(columns, words), style="bold") for words in zip(*titles, strict=True)),
+            *(
+                Text(_row(columns, [column.text(line) for column in columns]))
+                for line in self.lines[-rows:]
+            ),
         ]
-        for line in self.lines[-rows:]:
-            cells = (
-                str(line.number),
-                line.phase,
-                f"{line.cost:.4e}",
-                f"{line.gradient_norm:.2e}",
-                f"{line.step_norm:.2e}",
-                f"{line.damping:.2e}" if line.damping == line.damping else "-",
-                yes_or_no(line.capped) or "-",
-                str(line.inner),
-                str(line.nfev),
-            )
-            lines.append(Text(_row(cells[:columns])))
-        return lines
 
     def _progress(self) -> Text:
         first, last, limit = self.lines[0], self.lines[-1], ""
@@ -235,9 +224,17 @@ def _joined(lines: Iterable[Text]) -> Text:
     return text
 
 
-def _row(cells: Sequence[str]) -> str:
-    """Return the first cells of a line of the history, each in its column."""
-    return " ".join(form.format(cell) for form, cell in zip(FORMATS, cells, strict=False))
+def _row(columns: Sequence[IterationColumn], texts: Sequence[str]) -> str:
+    """Write a line of the history, each text below the title of its column."""
+    cells = (
+        text.rjust(column.width) if column.number else text.ljust(column.width)
+        for column, text in zip(columns, texts, strict=True)
+    )
+    return " ".join(cells)
+
+
+def _width(columns: Sequence[IterationColumn]) -> int:
+    return sum(column.width + 1 for column in columns) - 1
 
 
 def task(case: Case, strategy: str | None) -> str:

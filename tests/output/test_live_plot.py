@@ -1,5 +1,6 @@
 """The live plot: what a terminal shows of a fit while it runs."""
 
+import re
 import unicodedata
 from io import StringIO
 from threading import Event
@@ -14,6 +15,7 @@ from rich.text import Text
 from exfit import workflows
 from exfit.fitting.experiment import Experiment
 from exfit.output import live
+from exfit.output.iterations import COLUMNS
 from exfit.results.model import Iteration
 from exfit.workflows.responses import LiveResponse
 
@@ -138,9 +140,12 @@ def test_the_limit_of_iterations_is_shown_for_each_phase():
 def test_no_column_of_the_history_is_cut_in_two():
     for width in range(20, 80):
         text = watching(screen(width, 12), sketch=None).picture().plain
-        (head,) = [row for row in text.splitlines() if row.lstrip().startswith("it ")]
-        assert len(head) <= max(width, 20)
-        assert tuple(head.split()) == live.HISTORY[: len(head.split())]
+        lines = text.splitlines()
+        place = next(k for k, row in enumerate(lines) if row.startswith("iteration"))
+        assert max(map(len, lines[place - 1 : place + 2])) <= max(width, 20)
+        heads = [column.heading.splitlines()[-1] for column in COLUMNS]
+        words = re.findall(r"\S+(?: f)?", lines[place])
+        assert words == heads[: len(words)]
 
 
 def test_a_file_and_a_terminal_without_such_characters_ask_for_no_plot():

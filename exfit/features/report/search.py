@@ -34,10 +34,10 @@ from exfit.output.blocks import (
     columns,
     row,
 )
+from exfit.output.iterations import COLUMNS, COST, DAMPINGS, GRADIENT, LEGEND
 from exfit.results.comparisons import IterationResponses
 from exfit.results.influences import by_weight
 from exfit.results.model import FitResult, FittedParameter, Iteration, Minima
-from exfit.results.tables import yes_or_no
 from exfit.results.thinning import drawn_responses
 from exfit.signals import label_of
 from exfit.util.arrays import Array
@@ -50,10 +50,6 @@ PERCENT = 1e-2
 UNKNOWN = "Not known: the search did not end at a minimum with finite derivatives."
 TOGETHER = (
     "Near 1 or -1 two parameters can move together: the records determine each alone less well."
-)
-OF_HISTORY = (
-    "|g|: norm of the gradient. Capped: whether the step that was tried first was held back. "
-    "Inner: rejected trials. The file `history.csv` of the fit has all of it."
 )
 OF_MINIMA = (
     "Chi-square: how far a minimum lies above the lowest one, in variances of the residuals. "
@@ -111,17 +107,18 @@ def _facts(result: FitResult) -> Iterator[tuple[str, str]]:
 def _history(result: FitResult) -> Table:
     """Make the table of the iterations; on paper many parameters are left to its file."""
     names = [*result.parameters]
-    titles = ("no.", "phase", "cost (pu²)", "|g|", "|step|", "damping", "capped", "inner")
-    heads = columns(*titles, numbers=("no.", "cost (pu²)", "|g|", "|step|", "damping", "inner"))
+    heads = (
+        TableColumn(each.title, each.number, "pu²" if each.title == COST else "")
+        for each in COLUMNS
+    )
     aside = 1 if len(names) > MOST_PRINTED else 0
     values = (TableColumn(name, number=True, expendable=aside) for name in names)
     rows = (
         row(
-            *(str(each.number), each.phase, number(each.cost, 4), number(each.gradient_norm, 3)),
-            *(number(each.step_norm, 3), number(each.damping, 3), yes_or_no(each.capped)),
-            *(str(each.inner), *(number(each.values[name]) for name in names)),
+            *(each.text(line, DASH) for each in COLUMNS),
+            *(number(line.values[name]) for name in names),
         )
-        for each in result.history
+        for line in result.history
     )
     return Table(
         (*heads, *values),
@@ -129,7 +126,7 @@ def _history(result: FitResult) -> Table:
         "Iterations; line 0 is the start",
         style="history",
         summary=f"History of {len(result.history) - 1} iterations",
-        legend=OF_HISTORY,
+        legend=LEGEND,
     )
 
 
@@ -152,9 +149,9 @@ def _minima(search: Minima, names: Sequence[str]) -> Table:
 def convergence(history: Sequence[Iteration]) -> Chart:
     """Draw cost, gradient and damping over the iterations."""
     rows = {
-        "cost": "cost f (pu²)",
-        "gradient_norm": "norm of the gradient",
-        "damping": "damping ν, or step length λ",
+        "cost": f"{COST} (pu²)",
+        "gradient_norm": GRADIENT,
+        "damping": DAMPINGS,
     }
     numbers = np.array([float(each.number) for each in history])
     panels = []

@@ -26,6 +26,7 @@ from exfit.output.figures.style import (
     short,
     tidy,
 )
+from exfit.output.iterations import COST, DAMPINGS, GRADIENT
 from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult, Minima
 from exfit.signals import label_of
@@ -61,9 +62,9 @@ def convergence(result: FitResult) -> Figure:
     figure = new_figure(7.0)
     axes = panels(figure, 3, sharex=True)[:, 0]
     rows = (
-        ("cost", "cost f (pu²)", "o"),
-        ("gradient_norm", "norm of the gradient", "o"),
-        ("damping", "damping ν, or\nstep length λ", "s"),
+        ("cost", f"{COST} (pu²)", "o"),
+        ("gradient_norm", GRADIENT, "o"),
+        ("damping", DAMPINGS.replace(": ", ":\n"), "s"),
     )
     for ax, (name, label, marker) in zip(axes, rows, strict=True):
         values = [float(getattr(line, name)) for line in result.history]
