@@ -31,11 +31,10 @@ OTHER_VALUES = "--parameters FILE, or --as-found for the model before any fit"
 def check(case: Path) -> None:
     """Check CASE before a fit: its record, derivatives, bypassed blocks, a run without a step.
 
-    Warns of an inverted channel, another base, a step that no regulator is tested with, ripple, a
-    start that is not at rest, and of a validation that sees what is fitted.
+    Warns of an inverted channel, another base, a step above 0.2 pu, ripple, a start that is not at
+    rest, and a validation window that overlaps a fitted one.
 
-    Of a programme it runs the tests at rest, which takes no time, and checks each fit with what
-    they give.
+    For a programme it evaluates the steady tests, and checks each fit with their results.
     """
     from exfit import workflows
     from exfit.case.peek import keys_of

@@ -43,7 +43,7 @@ class Features:
 
     A time that the record is too short to show is None. Of a noisy record ``errors`` holds by how
     much a feature may be off, half of its 95 % interval, and ``why`` the reason where the noise
-    hides it; ``without`` are the lines, of a ripple or a sway, that were removed before.
+    hides it; ``without`` are the lines, of a ripple or an oscillation, that were removed before.
     """
 
     initial_value: Annotated[float, nan]

@@ -1,6 +1,6 @@
 """The largest line in the spectrum of errors, and whether white noise has one as large.
 
-At rest it is a ripple of the mains, or a sway of the grid.
+At rest it is a ripple of the mains, or an oscillation of the grid.
 
 Sources: Fisher 1929 (the distribution of the largest share that one frequency has of the power);
 Percival & Walden 1993, section 10.9.
@@ -30,7 +30,7 @@ MOST_FILLED_IN = 4  # times its samples: a rest with longer gaps shows no line
 FEWEST_PERIODS_AT_REST = 8.0  # in the rest: with fewer a line is like a drift
 BY_CHANCE = 1e-5  # probability that white noise has a line as large: a likelier one is none
 LEAST_SHARE = 0.4  # of the standard deviation at rest: a smaller amplitude does no harm
-SLOW = 5.0  # Hz: what sways more slowly is the grid or the unit, and no ripple
+SLOW = 5.0  # Hz: what oscillates more slowly is the grid or the unit, and no ripple
 MAINS = (50.0, 60.0)  # Hz
 HARMONICS = (1, 2, 3, 6, 12)  # of the mains that bridges and recorders leave
 PASSED = 0.4  # of the frequency of a ripple: a low pass that removes it
@@ -173,7 +173,7 @@ class Ripple:
     @property
     def in_words(self) -> str:
         """What it is."""
-        kind = "a sway" if self.frequency < SLOW else "a ripple"
+        kind = "an oscillation" if self.frequency < SLOW else "a ripple"
         text = f"{kind} of {self.frequency:.3g} Hz, amplitude {self.amplitude:.2g}, at rest"
         if self.folded_from is None:
             return text

@@ -266,9 +266,7 @@ class Stop(Enum):
     GRADIENT = "the gradient vanished"
     FLOOR = "the cost is at its floor: neither the linear model nor a trial finds a lower one"
     STEP = "the Gauss-Newton step fell below the tolerance"
-    KINK = (
-        "no trial lowers the cost, which has a kink here: the linear model sees nothing beyond it"
-    )
+    KINK = "no trial lowers the cost: it has a kink here, beyond which the linear model is invalid"
     CREEPING = "ten iterations, all with rejected trials, gained less than a millionth of the cost"
     UNCONFIRMED = "the lowest minimum is in doubt, and no other start led to it"
     ITERATIONS = "the iteration limit was reached"

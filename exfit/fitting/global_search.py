@@ -148,7 +148,7 @@ def global_search(
         return _best_of(searches, descents)
     why_local = ""
     if descents.best.stop in AT_TOLERANCE:
-        why_local = "a tolerance that the case gives ended the descent from its start"
+        why_local = "a tolerance of the case ended the run from its start"
     elif searches.unbounded:
         names = ", ".join(searches.unbounded)
         why_local = f"they are distributed between bounds, and {names} has no min or no max"
@@ -224,9 +224,9 @@ def is_same(best: Result, other: Result) -> bool:
 def taken_for_validation(times: float) -> str:
     """Explain a minimum so many times as high as the lowest one, taken for its validation."""
     return (
-        f"the cost is {times:.4g} times the lowest one found: the records do not tell the two "
-        "minima apart, and this one was taken because the validation holds on it; it is no "
-        "independent test then"
+        f"the cost is {times:.4g} times the lowest one: the records do not distinguish the two "
+        "minima, and this one was taken because the validation accepts it, which is therefore no "
+        "independent test"
     )
 
 
@@ -338,8 +338,8 @@ def _notes(doubts: Sequence[str], like: int, costs: ArrayLike) -> Iterator[str]:
     if doubts[-1]:
         count = int(np.count_nonzero(np.isfinite(costs)))
         yield (
-            f"{doubts[-1]}; {like} of {count} descents led to this minimum or to one like it, and "
-            "none lower"
+            f"{doubts[-1]}; {like} of {count} runs converged to this minimum or one like it, none "
+            "to a lower one"
         )
 
 

@@ -132,5 +132,5 @@ def _steps(result: Inspection) -> Table:
         sizes = _some([f"{name} {size:+.4g}" for name, size in step.sizes.items()])
         at = f"{step.at:.4f}" if not step.from_start else f"<= {step.at:.4g}"
         rows.append(row(at, "-" if step.from_start else f"{step.error:.1g}", sizes))
-    heads = columns("step at (s)", "+- (s)", "changes for good", numbers=("step at (s)",))
+    heads = columns("step at (s)", "+- (s)", "lasting changes", numbers=("step at (s)",))
     return Table(heads, tuple(rows))

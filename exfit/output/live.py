@@ -57,9 +57,7 @@ SMALLEST_RANGE = 1e-6  # pu: a range that is smaller shows rounding errors alone
 HEADS = ("fit", "it", "f", "rmse", "s", "")
 FORMS = ("{:>4}", "{:>10}", "{:>10}", "{:>7}", "{:<13}")  # behind the name
 MOST_OF_NAME = 28  # characters: the line has then 80
-DESCENTS_ALONE = (
-    "each fit is the descent from the start of its case alone: --search global looks further"
-)
+DESCENTS_ALONE = "each fit is one run from the start of its case: --search global makes more"
 BRIEF = {MATCHES: "matches", MISSES: "misses"}  # what a line has no room for
 
 

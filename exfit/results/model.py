@@ -150,7 +150,10 @@ class Minimum(NamedTuple):
 
     def height(self, cost: float) -> str:
         """Word its cost as a multiple of another one."""
-        return f"{multiple(self.cost / cost)} as high" if cost > 0.0 else f"at {self.cost:.3g}"
+        if not cost > 0.0:
+            return f"at a cost of {self.cost:.3g}"
+        ratio = multiple(self.cost / cost)
+        return "at the same cost" if ratio == "1.000 times" else f"at {ratio} the cost"
 
 
 def multiple(ratio: float) -> str:
@@ -195,12 +198,12 @@ class Minima:
         further = self.starts - max(1, self.ways.count("strategy"))
         here = sum(minimum.starts for minimum in self.minima if minimum.cost == cost)
         unfinished = int(np.count_nonzero(np.isnan(self.end_costs))) - self.failed
-        ends = [f"{here} of {self.starts} descents lead to this {'minimum' if here else 'point'}"]
+        ends = [f"{here} of {self.starts} runs converge to this {'minimum' if here else 'point'}"]
         ends += self._elsewhere(cost)
         if self.failed:
-            ends.append(f"{self.failed} to none: no response")
+            ends.append(f"{self.failed} without a response")
         if unfinished > 0:
-            ends.append(f"{unfinished} not done")
+            ends.append(f"{unfinished} not finished")
         starts = "1 further start" if further == 1 else f"{further} further starts"
         return f"from the start of the case and {starts}: {', '.join(ends)}"
 
@@ -212,15 +215,15 @@ class Minima:
             yield f"{along} to others in its flat valley"
         for minimum in others:
             if minimum.valley != 0 and not minimum.refuted:
-                verdict = "" if minimum.refuted is None else " (not refuted)"
-                yield f"{minimum.starts} to one {minimum.height(cost)}{verdict}"
+                verdict = "" if minimum.refuted is None else " (not rejected)"
+                yield f"{minimum.starts} to another {minimum.height(cost)}{verdict}"
         refuted = [minimum for minimum in others if minimum.refuted]
         if len(refuted) == 1:
-            yield f"{refuted[0].starts} to one {refuted[0].height(cost)} (refuted)"
+            yield f"{refuted[0].starts} to another {refuted[0].height(cost)} (rejected)"
         elif refuted:
             descents = sum(minimum.starts for minimum in refuted)
             height = f"{refuted[0].height(cost)} or more"
-            yield f"{descents} to {len(refuted)} others, {height} (refuted)"
+            yield f"{descents} to {len(refuted)} others {height} (rejected)"
 
 
 @dataclass(frozen=True, repr=False, eq=False)

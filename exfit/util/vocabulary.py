@@ -28,15 +28,15 @@ STRATEGIES: Mapping[str, str] = {
     "dgn": "damped Gauss-Newton: each step capped, then shortened until Armijo's rule holds",
     "lm": "Levenberg-Marquardt",
     "lm-then-dgn": "lm to reach a better start, then dgn, and lm again where that stalls",
-    "auto": "dgn; where noise or validation casts doubt on its match lm-then-dgn",
+    "auto": "dgn, then lm-then-dgn if noise or validation casts doubt on its match",
     "robust": "gn while it makes progress, then lm",
 }
 DEFAULT_STRATEGY = "lm-then-dgn"
 SEARCHES: Mapping[str, str] = {
-    "global": "the descent from the start of the case by its strategy, then further descents from "
-    "points distributed over the bounds; the lowest minimum is the result, or one that the records "
-    "do not tell from it if the validations hold on that one alone",
-    "local": "the descent from the start of the case alone",
+    "global": "one run from the start of the case by its strategy, then runs from points "
+    "distributed over the bounds; the lowest minimum is the result, or one that the records do not "
+    "distinguish from it if only that one passes the validations",
+    "local": "the run from the start of the case alone",
 }
 DEFAULT_SEARCH = "global"
 EXPLAINED = "; ".join(f"{name}: {words}" for name, words in STRATEGIES.items())

@@ -41,7 +41,7 @@ LOWER_BY_TWIN = (
     "the profiles led to a lower cost of the corrected twin, which the program need not have: a "
     "fit from there shows whether it has"
 )
-ENCLOSED = "the intervals enclose another minimum, which the record does not refute"
+ENCLOSED = "the intervals enclose another minimum, which the record does not reject"
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 POINTS = 5  # of a side: enough for a smooth figure

@@ -88,7 +88,7 @@ def test_a_search_leaves_a_false_minimum_by_a_path_that_is_whole(both):
 def test_what_the_own_start_led_to_is_noted_with_what_the_record_says_of_it(both):
     local, whole = both
     (note,) = [text for text in whole.notes if "start of the case ended" in text]
-    assert f"{local.cost / whole.cost:.2f} times this cost, which the record refutes" in note
+    assert f"{local.cost / whole.cost:.2f} times this cost, which the record rejects" in note
     assert f"KF {local.values['KF']:.4g} (here {whole.values['KF']:.4g})" in note
 
 
@@ -114,8 +114,8 @@ def test_a_minimum_that_the_record_does_not_refute_is_named():
     result = fit(local_case("ac8b_unit2"), search="global")
     likely = [minimum for minimum in result.minima.minima if not minimum.refuted]
     assert len(likely) == 2
-    (note,) = [text for text in result.notes if "refutes no point" in text]
-    assert any("1.003 times the lowest one found" in text for text in result.notes)
+    (note,) = [text for text in result.notes if "rejects no point" in text]
+    assert any("1.003 times the lowest one:" in text for text in result.notes)
     ends = sorted(minimum.values["KPR"] for minimum in likely)
     assert f"KPR {rounded_value(ends[0])} ... {rounded_value(ends[1])}" in note
     assert f"(here {rounded_value(result.values['KPR'])})" in note

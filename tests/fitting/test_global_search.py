@@ -147,8 +147,7 @@ def test_a_tolerance_of_the_case_that_ended_the_descent_ends_the_search(stop):
     assert searches.calls == ["lm"]
     assert found.best.stop is stop
     assert found.notes == (
-        "no search from further starts: a tolerance that the case gives ended the descent from its "
-        "start",
+        "no search from further starts: a tolerance of the case ended the run from its start",
     )
 
 
@@ -295,7 +294,7 @@ def test_a_minimum_in_doubt_has_converged_only_if_two_descents_led_there(times, 
     assert found.best.cost == 1.0
     assert found.best.success == success
     assert (found.best.stop is Stop.UNCONFIRMED) == (not success)
-    assert f"{times} of {5 + times} descents" in found.notes[-1]
+    assert f"{times} of {5 + times} runs converged to this minimum" in found.notes[-1]
 
 
 @pytest.mark.parametrize(("second", "success"), [(1.0, True), (4.0, False)])

@@ -100,7 +100,7 @@ def test_a_ripple_is_named_by_its_frequency_and_where_sampling_may_have_folded_i
         assert ripple.amplitude == pytest.approx(2e-4, rel=0.2)
         assert ripple.folded_from == folded_from
         assert ("anti-alias" in ripple.remedy) == (folded_from is not None)
-        assert ("sway" in ripple.in_words) == (shown < 5.0)
+        assert ("oscillation" in ripple.in_words) == (shown < 5.0)
 
 
 def test_white_noise_and_a_drift_have_no_ripple():

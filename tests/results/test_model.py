@@ -97,18 +97,18 @@ def minima(*others, best=(1.0, 9), unfinished=0, failed=0, own=1):
 @pytest.mark.parametrize(
     ("found", "words"),
     [
-        (minima(), "from the start of the case and 8 further starts: 9 of 9 descents lead to"),
-        (minima(best=(1.0, 2)), "1 further start: 2 of 2 descents"),
-        (minima((4.68, 3, True)), "9 of 12 descents lead to this minimum, 3 to one 4.68 times"),
-        (minima((1.003, 2, False)), ", 2 to one 1.003 times as high (not refuted)"),
-        (minima((1.5, 2, None)), ", 2 to one 1.500 times as high"),
+        (minima(), "from the start of the case and 8 further starts: 9 of 9 runs converge to"),
+        (minima(best=(1.0, 2)), "1 further start: 2 of 2 runs"),
+        (minima((4.68, 3, True)), "9 of 12 runs converge to this minimum, 3 to another at 4.68"),
+        (minima((1.003, 2, False)), ", 2 to another at 1.003 times the cost (not rejected)"),
+        (minima((1.5, 2, None)), ", 2 to another at 1.500 times the cost"),
         (
             minima((1.003, 1, False), (2.0, 2, True), (9.0, 1, True)),
-            ", 1 to one 1.003 times as high (not refuted), 3 to 2 others, 2.00 times",
+            ", 1 to another at 1.003 times the cost (not rejected), 3 to 2 others at 2.00 times",
         ),
-        (minima(failed=2), ", 2 to none: no response"),
-        (minima(unfinished=3, own=2), "10 further starts: 9 of 12 descents lead to this"),
-        (minima(unfinished=3), "minimum, 3 not done"),
+        (minima(failed=2), ", 2 without a response"),
+        (minima(unfinished=3, own=2), "10 further starts: 9 of 12 runs converge to this"),
+        (minima(unfinished=3), "minimum, 3 not finished"),
     ],
 )  # fmt: skip
 def test_the_sentence_counts_every_descent(found, words):
@@ -116,7 +116,7 @@ def test_the_sentence_counts_every_descent(found, words):
 
 
 def test_a_point_that_is_no_minimum_is_not_called_one():
-    words = "0 of 9 descents lead to this point, 9 to one 2.00 times as high"
+    words = "0 of 9 runs converge to this point, 9 to another at 2.00 times the cost"
     assert words in minima().summary(0.5)
 
 

@@ -146,8 +146,8 @@ class Compared(Section):
     )
     sine: SineSection | None = Field(
         default=None,
-        description="A small periodic disturbance of constant amplitude, as a sway of the grid, "
-        "which is added to the simulated signal.",
+        description="A small sine of constant amplitude, such as an oscillation of the grid, added "
+        "to the simulated signal.",
     )
 
 

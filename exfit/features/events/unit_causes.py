@@ -155,7 +155,7 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
         if trial := refitted(evidence, with_freed(of_case(evidence, other), freed)):
             amplification = trial.values[gain] * trial.values[washout]
             cause = Cause(
-                f"a stabiliser that the case lacks: one that hears {heard}, with a gain of "
+                f"a stabiliser that the case lacks: one with input {heard} and a gain of "
                 f"{amplification:.2g}, would match",
                 "if it was in service, give the unit's own: stabiliser: {model: ..., "
                 f"inputs: [{heard}], parameters: {{...}}}}, or its output as channel vs",

@@ -241,7 +241,7 @@ def _bump_tests(
         if exciter == ALONE and test.window is None:
             level["vt0"] = Noted(rounded(voltage.level if voltage else 1.0), "at rest")
         elif exciter != ALONE and test.steps and not test.steps[0].from_start:
-            level["vt0"] = Noted({"start": "auto"}, "at rest: the noise of its mean counts")
+            level["vt0"] = Noted({"start": "auto"}, "the mean at rest, with its noise")
         steps = {**level, **steps_section(inspection, test.steps, test.sizes)}
         own = channels_section(inspection, ("vt", *test.bases), test.bases)
         channels = known.setdefault(repr(own), own)  # with their comments

@@ -149,18 +149,18 @@ def waterfall(search: Minima, title: str) -> Figure:
     for way, (label, marker) in WAYS.items():
         for verdict, color in ((False, GREEN), (True, SIMULATED)):
             own = (ways == way) & (refuted == verdict)
-            text = f"{label}, refuted" if verdict else label
+            text = f"{label}, rejected" if verdict else label
             if own.any():
                 axes.plot(ranks[own], ends[own], marker, color=color, markersize=5, label=text)
     logarithmic(axes)
-    axes.set_xlabel("descent, by the cost that it led to")
+    axes.set_xlabel("run, in the order of the costs reached")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=8)
-    lowest = f"{search.minima[0].starts} of {search.starts} descents led to the lowest minimum"
+    lowest = f"{search.minima[0].starts} of {search.starts} runs converged to the lowest minimum"
     axes.set_title(lowest, fontsize=9, loc="right")
     tidy(axes)
-    figure.suptitle(f"{title}: where {search.starts} descents ended", fontsize=11)
+    figure.suptitle(f"{title}: where {search.starts} runs ended", fontsize=11)
     return figure
 
 

@@ -96,8 +96,8 @@ def minima_notes(
         ends = search.minima.end_costs
         done = int(np.count_nonzero(np.isfinite(ends)))
         yield (
-            f"interrupted in the search from further starts: {done} of {len(ends)} descents were "
-            "done, and this is the best of them"
+            f"interrupted in the search from further starts: {done} of {len(ends)} runs "
+            "ended, and this is the best of them"
         )
     own, best = search.own, search.best
     if search.for_validation:
@@ -105,7 +105,7 @@ def minima_notes(
         yield taken_for_validation(best.cost / lowest)
     if search.goes_on and not own.success:
         yield (
-            f"the descent from the start of the case ended at {times(own.cost, best.cost)} this "
+            f"the run from the start of the case ended at {times(own.cost, best.cost)} this "
             f"cost: {own.message}"
         )
     if minima is not None:
@@ -136,7 +136,7 @@ def _of_others(
             yield valley_in_words(along, cost, _above(minima), here, residuals)
             continue
         from_start, minimum = max(members, key=lambda member: member[0])  # else the lowest
-        subject = "the descent from the start of the case ended at" if from_start else "there is"
+        subject = "the run from the start of the case ended at" if from_start else "there is"
         yield f"{subject} {minimum_in_words(minimum, cost, here)}"
 
 
@@ -155,10 +155,10 @@ def _is_apart(there: Values, here: Values, std_errors: Values) -> bool:
 
 def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
     """Word another minimum: its height, whether it is refuted, the values that differ most."""
-    verdict = "which the record refutes"
+    verdict = "which the record rejects"
     if not minimum.refuted:
         verdict = (
-            f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
+            f"which the record does not reject (chi-square {minimum.chi_square:.2g} above the "
             f"lowest, limit {REFUTED})"
         )
     pairs = {name: (value, here[name]) for name, value in minimum.values.items()}
@@ -188,9 +188,9 @@ def valley_in_words(
     count = "another minimum lies" if len(others) == 1 else f"{len(others)} other minima lie"
     height = f"{'up to ' * (len(others) > 1)}{times(max(each.cost for each in others), cost)}"
     return (
-        f"{count} in one flat valley with this one, {height} this cost, and the record "
-        f"refutes no point of the way (chi-square up to {above:.2g}, limit {REFUTED}): along it "
-        f"move {', '.join(moves)}"
+        f"{count} in the same flat valley, {height} this cost, and the record rejects "
+        f"no point between them (chi-square up to {above:.2g}, limit {REFUTED}): along it "
+        f"{', '.join(moves)}"
     )
 
 

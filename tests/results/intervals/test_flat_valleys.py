@@ -44,14 +44,14 @@ def test_minima_in_one_flat_valley_are_named_once_with_what_moves_along_it(vague
     assert len(along) > 1
     assert not any(minimum.refuted for minimum in along)
     (note,) = (note for note in vague.notes if "minim" in note)
-    assert "in one flat valley with this one" in note
+    assert "in the same flat valley" in note
     for name in ("KA", "KF", "TF"):  # which differ most
         values = [minimum.values[name] for minimum in along]
         least, most = (rounded_value(end) for end in (min(values), max(values)))
         assert f"{name} {least} ... {most}" in note
     summary = vague.minima.summary(vague.cost)
     assert summary.count("valley") == 1
-    assert "not refuted" not in summary
+    assert "not rejected" not in summary
 
 
 class Plane:
