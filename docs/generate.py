@@ -2,23 +2,31 @@
 
     python docs/generate.py
 
-writes the key tables into case_file.md and the pages into models/. Sphinx calls `setup`: it writes
-the pages of the models, and warns where the key tables are out of date.
+writes the tables of keys into case_file.md and the pages of case_file/, a page for each section,
+and the pages into models/. Sphinx calls `setup`: it writes the pages of the models, and warns where
+a table of keys is out of date. What stands outside the marks of a page is written by hand.
 """
 
 import re
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 import exfit
 from exfit.features.drawings.diagram import block_diagram
 from exfit.features.drawings.letters import diagram_and_remarks
 
 DOCS = Path(__file__).parent
-CASES = DOCS.parent / "configs" / "models"
+CONFIGS = DOCS.parent / "configs"
+CASES = CONFIGS / "models"
 CASE_FILE = DOCS / "case_file.md"
+SECTIONS = DOCS / "case_file"  # the pages of the sections
+LONGEST = 12  # lines of an example
 MODEL_PAGES = DOCS / "models"
 BEGIN, END = "<!-- keys -->", "<!-- /keys -->"
 
@@ -82,102 +90,186 @@ LIMITER_EXAMPLES: Mapping[str, tuple[str, str, float, str]] = {
 # ---- keys of the case file
 
 
-def key_tables() -> str:
-    """Return a table for each section of the case file, as Markdown."""
-    from exfit.case.json_schema import json_schema
+@dataclass(frozen=True)
+class Part:
+    """A mapping of the case file: its keys, and the places at which a file may have it."""
 
-    schema = json_schema()
-    sections = {"": schema, **schema["$defs"]}
-    headings = _headings(sections)
-    return "\n\n".join(_section(name, headings, sections) for name in headings)
+    schema: Schema
+    places: list[str] = field(default_factory=list)
 
+    @property
+    def heading(self) -> str:
+        """The first of its places, with its type or kind where others may stand there."""
+        return self.places[0]
 
-def _headings(sections: Mapping[str, Schema]) -> dict[str, str]:
-    """Return the heading of each section: the shortest places at which a case file has it."""
-    places: dict[str, list[str]] = {}
-    reached = [("", "top level")]
-    for name, place in reached:
-        if place.count(".") > places.get(name, [place])[0].count("."):
-            continue
-        places.setdefault(name, []).append(place)
-        for key, value in sections[name]["properties"].items():
-            inner = _inner(value, sections)
-            above = "" if name == "" else f"{place.partition(' (')[0]}."
-            for other in inner:
-                kind = f" ({_kind(sections[other])})" if len(inner) > 1 else ""
-                if f"{above}{key}{kind}" not in places.get(other, ()):
-                    reached.append((other, f"{above}{key}{kind}"))
-    return {name: ", ".join(dict.fromkeys(all_places)) for name, all_places in places.items()}
+    @property
+    def page(self) -> str:
+        """The section of the case file in which it is described."""
+        return re.match(r"\w+", self.heading)[0]
 
 
-def _inner(value: Any, sections: Mapping[str, Schema]) -> list[str]:
-    """Return the names of the sections that the value of a key may be, or that it holds."""
-    if isinstance(value, list):
-        return [name for part in value for name in _inner(part, sections)]
-    if not isinstance(value, Mapping):
-        return []
-    if "$ref" in value:
-        name = str(value["$ref"]).rpartition("/")[2]
-        part = sections[name]
-        return [name] if "properties" in part else _inner(part, sections)
-    parts = ("anyOf", "oneOf", "items", "prefixItems", "additionalProperties")
-    return list(dict.fromkeys(name for key in parts for name in _inner(value.get(key), sections)))
+class KeyTables:
+    """The tables of keys of the case file, as Markdown, for the page of each section."""
+
+    def __init__(self, schema: Schema) -> None:
+        self.schema = schema
+        self.examples = examples()
+        self.parts = {name: Part(part) for name, part in schema["$defs"].items()}
+        # a parameter that is fitted stands in many sections: it has its place under `parameters`
+        reached = sorted(self._below(schema, ""), key=lambda found: found[1] != "parameters")
+        order: dict[str, Part] = {}
+        for name, place, kind in reached:
+            part = order.setdefault(name, self.parts[name])
+            if not part.places and any(place in other.places for other in order.values()):
+                part.places.append(f"{place}{kind}")
+            elif place not in part.places and (
+                not part.places or place.count(".") == part.heading.count(".")
+            ):
+                part.places.append(place)
+                reached += self._below(part.schema, place)
+        self.order = list(order.values())
+
+    def _below(self, section: Schema, above: str) -> Iterator[tuple[str, str, str]]:
+        """Yield the names of the parts in a section, their places, and the kind of the section."""
+        place, bracket, kind = above.partition(" (")
+        for key, value in section["properties"].items():
+            inner = self._inner(value)
+            for name in inner:
+                own = f" ({self._kind(name)})" if len(inner) > 1 else ""
+                yield name, f"{place}.{key}{own}".lstrip("."), f"{bracket}{kind}"
+
+    def _inner(self, value: Any) -> list[str]:
+        """Return the names of the parts that the value of a key may be, or that it holds."""
+        if isinstance(value, list):
+            return [name for part in value for name in self._inner(part)]
+        if not isinstance(value, Mapping):
+            return []
+        if "$ref" in value:
+            name = str(value["$ref"]).rpartition("/")[2]
+            part = self.parts[name].schema
+            return [name] if "properties" in part else self._inner(part)
+        keys = ("anyOf", "oneOf", "items", "prefixItems", "additionalProperties")
+        return list(dict.fromkeys(name for key in keys for name in self._inner(value.get(key))))
+
+    def _kind(self, name: str) -> str:
+        """Return what distinguishes a part from others: its type or kind, or its first key."""
+        part = self.parts[name].schema
+        words = (part["properties"].get(key, {}).get("const") for key in ("type", "kind"))
+        return str(next(filter(None, words), part["required"][0]))
+
+    @cached_property
+    def pages(self) -> dict[Path, str]:
+        """The tables of each page: of the top level, then of each section."""
+        top = {CASE_FILE: self._table(self.schema, "case_file")}
+        sections: dict[str, list[Part]] = {}
+        for part in self.order:
+            sections.setdefault(part.page, []).append(part)
+        for key in self.schema["properties"]:
+            parts = sorted(sections.get(key, ()), key=lambda part: part.heading.count("."))
+            if parts:
+                top[SECTIONS / f"{key}.md"] = "\n\n".join(map(self._section, parts))
+        return top
+
+    def _section(self, part: Part) -> str:
+        """Return a part of a page: a heading, what it is, an example, and its table."""
+        first, *others = part.places
+        lines = [] if first == part.page else [f"## {first}"]
+        lines.append(_cell(part.schema["description"]))
+        if others:
+            lines.append(
+                f"The same keys stand under {', '.join(f'`{place}`' for place in others)}."
+            )
+        if first in self.examples:
+            path, text = self.examples[first]
+            lines.append(f"From `{path}`:\n\n```yaml\n{text}\n```")
+        return "\n\n".join([*lines, self._table(part.schema, part.page)])
+
+    def _table(self, section: Schema, page: str) -> str:
+        required = section.get("required", [])
+        rows = [
+            (
+                f"`{key}`",
+                self._value(value, page),
+                "required" if key in required else _default(value),
+                _cell(value.get("description") or self._about(value)),
+            )
+            for key, value in sorted(
+                section["properties"].items(), key=lambda pair: pair[0] not in required
+            )
+        ]
+        return _table(("key", "value", "default", "meaning"), rows)
+
+    def _about(self, value: Schema) -> str:
+        """Return the description of the part that a value is."""
+        return " ".join(self.parts[name].schema["description"] for name in self._inner(value))
+
+    def _value(self, value: Schema, page: str) -> str:
+        """Return what the value of a key may be: its type and limits, with links to the parts."""
+        inner = self._inner(value)
+
+        def words(part: Schema) -> str:
+            if "$ref" in part:
+                name = str(part["$ref"]).rpartition("/")[2]
+                if not self.parts[name].places:
+                    return words(self.parts[name].schema)
+                kind = self._kind(name) if len(inner) > 1 else "mapping"
+                return f"[{kind}]({self._link(self.parts[name], page)})"
+            if "const" in part:
+                return f"`{part['const']}`"
+            if "enum" in part:
+                return ", ".join(f"`{word}`" for word in part["enum"])
+            choices = part.get("anyOf") or part.get("oneOf")
+            if choices:
+                return " or ".join(dict.fromkeys(words(choice) for choice in choices))
+            if part.get("type") == "array":
+                items = part.get("items") or part["prefixItems"][0]
+                least, most = part.get("minItems"), part.get("maxItems")
+                count = f" {most}" if least == most and most is not None else ""
+                return f"list of{count} {words(items)}"
+            if part.get("type") == "object":
+                return f"name: {words(part['additionalProperties'])}"
+            return TYPES[part["type"]] + _limits(part)
+
+        return words(value)
+
+    def _link(self, part: Part, page: str) -> str:
+        """Return the link from a page to a part."""
+        folder = "case_file/" if page == "case_file" else ""
+        file = "" if part.page == page else f"{folder}{part.page}.md"
+        anchor = "" if part.heading == part.page else f"#{_anchor(part.heading)}"
+        return f"{file}{anchor}" or f"#{_anchor(part.page)}"
 
 
-def _kind(section: Schema) -> str:
-    """Return what distinguishes a section from others: its type or kind, or its first key."""
-    words = (section["properties"].get(key, {}).get("const") for key in ("type", "kind"))
-    return str(next(filter(None, words), section["required"][0]))
+def examples() -> dict[str, tuple[str, str]]:
+    """Return for each place an example: the case that has most of its keys in few lines."""
+    best: dict[str, tuple[int, str, str]] = {}
+    for path in sorted(CONFIGS.rglob("*.yaml")):
+        for key, text in _top_level(path.read_text(encoding="utf-8")):
+            content = yaml.safe_load(text)[key]
+            for value, lines in _entries(key, content, text):
+                kind = next((value[word] for word in ("type", "kind") if word in value), "")
+                kind = "bump" if key == "tests" and not kind else kind
+                place = f"{key} ({kind})" if kind else key
+                keys = str(value).count(":")
+                if lines.count("\n") < LONGEST and keys > best.get(place, (0,))[0]:
+                    best[place] = (keys, path.relative_to(DOCS.parent).as_posix(), lines)
+    return {place: example for place, (_, *example) in best.items()}
 
 
-def _section(name: str, headings: Mapping[str, str], sections: Mapping[str, Schema]) -> str:
-    section = sections[name]
-    required = section.get("required", [])
-    rows = [
-        (
-            f"`{key}`" + (" (required)" if key in required else ""),
-            _value(value, headings, sections),
-            _cell(value.get("description") or _about(value, sections)) + _default(value),
-        )
-        for key, value in sorted(
-            section["properties"].items(), key=lambda pair: pair[0] not in required
-        )
-    ]
-    table = _table(("key", "value", "meaning"), rows)
-    return f"### {headings[name]}\n\n{_cell(section['description'])}\n\n{table}"
+def _top_level(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the sections of a case with their lines."""
+    for match in re.finditer(r"^(\w+):.*\n(?:[ ].*\n)*", text, re.MULTILINE):
+        yield match[1], match[0].rstrip()
 
 
-def _about(value: Schema, sections: Mapping[str, Schema]) -> str:
-    """Return the description of the section that a value is."""
-    return " ".join(sections[name]["description"] for name in _inner(value, sections))
-
-
-def _value(value: Schema, headings: Mapping[str, str], sections: Mapping[str, Schema]) -> str:
-    """Return what the value of a key may be, with links to the sections."""
-    inner = _inner(value, sections)
-
-    def words(part: Schema) -> str:
-        if "$ref" in part:
-            name = str(part["$ref"]).rpartition("/")[2]
-            if name not in headings:
-                return words(sections[name])
-            kind = _kind(sections[name]) if len(inner) > 1 else "mapping"
-            return f"[{kind}](#{_anchor(headings[name])})"
-        if "const" in part:
-            return f"`{part['const']}`"
-        if "enum" in part:
-            return ", ".join(f"`{word}`" for word in part["enum"])
-        choices = part.get("anyOf") or part.get("oneOf")
-        if choices:
-            return " or ".join(dict.fromkeys(words(choice) for choice in choices))
-        if part.get("type") == "array":
-            items = part.get("items") or part["prefixItems"][0]
-            return f"list of {words(items)}"
-        if part.get("type") == "object":
-            return f"name: {words(part['additionalProperties'])}"
-        return TYPES[part["type"]]
-
-    return words(value)
+def _entries(key: str, content: Any, text: str) -> Iterator[tuple[Mapping[str, Any], str]]:
+    """Yield the mappings of a section with their lines: the section itself, or its entries."""
+    if isinstance(content, Mapping):
+        yield content, text
+    elif isinstance(content, list):
+        head, *entries = re.split(r"^(?=  - )", text, flags=re.MULTILINE)
+        for value, lines in zip(content, entries, strict=False):
+            yield value, f"{head}{lines.rstrip()}"
 
 
 def _anchor(heading: str) -> str:
@@ -185,16 +277,44 @@ def _anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
+def _limits(part: Schema) -> str:
+    """Return the limits of a number or the greatest length of a text."""
+    signs = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
+    limits = [f"{sign} {part[key]:,}" for key, sign in signs.items() if key in part]
+    if "maxLength" in part:
+        limits.append(f"of at most {part['maxLength']} characters")
+    return f" {', '.join(limits)}" if limits else ""
+
+
 def _default(value: Schema) -> str:
     default = value.get("default")
-    return "" if default is None or default in ({}, []) else f" Default: `{_yaml(default)}`."
+    return "" if default is None or default in ({}, []) else f"`{_yaml(default)}`"
 
 
 def _yaml(value: Any) -> str:
     """Return a value as a case file has it, on one line."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {_yaml(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, bool):
+        return str(value).lower()
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def key_pages() -> dict[Path, str]:
+    """Return the pages with keys of the case file: what is written by hand, and the tables."""
+    from exfit.case.json_schema import json_schema
+
+    return {path: _with_tables(path, text) for path, text in KeyTables(json_schema()).pages.items()}
+
+
+def _with_tables(path: Path, tables: str) -> str:
+    """Return a page with the tables between their marks; a new page has a title and no more."""
+    page = f"# {path.stem}\n\n{BEGIN}{END}\n"
+    if path.exists():
+        page = path.read_text(encoding="utf-8")
+    before, _, rest = page.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{tables}\n\n{END}{after}"
 
 
 # ---- pages of the models
@@ -378,13 +498,6 @@ def _write(path: Path, parts: Iterable[str]) -> Path:
     return path
 
 
-def with_key_tables(page: str) -> str:
-    """Return a page with the key tables between their marks."""
-    before, _, rest = page.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n\n{key_tables()}\n\n{END}{after}"
-
-
 # ---- Sphinx
 
 
@@ -395,6 +508,9 @@ def with_contents(_app: Any, name: str, source: list[str]) -> None:
         for group, links in groups:
             pages = "\n".join(re.findall(r"\]\((.+?)\.(?:md|ipynb)\)", links))
             source[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {group}\n\n{pages}\n```\n"
+    elif name == "case_file":
+        pages = "\n".join(f"case_file/{path.stem}" for path in key_pages() if path != CASE_FILE)
+        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
     elif name == "models/index":
         source[0] += "\n## All models\n\n```{toctree}\n:maxdepth: 1\n:glob:\n\n[A-Z]*\n```\n"
 
@@ -419,13 +535,13 @@ def without_fields(_app: Any, what: str, *_: Any) -> tuple[str, None] | None:
 
 
 def prepare(_app: Any) -> None:
-    """Write the pages of the models; warn where the key tables are not those of the schema."""
+    """Write the pages of the models; warn where the tables of keys are not those of the schema."""
     from sphinx.util import logging
 
     model_pages()
-    page = CASE_FILE.read_text(encoding="utf-8")
-    if with_key_tables(page) != page:
-        logging.getLogger(__name__).warning("case_file.md: run python docs/generate.py")
+    for path, page in key_pages().items():
+        if not path.exists() or path.read_text(encoding="utf-8") != page:
+            logging.getLogger(__name__).warning(f"{path.name}: run python docs/generate.py")
 
 
 def setup(app: Any) -> dict[str, bool]:
@@ -439,4 +555,6 @@ def setup(app: Any) -> dict[str, bool]:
 
 if __name__ == "__main__":
     model_pages()
-    CASE_FILE.write_text(with_key_tables(CASE_FILE.read_text(encoding="utf-8")), encoding="utf-8")
+    SECTIONS.mkdir(exist_ok=True)
+    for key_page, text in key_pages().items():
+        key_page.write_text(text, encoding="utf-8")

@@ -4,6 +4,7 @@ import importlib.util
 import json
 import re
 import shutil
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -33,7 +34,12 @@ from exfit.util.vocabulary import STRATEGIES
 DOCS = ROOT / "docs"
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
-    for path in [ROOT / "README.md", *DOCS.glob("*.md"), DOCS / "models" / "index.md"]
+    for path in [
+        ROOT / "README.md",
+        *DOCS.glob("*.md"),
+        *DOCS.glob("case_file/*.md"),
+        DOCS / "models" / "index.md",
+    ]
 }
 README = PAGES["README.md"]
 NOTEBOOK = DOCS / "tutorial.ipynb"
@@ -321,23 +327,26 @@ def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
     }
 
 
-def test_the_page_of_the_case_file_explains_each_strategy_as_the_help_does():
-    rows = [f"| `{name}` | {words} |" for name, words in STRATEGIES.items()]
-    assert "\n".join(rows) in PAGES["docs/case_file.md"]
+def test_the_page_of_the_estimate_explains_each_strategy_as_the_help_does():
+    page = PAGES["docs/case_file/estimate.md"]
+    assert [words for name, words in STRATEGIES.items() if f"{name}: {words}" not in page] == []
+    (option,) = (it for it in COMMANDS["fit"].params if it.name == "strategies")
+    assert sorted(option.type.choices) == sorted(STRATEGIES)
 
 
 def test_the_tables_of_keys_are_those_of_the_schema():
     spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
     generate = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = generate
     spec.loader.exec_module(generate)
-    page = PAGES["docs/case_file.md"]
-    assert generate.with_key_tables(page) == page, "run python docs/generate.py"
-
-
-def test_the_strategies_of_the_page_are_those_of_a_case():
-    cells = first_column(PAGES["docs/case_file.md"], "## Strategies")
-    (option,) = (it for it in COMMANDS["fit"].params if it.name == "strategies")
-    assert sorted(cell.strip("`") for cell in cells) == sorted(option.type.choices)
+    pages = generate.key_pages()
+    assert set(pages) == {DOCS / "case_file.md", *DOCS.glob("case_file/*.md")}
+    old = [path.name for path, page in pages.items() if path.read_text("utf-8") != page]
+    assert old == [], "run python docs/generate.py"
+    tables = "\n".join(pages.values())
+    schema = json_schema()
+    for part in (schema, *schema["$defs"].values()):
+        assert {f"| `{key}` |" in tables for key in part.get("properties", ())} <= {True}
 
 
 # ---- Python
@@ -400,6 +409,6 @@ def test_the_index_links_every_page_in_one_of_its_groups():
     assert [*groups] == ["Start", "Guides", "Reference", "Theory"]
     links = [DOCS / link for links in groups.values() for link in re.findall(r"\]\((.+)\)", links)]
     assert len(links) == len(set(links))
-    pages = {ROOT / name for name in PAGES} | {NOTEBOOK}
+    pages = {ROOT / name for name in PAGES if not name.startswith("docs/case_file/")} | {NOTEBOOK}
     assert set(links) == pages - {ROOT / "README.md", DOCS / "index.md"}
     assert "](docs/index.md)" in README
