@@ -102,7 +102,7 @@ class Commands(click.Group):
         """Run as a program: no output that fails keeps a command from its files."""
         with unfailing_output() as exit_code, endings_as_interruptions() as signals:
             try:
-                return super().main(*arguments, **settings)
+                return super().main(*arguments, obj=signals, **settings)
             except SystemExit as ended:
                 code = exit_code(ended.code)
                 raise SystemExit(SIGNALLED + signals[0] if signals else code) from None

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from exfit.cli.options import (
     load,
     output_options,
     parameters_option,
+    progress_option,
 )
 from exfit.errors import CaseError, ExfitError
 from exfit.registry import parts
@@ -119,6 +121,7 @@ def show(result: Path, everything: bool, history: bool) -> None:
     metavar="[PARAM]...",
     shell_complete=completion.free_parameters,
 )
+@progress_option
 @output_options
 def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
     """Fit CASE, then find the 95 % interval of each PARAM from its profile likelihood.
@@ -133,7 +136,10 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
 
     loaded = load(case)
     folder = output.folder_of(loaded, "profile", run_folder.OF_PROFILES)
-    if output.shown:
+    if output.events is not None:
+        name = output.events.named(case.stem)
+        profiles = workflows.profile(loaded, parameters, partial(output.events, name))
+    elif output.live:
         from exfit.output import live, terminal
 
         console = terminal.console()

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,18 +18,20 @@ from exfit.cli.options import (
     output_options,
     parameters_option,
     print_json,
+    progress_option,
     refuse_own_files,
     set_option,
-    warn,
 )
-from exfit.cli.streams import echo, output_is_lost
+from exfit.cli.streams import output_is_lost
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.runs.runner import FitSettings
 from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.output.events import Events
     from exfit.output.figure_files import FigureFiles
+    from exfit.output.live import SeriesProgress
     from exfit.results.model import FitResult
     from exfit.runs.fits import FitRun, FitSeries, PlannedFit
 
@@ -53,6 +56,7 @@ SERIES = "fits"  # the folder of a series by default
 @parameters_option
 @click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
 @click.option("-v", "--verbose", is_flag=True, help="Print all of the result, as exfit show --all.")
+@progress_option
 @output_options
 def fit(
     cases: tuple[Path, ...],
@@ -113,8 +117,7 @@ def fit(
     from exfit.verdict.diagnostics import case_warnings, event_warnings
 
     loaded = given.load(case)
-    for warning in (*case_warnings(loaded), *event_warnings(loaded)):
-        echo(f"warning: {warning}", err=True)
+    output.warn((*case_warnings(loaded), *event_warnings(loaded)), "warning")
     folder = output.folder_of(loaded, "fit", run_folder.OF_FIT, after_records=True)
     if not fit_one(loaded, folder, settings, output, verbose).holds:
         raise SystemExit(NOT_CONVERGED)
@@ -135,16 +138,24 @@ def fit_one(
     from exfit import workflows
     from exfit.output import run_folder
 
-    strategy, search = settings
-    if not output.shown:
-        result = workflows.fit(case, strategy, search=search)
-    else:
-        from exfit.output import fits, live, terminal
+    (strategy, search), events = settings, output.events
+    if events is not None:
+        from exfit.runs.fits import FitRun
+
+        name = case.path.stem
+        watch = partial(events, events.named(name))
+        result = workflows.fit(case, strategy, watch, watch, search=search)
+        events.finished(FitRun(name, name, result))
+    elif output.live:
+        from exfit.output import live, terminal
 
         console, most = terminal.console(), case.estimate.most_iterations
         title = live.task(case, strategy)
         with live.LiveIterations(console, title, most).running() as shown:
             result = workflows.fit(case, strategy, shown, shown.starts, shown.live, search=search)
+        console.print()
+    else:
+        result = workflows.fit(case, strategy, search=search)
     place = None
     try:
         figures = run_folder.write_fit(result, folder)
@@ -153,7 +164,9 @@ def fit_one(
         if output.as_json:
             print_json(result.to_dict())
         elif output.shown:
-            console.print()
+            from exfit.output import fits, terminal
+
+            console = terminal.console()
             if verbose:
                 terminal.show(console, fits.whole(result, place, before))
             else:
@@ -226,7 +239,8 @@ def fit_several(
             from exfit.output.series import fit_series
 
             console = terminal.console()
-            console.print()
+            if output.live:
+                console.print()
             terminal.show(console, fit_series(series))
     if output.shown:
         terminal.written(console, folder)
@@ -248,8 +262,8 @@ def run_planned(
     from exfit.output import run_folder
     from exfit.runs.fits import run_all
 
-    progress = None
-    if output.shown:
+    progress: SeriesProgress | Events | None = output.events
+    if output.live:
         from exfit.output import live, terminal
 
         progress = live.SeriesProgress(terminal.console(), plan)
@@ -273,7 +287,7 @@ def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
     left = [*figures]
     try:
         for name, of_fit in figures.items():
-            warn(of_fit.draw())
+            output.warn(of_fit.draw())
             left.remove(name)
             if output.shown:
                 from exfit.output import terminal

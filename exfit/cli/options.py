@@ -1,7 +1,8 @@
 """What several commands share: their options, and small steps on the way."""
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,11 +13,13 @@ from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind, ParameterFile
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
+from exfit.util.interrupts import SIGNALLED
 from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
     from exfit.output.blocks import Block
+    from exfit.output.events import Events
     from exfit.output.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
@@ -51,17 +54,27 @@ force_option = click.option("--force", is_flag=True, help="Write over a file tha
 
 
 class Output(NamedTuple):
-    """Where a command leaves its files, and what it prints: tables, JSON or nothing."""
+    """Where a command leaves its files, and what it prints: tables, JSON or nothing.
+
+    ``progress`` is that of --progress; ``events`` takes what json announces, else it is None.
+    """
 
     given: Path | None
     figures: bool
     quiet: bool
     as_json: bool
+    progress: str = "auto"
+    events: "Events | None" = None
 
     @property
     def shown(self) -> bool:
         """Whether tables are printed."""
         return not (self.quiet or self.as_json)
+
+    @property
+    def live(self) -> bool:
+        """Whether progress is shown to a reader."""
+        return self.shown and self.progress == "auto"
 
     def folder(self, default: str, files: Iterable[str] = ()) -> Path:
         """Find the folder for the ``files`` of a command, by default one in runs.
@@ -72,6 +85,8 @@ class Output(NamedTuple):
 
         folder = self.given or Path("runs") / default
         run_folder.refuse_unwritable(folder, files)
+        if self.events is not None:
+            self.events.folder = folder
         return folder
 
     def folder_of(
@@ -111,9 +126,17 @@ class Output(NamedTuple):
         if self.shown and listed:
             from exfit.output import terminal
 
-            warn(figures.draw(partial(terminal.figure, terminal.console())))
+            self.warn(figures.draw(partial(terminal.figure, terminal.console())))
         else:
-            warn(figures.draw())
+            self.warn(figures.draw())
+
+    def warn(self, texts: Iterable[str], label: str = "Warning") -> None:
+        """Announce what went wrong beside a result, or write it to standard error."""
+        if self.events is None:
+            warn(texts, label)
+            return
+        for text in texts:
+            self.events.write("warning", text=text)
 
 
 def file_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -130,11 +153,77 @@ def file_options(command: Callable[..., None]) -> Callable[..., None]:
     @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
     @wraps(command)
     def with_output(
-        output: Path | None, plots: bool, quiet: bool, as_json: bool = False, **others: Any
+        output: Path | None,
+        plots: bool,
+        quiet: bool,
+        as_json: bool = False,
+        progress: str = "auto",
+        events: "Events | None" = None,
+        **others: Any,
     ) -> None:
-        command(output=Output(output, plots, quiet, as_json), **others)
+        given = Output(output, plots, quiet, as_json, progress, events)
+        command(output=given, **others)
 
     return with_output
+
+
+def progress_option(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the ``progress`` of --progress, and ``events`` for json; else these are None.
+
+    It stands above output_options, which make both a part of ``output``.
+    """
+
+    @click.option(
+        "--progress",
+        type=click.Choice(["auto", "json", "none"]),
+        default="auto",
+        help="Progress: auto, above the result (default); json, an object a line on standard "
+        "error, for programs; none.",
+    )
+    @wraps(command)
+    def with_progress(progress: str, **others: Any) -> None:
+        with announced(progress, **others) as events:
+            command(progress=progress, events=events, **others)
+
+    return with_progress
+
+
+@contextmanager
+def announced(progress: str, **arguments: Any) -> "Iterator[Events | None]":
+    """Give what takes the events of a command with --progress json, the last one how it ends."""
+    if progress != "json":
+        yield None
+        return
+    from exfit.output.events import Events
+
+    context = click.get_current_context()
+    inputs = (arguments.get(name) for name in ("case", "cases", "programme", "record"))
+    strategies = arguments.get("strategies") or arguments.get("strategy")
+    events = Events(str(context.info_name), [*_listed(inputs)], [*_listed([strategies])])
+    code, error = 0, None
+    try:
+        yield events
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+        raise
+    except KeyboardInterrupt:
+        code = Interruption.exit_code
+        raise
+    except click.ClickException as fault:
+        code, error = fault.exit_code, fault.format_message()
+        raise
+    except Exception as fault:
+        code, error = Refusal.exit_code, str(fault)
+        raise
+    finally:
+        signals = context.find_root().obj  # a signal that ended the command has a code of its own
+        events.end(SIGNALLED + signals[0] if signals else code, error)
+
+
+def _listed(given: Iterable[Any]) -> Iterator[str]:
+    """Yield the texts of arguments, of those that take several each."""
+    for each in given:
+        yield from map(str, each if isinstance(each, tuple) else [each] if each else [])
 
 
 def output_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -256,10 +345,10 @@ def print_json(content: Mapping[str, Any]) -> None:
     click.echo(CONTROLS.sub(lambda control: f"\\u{ord(control[0]):04x}", text), nl=False)
 
 
-def warn(texts: Iterable[str]) -> None:
+def warn(texts: Iterable[str], label: str = "Warning") -> None:
     """Write what went wrong beside a result to standard error."""
     for text in texts:
-        echo(f"Warning: {text}", err=True)
+        echo(f"{label}: {text}", err=True)
 
 
 def assignments(texts: tuple[str, ...], option: str) -> dict[str, float]:

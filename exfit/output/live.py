@@ -20,7 +20,6 @@ from exfit.estimate import Progress
 from exfit.output.iterations import COLUMNS, IterationColumn
 from exfit.output.terminal import paragraph
 from exfit.results.model import Iteration
-from exfit.results.side_by_side import outcome_of
 from exfit.results.verdict import MATCHES, MISSES
 from exfit.runs.fits import FitRun, PlannedFit
 from exfit.runs.fits import Progress as ProgressOfFit
@@ -327,10 +326,10 @@ class SeriesProgress(RunLines):
 
     def finished(self, run: FitRun) -> None:
         """Show a fit that has ended."""
-        result, outcome = run.result, outcome_of(run.result)
+        result, outcome = run.result, run.verdict
         numbers = (f"{result.cost:.4e}", f"{result.rmse:.4e}", f"{result.seconds:.2f}")
         cells = (run.name, f"{result.nit}", *numbers, BRIEF.get(outcome, outcome))
-        self.line(cells, "" if result.holds else "yellow")
+        self.line(cells, "" if run.holds else "yellow")
         self.show(run.name, "writing numbers")
         self.done += 1
 

@@ -49,6 +49,16 @@ class FitRun:
         """Whether its result is the best point before an interruption."""
         return self.result.interrupted
 
+    @property
+    def verdict(self) -> str:
+        """The verdict on its result, or what speaks against one that matches."""
+        return outcome_of(self.result)
+
+    @property
+    def holds(self) -> bool:
+        """Whether its result matches and is accepted."""
+        return self.result.holds
+
 
 @dataclass(frozen=True, eq=False)
 class FitSeries:
@@ -78,7 +88,7 @@ class FitSeries:
     def all_hold(self) -> bool:
         """Whether all fits were run, and each matches its records and is accepted."""
         done = not (self.failed or self.not_run or self.interrupted)
-        return done and all(result.holds for result in self.results.values())
+        return done and all(run.holds for run in self.runs)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of all fits as plain data, as ``exfit fit --json`` prints them."""
@@ -87,7 +97,7 @@ class FitSeries:
                 {
                     "name": run.name,
                     "case_name": run.case_name,
-                    "outcome": outcome_of(run.result),
+                    "outcome": run.verdict,
                     "result": run.result.to_dict(),
                 }
                 for run in self.runs

@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING
 
 import click
 
-from exfit.cli.options import NOT_CONVERGED, Interruption, print_json
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    Interruption,
+    print_json,
+    progress_option,
+)
 from exfit.errors import ExfitError
 from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
-    from exfit.features.fleet.batch import CaseMaking
+    from exfit.features.fleet.batch import BatchObserver, CaseMaking
     from exfit.features.fleet.folder import Fleet
-    from exfit.features.fleet.terminal import BatchProgress
+    from exfit.output.events import Events
 
 FAILED = 1  # the exit code where cases are without a fit
 WITHOUT_FIT = ("failed", "timed out", "crashed", "refused", "not run")
@@ -89,6 +94,7 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON and nothing else.")
+@progress_option
 def batch(
     cases: tuple[Path, ...],
     output: Path,
@@ -103,6 +109,8 @@ def batch(
     search: str | None,
     quiet: bool,
     as_json: bool,
+    progress: str,
+    events: "Events | None",
 ) -> None:
     """Fit all CASES: case files, folders with case files (*.yaml) in them or below, and tables.
 
@@ -133,12 +141,18 @@ def batch(
     from exfit.features.start.tables import is_table
 
     tables = [path for path in cases if is_table(path) and not path.is_dir()]
-    shown: AbstractContextManager[BatchProgress | None] = nullcontext()
+    shown: AbstractContextManager[BatchObserver | None] = nullcontext()
     if not (quiet or as_json):
         from exfit.features.fleet import terminal
         from exfit.output.terminal import console
 
-        shown = terminal.BatchProgress(console()).running()
+        if progress == "auto":
+            shown = terminal.BatchProgress(console()).running()
+    if events is not None:
+        from exfit.features.fleet.terminal import BatchEvents
+
+        events.folder = output
+        shown = nullcontext(BatchEvents(events))
     with shown as observer:
         fleet = fit_all(
             [path for path in cases if path not in tables],

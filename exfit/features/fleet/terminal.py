@@ -15,6 +15,7 @@ from rich.text import Text
 from exfit.features.fleet.batch import BatchObserver
 from exfit.features.fleet.folder import CaseSummary, Fleet
 from exfit.output.blocks import Block, Mark, Note, Table, columns, row
+from exfit.output.events import Events
 from exfit.output.terminal import STYLES, paragraph, show, written
 from exfit.results.verdict import GOOD, MATCHES
 
@@ -150,6 +151,37 @@ class BatchProgress(BatchObserver):
         parts = [*kept.items(), *self._outcomes.most_common()]
         words = (Text(f"{word} {count}", STYLES[MARKS.get(word, "")]) for word, count in parts)
         return Text(", ").join(words)
+
+
+class BatchEvents(BatchObserver):
+    """Announces the cases of a batch to a program."""
+
+    def __init__(self, events: Events) -> None:
+        self.events = events
+        self._cases = self._done = 0
+
+    def begun(self, cases: int, workers: int) -> None:
+        """Announce how much there is to do."""
+        self._cases = cases
+        self._count(0)
+
+    def kept(self, case: str) -> None:
+        """Announce a case that is done already."""
+        self.events.write("kept", run=case)
+        self._count(1)
+
+    def started(self, case: str) -> None:
+        """Announce that a case begins."""
+        self.events(self.events.named(case))
+
+    def finished(self, summary: CaseSummary) -> None:
+        """Announce how a case has ended."""
+        self.events.done(summary.case, summary.outcome, summary.holds)
+        self._count(1)
+
+    def _count(self, more: int) -> None:
+        self._done += more
+        self.events.stage(None, "cases", self._done, self._cases)
 
 
 def batch(console: Console, fleet: Fleet) -> None:

@@ -1,6 +1,7 @@
 """The command run."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,13 +13,18 @@ from exfit.cli.options import (
     Output,
     output_options,
     print_json,
+    progress_option,
 )
 from exfit.errors import FileError
+
+if TYPE_CHECKING:
+    from exfit.output.events import Events
 
 
 @click.command(short_help="Run all tests of a unit, each feeding the later ones.")
 @click.argument("programme", type=GivenFile(Kind.CASE))
 @click.option("--again", is_flag=True, help="Run every test, whatever is kept of an earlier run.")
+@progress_option
 @output_options
 def run(programme: Path, again: bool, output: Output) -> None:
     """Run the tests of PROGRAMME in the order in which one feeds the next.
@@ -36,6 +42,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
     matched, a validation that is not accepted, or not all tests are run.
     """
     from exfit.features.programme import folder as programme_folder
+    from exfit.features.programme import programme_terminal
     from exfit.features.programme.programme import load_programme, steps_of
     from exfit.features.programme.run import run as run_programme
 
@@ -45,11 +52,13 @@ def run(programme: Path, again: bool, output: Output) -> None:
     names = [step.name for step in steps]
     inputs = [loaded.path, *(file for name in names for file in loaded.files_of(name))]
     programme_folder.refuse_inputs(inputs, names, folder)
-    if output.shown:
-        from exfit.features.programme.programme_terminal import ProgrammeProgress
+    progress: programme_terminal.ProgrammeProgress | Events | None = output.events
+    if output.live:
         from exfit.output import terminal
 
-        with ProgrammeProgress(terminal.console(), steps).running() as shown:
+        progress = programme_terminal.ProgrammeProgress(terminal.console(), steps)
+    if progress is not None:
+        with progress.running() as shown:
             result = run_programme(
                 loaded, folder, again, shown, shown.finished, keep=programme_folder.write_test
             )
@@ -68,6 +77,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
             print_json(result.to_dict())
         elif output.shown:
             from exfit.features.programme import programme_blocks
+            from exfit.output import terminal
 
             console = terminal.console()
             terminal.show(console, programme_blocks.programme(result))

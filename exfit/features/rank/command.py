@@ -14,6 +14,7 @@ from exfit.cli.options import (
     load,
     output_options,
     print_json,
+    progress_option,
 )
 from exfit.util.vocabulary import SEARCHES, SEARCHES_EXPLAINED
 
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     default="global",
     help=f"How far to search for each. {SEARCHES_EXPLAINED}.",
 )
+@progress_option
 @output_options
 def rank(case: Path, models: str | None, search: str, output: Output) -> None:
     """Fit the records of CASE under several exciters, and rank these.
@@ -71,7 +73,8 @@ def rank(case: Path, models: str | None, search: str, output: Output) -> None:
             from exfit.output import terminal
 
             console = terminal.console()
-            console.print()
+            if output.live:
+                console.print()
             terminal.show(console, ranking_blocks(ranking))
             console.print()
             terminal.written(console, folder)

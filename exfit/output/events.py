@@ -1,0 +1,101 @@
+"""What a command announces to a program that runs it: a JSON object a line on standard error."""
+
+import json
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, Self
+
+from exfit.estimate import Progress
+from exfit.results.model import Iteration
+from exfit.util.typed import plain
+
+
+class Named(Protocol):
+    """A run of a command, by a name that no other has: a fit, a test of a programme, a case."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+
+class Judged(Named, Protocol):
+    """A run that has ended."""
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on it, or what speaks against one that matches."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether it matches and is accepted."""
+
+
+class NamedRun(NamedTuple):
+    """A run that has nothing but a name."""
+
+    name: str
+
+
+class Events:
+    """Writes each event as it comes; docs/commands.md describes what they hold.
+
+    It is called with a run and an iteration of it, or how far it is; None as it begins. ``folder``
+    is where the command leaves its files.
+    """
+
+    def __init__(self, command: str, inputs: Sequence[str], strategies: Sequence[str]) -> None:
+        self._began = time.monotonic()
+        self._begun: set[str] = set()
+        self._verdicts: list[str] = []
+        self.folder: Path | None = None
+        self.write("start", command=command, inputs=inputs, strategies=strategies)
+
+    @staticmethod
+    def named(name: str) -> Named:
+        """Name a run that has no plan."""
+        return NamedRun(name)
+
+    def write(self, event: str, **content: Any) -> None:
+        """Write an event with the seconds since the start; numbers that are not finite are null."""
+        line = {"event": event, "elapsed": round(time.monotonic() - self._began, 3), **content}
+        print(json.dumps(plain(line), allow_nan=False), file=sys.stderr, flush=True)
+
+    @contextmanager
+    def running(self) -> Iterator[Self]:
+        """Write events: as what else shows progress, it is entered first."""
+        yield self
+
+    def __call__(self, run: Named, progress: Iteration | Progress | None = None) -> None:
+        """Write how far a run is."""
+        if run.name not in self._begun:
+            self._begun.add(run.name)
+            self.write("begin", run=run.name)
+        if isinstance(progress, Iteration):
+            self.write("iteration", run=run.name, **plain(progress))
+        elif progress is not None:
+            self.stage(run.name, progress.stage, progress.done, progress.total, progress.best)
+
+    def stage(
+        self, run: str | None, stage: str, done: int, total: int, best_cost: float | None = None
+    ) -> None:
+        """Write how far a stage is, of a run or the command; ``best_cost``: the lowest so far."""
+        self.write("stage", run=run, stage=stage, done=done, total=total, best_cost=best_cost)
+
+    def finished(self, run: Judged) -> None:
+        """Write that a run has ended."""
+        self.done(run.name, run.verdict, run.holds)
+
+    def done(self, run: str, verdict: str, holds: bool) -> None:
+        """Write the verdict on a run, or why it has none, and whether it matches."""
+        self._begun.discard(run)
+        self._verdicts.append(verdict)
+        self.write("done", run=run, verdict=verdict, holds=holds)
+
+    def end(self, exit_code: int, error: str | None) -> None:
+        """Write how the command ends; the verdict is that of its run, null where it has several."""
+        verdict = self._verdicts[0] if len(self._verdicts) == 1 else None
+        folder = self.folder
+        self.write("end", exit_code=exit_code, verdict=verdict, folder=folder, error=error)
