@@ -22,15 +22,19 @@ from exfit.errors import (
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.features.compare.agreement import compare
     from exfit.features.design.designed_test import design_test
     from exfit.features.design.experiment_design import identify
     from exfit.features.fleet.batch import batch
     from exfit.features.fleet.folder import read_fleet
-    from exfit.features.planner.import_all import cases_of_table
+    from exfit.features.planner.export import export
+    from exfit.features.planner.import_all import cases_of_table, import_units
     from exfit.features.programme.run import run
     from exfit.features.programme.saturation import saturation_curve
     from exfit.features.rank.ranked_cases import rank
+    from exfit.features.report.writing import write_report as report
     from exfit.features.translate.translate import translate
+    from exfit.output.stored import show
     from exfit.records.record import Record
     from exfit.results.io import load_result
     from exfit.results.model import FitResult
@@ -62,18 +66,23 @@ __all__ = [
     "batch",
     "cases_of_table",
     "check",
+    "compare",
     "design_test",
+    "export",
     "fit",
     "fit_all",
     "identify",
+    "import_units",
     "load_case",
     "load_result",
     "profile",
     "rank",
     "read_fleet",
     "read_record",
+    "report",
     "run",
     "saturation_curve",
+    "show",
     "simulate",
     "translate",
     "validate",
@@ -90,6 +99,7 @@ _MODULES = {
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",
     "read_record": "exfit.workflows",
+    "show": "exfit.output.stored",
     "simulate": "exfit.workflows",
     "validate": "exfit.workflows",
 }

@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from pkgutil import iter_modules
 
 import numpy as np
 import pytest
@@ -14,10 +15,13 @@ from matplotlib.figure import Figure
 from places import ROOT
 
 import exfit
+from exfit import cli
 from exfit.fitting.recordings import record_of
 from exfit.output import run_folder
 
+API_PAGE = ROOT / "docs" / "python_api.md"
 CASE = ROOT / "configs" / "first_order.yaml"
+DYR = ROOT / "sample_data" / "unit.dyr"
 HEAVY = {"numpy", "scipy", "pydantic", "yaml", "matplotlib", "rich", "click", "llvmlite"}
 
 NOISE = 1e-4  # pu
@@ -55,6 +59,12 @@ def test_every_public_name_can_be_used_and_is_listed(name):
 @pytest.mark.parametrize("name", sorted({*exfit.__all__} - {"__version__"}))
 def test_every_public_name_is_documented(name):
     assert getattr(exfit, name).__doc__
+    assert f"`{name}`" in API_PAGE.read_text(encoding="utf-8")
+
+
+def test_no_module_hides_a_public_name():
+    """Importing a module ``exfit.show`` would put it in place of a function of that name."""
+    assert not {module.name for module in iter_modules(exfit.__path__)} & {*exfit.__all__}
 
 
 def test_another_name_is_no_attribute():
@@ -332,3 +342,35 @@ def test_a_result_is_read_back_from_its_folder(result, tmp_path):
         assert read.to_dict() == result.to_dict()
         assert read._repr_html_() == result._repr_html_()
         assert isinstance(read.plot(), Figure)
+
+
+def test_a_result_is_printed_as_the_command_prints_it(result, tmp_path, capsys):
+    run_folder.write_fit(result, tmp_path)
+    exfit.show(tmp_path)
+    printed = capsys.readouterr().out
+    assert "written to" in printed
+    exfit.show(result)
+    verdict = printed.splitlines()[-1]
+    assert (
+        capsys.readouterr().out.splitlines()[-1] == verdict == f"verdict: {result.verdict.sentence}"
+    )
+    with pytest.raises(SystemExit):
+        cli.main(["show", str(tmp_path)], prog_name="exfit")
+    assert capsys.readouterr().out == printed
+
+
+@pytest.mark.parametrize(
+    ("use", "fault"),
+    [
+        (lambda result: exfit.export(result, form="dvr"), "dvr: no format .* did you mean dyr"),
+        (lambda _: exfit.compare([CASE]), "one curve alone"),
+        (lambda _: exfit.import_units(DYR, "out", steps=["0.05"]), "only with a folder of records"),
+    ],
+)
+def test_what_a_function_cannot_use_is_refused_before_it_writes(
+    result, use, fault, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(exfit.ExfitError, match=fault):
+        use(result)
+    assert not [*tmp_path.iterdir()]

@@ -74,43 +74,9 @@ def show(result: Path, everything: bool, history: bool) -> None:
     RESULT is the result.json of a fit, the validation.json of a validation, or the folder that
     holds one of them.
     """
-    from exfit.output import fits, run_folder, terminal, validations
-    from exfit.output.blocks import Table, columns, paragraph, row
-    from exfit.results.io import load_result, load_validation, result_file
-    from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
+    from exfit.output import stored
 
-    console, source = terminal.console(), result_file(result)
-    programme = result / WHOLE_PROGRAMME if result.is_dir() else result
-    if programme.name == WHOLE_PROGRAMME and programme.is_file():
-        raise ExfitError(f"{result}: a programme; `exfit report` makes a page of it")
-    validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
-    if source == validated or (validated.is_file() and not source.exists()):
-        if history:
-            raise ExfitError(f"{result}: a validation has no iterations: give the result of a fit")
-        validation = load_validation(validated)
-        terminal.show(console, [paragraph(validation.origin)])
-        terminal.show(console, validations.validation(validation.matches))
-        return
-    fit, folder = load_result(source), source.parent
-    if history:
-        from exfit.output.iterations import iterations
-
-        terminal.show(console, iterations(fit.history))
-        if not everything:
-            return
-        console.print()
-    if not everything:
-        terminal.show_shortest(console, fits.briefs(fit, folder))
-        return
-    figures = tuple(
-        row(name, planned.shows)
-        for name, planned in run_folder.figures_of_fit(fit).items()
-        if (folder / name).is_file()
-    )
-    if figures:
-        terminal.show(console, [Table(columns("figure", "shows"), figures)])
-        console.print()
-    terminal.show(console, fits.whole(fit, folder))
+    stored.show(result, everything, history)
 
 
 @click.command(short_help="Find the intervals of parameters by their profile likelihood.")

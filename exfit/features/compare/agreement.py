@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
+from os import PathLike
 from pathlib import Path
 from string import ascii_uppercase
 from typing import Any, NamedTuple
@@ -15,7 +16,6 @@ from exfit.dsp.step_detection import DetectedStep, first_step
 from exfit.errors import ExfitError, RecordError
 from exfit.features.compare.curves import (
     RECORD,
-    USUAL_COLUMNS,
     ColumnChoice,
     Curve,
     Difference,
@@ -105,9 +105,10 @@ class Agreement:
 
 
 def compare(
-    sources: Sequence[Path],
-    record: Path | None = None,
-    choice: ColumnChoice = USUAL_COLUMNS,
+    sources: Sequence[str | PathLike[str]],
+    record: str | PathLike[str] | None = None,
+    columns: Mapping[str, Sequence[str]] | None = None,
+    time: Sequence[str] = (),
     shifts: Mapping[str, float] | None = None,
     align: bool = False,
     step_at: float | None = None,
@@ -122,7 +123,8 @@ def compare(
     Args:
         sources: where the responses are, named A, B, C ...; one alone only beside a record.
         record: where the measured curve is.
-        choice: the columns of signals and time, in the files that have them.
+        columns: possible columns of each signal: a file is read by the one that it has.
+        time: possible columns of the time; by default the usual names are looked for.
         shifts: s, added to the time of a curve, by its name.
         align: whether the clocks are moved so that the steps that are detected are together: at
             that of the record, or of A.
@@ -131,9 +133,16 @@ def compare(
 
     Raises RecordError where a file cannot be used, they have no signal or time in common, or a step
     is not detected that is to be aligned.
+
+    Example:
+        >>> agreement = exfit.compare(["runs/a-fit", "pss_e.csv"], shifts={"B": 0.5})
+        >>> agreement.differences[0].rms
     """
-    paths = dict(zip(_names(len(sources)), sources, strict=True))
-    named = paths if record is None else {**paths, RECORD: record}
+    if len(sources) == 1 and record is None:
+        raise RecordError(f"{sources[0]}: one curve alone can be compared only with a record")
+    choice = ColumnChoice({} if columns is None else columns, time)
+    paths = dict(zip(_names(len(sources)), map(Path, sources), strict=True))
+    named = paths if record is None else {**paths, RECORD: Path(record)}
     as_read = [read_curve(name, path, choice) for name, path in named.items()]
     refuse_unknown(choice, as_read)
     curves = shifted(as_read, shifts or {})

@@ -16,8 +16,6 @@ from exfit.util.text import percentage, rounded
 if TYPE_CHECKING:
     from exfit.features.compare.agreement import Agreement
 
-FEWEST_CURVES = 2  # without a record
-
 
 @click.command(short_help="Compare responses, from any program.")
 @click.argument(
@@ -80,19 +78,17 @@ def compare(
     Writes compare.json, compare.csv and compare.png to runs/compare, or to DIR; with a record
     compare-record.csv too.
     """
-    if len(curves) < FEWEST_CURVES and record is None:
+    if len(curves) == 1 and record is None:
         raise click.UsageError("One CURVE alone can be compared only with a --record.")
     if align and shifts:
         raise click.UsageError("--align moves all clocks: not together with --shift.")
     from exfit.features.compare.agreement import compare as compared
-    from exfit.features.compare.curves import ColumnChoice
     from exfit.features.compare.files import FILES, write_agreement
     from exfit.output import run_folder
 
     folder = output.folder("compare", FILES)
     run_folder.refuse_inputs(FILES, [*curves, *([record] if record else ())], folder)
-    choice = ColumnChoice(_columns(columns), time)
-    agreement = compared(curves, record, choice, _shifts(shifts), align, step_at)
+    agreement = compared(curves, record, _columns(columns), time, _shifts(shifts), align, step_at)
     figures = write_agreement(agreement, folder)
     output.show(agreement.as_json(), blocks_of(agreement), folder, figures)
 

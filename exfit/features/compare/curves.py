@@ -57,11 +57,8 @@ class ColumnChoice(NamedTuple):
     Of several names for one of them, a file is read by the one that it has.
     """
 
-    columns: Mapping[str, Sequence[str]] = {}
-    time: Sequence[str] = ()
-
-
-USUAL_COLUMNS = ColumnChoice()
+    columns: Mapping[str, Sequence[str]]
+    time: Sequence[str]
 
 
 def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:

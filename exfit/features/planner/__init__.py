@@ -9,4 +9,8 @@ COMMANDS = {
     ),
 }
 
-PUBLIC = {"cases_of_table": "import_all:cases_of_table"}
+PUBLIC = {
+    "cases_of_table": "import_all:cases_of_table",
+    "export": "export:export",
+    "import_units": "import_all:import_units",
+}

@@ -18,11 +18,10 @@ from exfit.util.vocabulary import FITTED
 if TYPE_CHECKING:
     from exfit.features.fleet.folder import Fleet
     from exfit.features.planner.fitted_file import ChangedValue, FittedUnit, LeftUnit
-    from exfit.features.planner.import_all import ImportedUnits, ImportPlan, RecordOptions
+    from exfit.features.planner.import_all import ImportedUnits
 
 MOST_BUSES = 999_999
 BUSES = click.IntRange(1, MOST_BUSES)
-UNITS = "units.csv"
 
 
 @click.command("import", short_help="Make cases from a planner's dynamics file.")
@@ -71,9 +70,9 @@ def import_(
     holds several units, --bus and --id choose one, and --all makes a case of each. With --records
     a case has the tests of its records, as `exfit new` makes it.
     """
-    from exfit.case.suggestion import RecordSettings, bases_of, relative
+    from exfit.case.suggestion import relative
     from exfit.features.planner.fields import located
-    from exfit.features.planner.import_all import RecordOptions
+    from exfit.features.planner.import_all import import_units
     from exfit.features.planner.import_case import import_unit, imported_case
 
     in_table = (sizes, clock, unit, sheet)
@@ -92,8 +91,8 @@ def import_(
                 "--step, --time, --time-unit and --sheet: not allowed with a table, which has "
                 "columns for them."
             )
-        options = RecordOptions(sizes, bases_of(bases), RecordSettings(clock, unit, sheet))
-        _import_every_unit(dyr, records, options, output, force)
+        given_as = (records, sizes, bases, clock, unit, sheet, force)
+        _report_import(import_units(dyr, output, *given_as), output)
         return
     if records is not None or given:
         raise click.UsageError(
@@ -109,31 +108,12 @@ def import_(
         echo(f"written to {output}; next: exfit simulate {output}")
 
 
-def _import_every_unit(
-    dyr: Path, records: Path | None, options: "RecordOptions", folder: Path, force: bool
-) -> None:
-    """Write a case for every unit of a dynamics file, and a table of all units."""
-    from exfit.features.planner.import_all import import_all, plan_import, units_table
-    from exfit.util.files import write_each
-
-    plan = plan_import(dyr, records)
-    names = () if force else (*plan.names, UNITS)
-    existing = [str(folder / name) for name in names if (folder / name).exists()]
-    if existing:
-        listed = "\n".join(first_texts(existing))
-        raise ExfitError(f"{listed}\nexist already; --force writes over them")
-    imported = import_all(plan, folder, options)
-    if imported.unused:
-        raise ExfitError(f"--step {imported.unused[0]}: no test of that name in any record")
-    write_each(folder, {**imported.texts, UNITS: units_table(imported.units)})
-    warn(first_texts(imported.doubts))
-    _report_import(plan, imported, folder)
-
-
-def _report_import(plan: "ImportPlan", imported: "ImportedUnits", folder: Path) -> None:
+def _report_import(imported: "ImportedUnits", folder: Path) -> None:
     """Say what was written and what was not; raises ExfitError where something was refused."""
-    from exfit.features.planner.import_all import NO_MODEL, RECORDED, REFUSED
+    from exfit.features.planner.import_all import NO_MODEL, RECORDED, REFUSED, UNITS
 
+    plan = imported.plan
+    warn(first_texts(imported.doubts))
     lines: dict[str, list[str]] = {NO_MODEL: [], RECORDED: [], REFUSED: []}
     for unit in imported.units:
         line = f"bus {unit.bus}, machine {unit.id}: {unit.notes}"
@@ -253,8 +233,7 @@ def _export_one(
 ) -> None:
     """Write the records of one fit, at the bus that is given, or where they were found."""
     from exfit.features.planner.export import export as exported
-    from exfit.features.planner.export import place_of
-    from exfit.features.planner.units import FORMATS, format_of
+    from exfit.features.planner.units import format_of
     from exfit.results.io import load_result, result_file
 
     if output is not None:
@@ -262,11 +241,8 @@ def _export_one(
     source = result_file(result)
     fit = load_result(source)
     try:
-        if bus is None or machine_id is None:
-            own_bus, own_id = place_of(fit)
-            bus, machine_id = bus or own_bus, machine_id or own_id
-        files = format_of(output or "") if form is None else FORMATS[form]
-        records = exported(fit, bus, machine_id, model, files=files)
+        form = form or format_of(output or "").suffix.removeprefix(".")
+        records = exported(fit, bus, machine_id, model, form)
     except ExfitError as fault:
         texts = (f"{source}: {text}" for text in str(fault).splitlines())
         raise FileError(texts) from None

@@ -5,6 +5,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
+from os import PathLike
 from typing import Any
 
 from exfit import __version__
@@ -30,11 +31,13 @@ from exfit.features.planner.records import (
     outside,
     unused_of,
 )
+from exfit.features.planner.units import FORMATS
 from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.sheet import DynamicsRecord
 from exfit.results.influences import by_weight, first_of
+from exfit.results.io import load_result
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.util.text import near, show
@@ -68,25 +71,46 @@ class Written:
 
 
 def export(
-    result: FitResult,
-    bus: int,
-    machine_id: str,
-    name: str | None = None,
+    result: FitResult | str | PathLike[str],
+    bus: int | None = None,
+    machine_id: str | None = None,
+    model: str | None = None,
+    form: str = "dyr",
     translation: Translation | None = None,
-    files: FileFormat = PSSE_FILES,
 ) -> Exported:
-    """Return the records of a fit for a program, of its exciter as its ``translation`` has it.
+    """Write machine, exciter, stabiliser and governor of a fit as records of a planner's file.
 
-    ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
-    model has no record, or a value is missing or lies outside the range of its data sheet.
+    Args:
+        result: a fit, its result.json, or the folder that holds it.
+        bus: of the unit; by default where it was found, else 1.
+        machine_id: of the unit; by default as it was found, else "1".
+        model: the record of the exciter in place of the model's first one, such as ESAC8B.
+        form: "dyr" of PSS/E or "dyd" of PSLF.
+        translation: another model in place of the exciter.
+
+    Raises ExfitError where the result cannot be read, the model has no record, or a value is
+    missing or lies outside the range of its data sheet.
+
+    Example:
+        >>> records = exfit.export("runs/ac1a_typical-fit", bus=101)
+        >>> Path("unit.dyr").write_text(records.text)
+        >>> records.warnings
     """
+    if not isinstance(result, FitResult):
+        result = load_result(result)
+    if form not in FORMATS:
+        raise ExfitError(f"{form}: no format of a planner's file; {near(form, FORMATS)}")
+    if bus is None or machine_id is None:
+        found_bus, found_id = place_of(result)
+        bus, machine_id = bus or found_bus, machine_id or found_id
+    files = FORMATS[form]
     comments = [*_origin(result, translation)]
     if translation is not None:
         result = _translated(result, translation)
     of_fit = [*_of_fit(result, files.program)]
     content, warnings = content_of(result.case_text, result.case), list[str]()
     given = (result, content, files.program)
-    exciter = _exciter(*given, name)
+    exciter = _exciter(*given, model)
     written = [*_added(*given, "machine", warnings)]
     if exciter is not None:
         written.append(exciter)

@@ -2,16 +2,16 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-from exfit.case.suggestion import Base, RecordSettings, relative
+from exfit.case.suggestion import Base, RecordSettings, bases_of, relative
 from exfit.errors import DynamicsError, ExfitError
 from exfit.features.planner.fields import located
-from exfit.features.planner.import_case import import_units, imported_case, unit_data
+from exfit.features.planner.import_case import imported_case, unit_data, units_of_file
 from exfit.features.planner.units import DynamicsUnits, Unit
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
 from exfit.features.start.starting_case import (
@@ -22,10 +22,11 @@ from exfit.features.start.starting_case import (
     unit_with,
 )
 from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
-from exfit.util.files import write
-from exfit.util.text import dotted
+from exfit.util.files import write, write_each
+from exfit.util.text import dotted, first_texts
 
 WRITTEN, RECORDED, REFUSED, NO_MODEL = "written", "written with records", "refused", "no model"
+UNITS = "units.csv"
 CASES = "cases"  # the folder of the cases in that of a batch
 
 
@@ -59,7 +60,7 @@ class ImportPlan:
 class RecordOptions:
     """What is common to all records: sizes of steps, bases by signal, how they are read."""
 
-    sizes: tuple[str, ...] = ()
+    sizes: Sequence[str] = ()
     bases: Mapping[str, Base] = field(default_factory=dict)
     settings: RecordSettings = field(default_factory=RecordSettings)
 
@@ -82,15 +83,15 @@ class ImportedUnit(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedUnits:
-    """All units of a file, the texts of the cases by their names, and what is doubtful in them.
+    """The units of a file with what became of each, and the texts of their cases by file name.
 
-    ``unused`` are sizes of steps that are of no test.
+    ``doubts`` are what is doubtful in the cases, ``plan`` is what was to be imported.
     """
 
     units: tuple[ImportedUnit, ...]
     texts: Mapping[str, str]
     doubts: tuple[str, ...]
-    unused: tuple[str, ...]
+    plan: ImportPlan
 
 
 def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
@@ -98,7 +99,7 @@ def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
 
     Raises DynamicsError where the file cannot be read, ExfitError where the folder or table cannot.
     """
-    units = import_units(dyr)
+    units = units_of_file(dyr)
     known = [key_of(unit) for unit in units.units]
     faults = located(units.faults, str(dyr))
     if records is None:
@@ -122,8 +123,49 @@ def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
     return ImportPlan(dyr, units, {}, rows, tuple(faults), ())
 
 
-def import_all(plan: ImportPlan, folder: Path, options: RecordOptions) -> ImportedUnits:
-    """Return the cases of all units as they will be written into a folder."""
+def import_units(
+    dyr: str | PathLike[str],
+    folder: str | PathLike[str],
+    records: str | PathLike[str] | None = None,
+    steps: Sequence[str] = (),
+    bases: Sequence[str] = (),
+    time: Sequence[str] = (),
+    time_unit: str | None = None,
+    sheet: str | None = None,
+    force: bool = False,
+) -> ImportedUnits:
+    """Write a case for every unit of a planner's dynamics file, and units.csv with all units.
+
+    Args:
+        dyr: a file of PSS/E (.dyr) or of PSLF (.dyd).
+        folder: where the cases and units.csv are written.
+        records: a folder of records that are named by bus and id, or a table of them.
+        steps: sizes of the steps of the records, pu: "0.05", of one test "up=0.05".
+        bases: values of 1 pu of their signals: "vt=15.75kV".
+        time: columns of their time.
+        time_unit: s, ms, us or min.
+        sheet: of Excel files.
+        force: replace files that exist.
+
+    Raises DynamicsError where the dynamics file cannot be read, ExfitError where records or options
+    cannot be used. A unit that cannot be imported raises nothing: its ``status`` and ``notes`` say
+    why.
+
+    Example:
+        >>> imported = exfit.import_units("planner.dyr", "cases", records="records")
+        >>> [unit.case for unit in imported.units]
+    """
+    if any((steps, time, time_unit, sheet)) and not (records and Path(records).is_dir()):
+        raise ExfitError("steps, time, time_unit and sheet: only with a folder of records")
+    options = RecordOptions(
+        steps, bases_of(tuple(bases)), RecordSettings(tuple(time), time_unit, sheet)
+    )
+    folder = Path(folder)
+    plan = plan_import(Path(dyr), None if records is None else Path(records))
+    names = () if force else (*plan.names, UNITS)
+    if existing := [str(folder / name) for name in names if (folder / name).exists()]:
+        listed = "\n".join(first_texts(existing))
+        raise ExfitError(f"{listed}\nexist already; --force writes over them")
     rows, texts, doubts, used = list[ImportedUnit](), dict[str, str](), list[str](), set[str]()
     file = relative(plan.dyr, folder)
     for unit in plan.units.units:
@@ -160,10 +202,11 @@ def import_all(plan: ImportPlan, folder: Path, options: RecordOptions) -> Import
         text = "; ".join(f"line {fault.line}: {fault.text}" for fault in refused.faults)
         place = (refused.bus, refused.id, refused.line)
         rows.append(ImportedUnit(*place, "", "", "", "", status, "", "", text))
-    unused = tuple(size for size in options.sizes if size not in used)
-    return ImportedUnits(
-        tuple(sorted(rows, key=lambda row: row.line)), texts, tuple(doubts), unused
-    )
+    if unused := [size for size in steps if size not in used]:
+        raise ExfitError(f"--step {unused[0]}: no test of that name in any record")
+    rows.sort(key=lambda row: row.line)
+    write_each(folder, {**texts, UNITS: units_table(rows)})
+    return ImportedUnits(tuple(rows), texts, tuple(doubts), plan)
 
 
 def _made(
@@ -251,7 +294,7 @@ def cases_of_table(
     units: dict[Path, DynamicsUnits | str] = {}
     for file in dict.fromkeys(case.dyr for case in cases if case.dyr is not None):
         try:
-            units[file] = import_units(file)
+            units[file] = units_of_file(file)
         except DynamicsError as fault:
             units[file] = str(fault)
     makers = (CaseMaker(case, Path(folder, CASES, f"{case.name}.yaml"), units) for case in cases)

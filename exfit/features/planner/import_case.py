@@ -28,7 +28,7 @@ def import_unit(path: Path, bus: int | None = None, machine_id: str | None = Non
     return read_unit(text_of(read_file(path), str(path)), str(path), bus, machine_id)
 
 
-def import_units(path: Path) -> DynamicsUnits:
+def units_of_file(path: Path) -> DynamicsUnits:
     """Read all units of a file; raises DynamicsError where it cannot be read."""
     return read_units(text_of(read_file(path), str(path)), path)
 

@@ -7,3 +7,5 @@ COMMANDS = {
         "command:report",
     )
 }
+
+PUBLIC = {"report": "writing:write_report"}

@@ -16,9 +16,9 @@ from exfit.cli.streams import echo
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="File to write (default: report.html beside the result, or report.pdf).",
+    help="File to write (default: report.html beside the result).",
 )
-@click.option("--pdf", is_flag=True, help="Make a PDF, with bookmarks and page numbers.")
+@click.option("--pdf", is_flag=True, help="Write a PDF too, beside the page.")
 @click.option(
     "--against",
     type=click.Path(path_type=Path),
@@ -27,13 +27,16 @@ from exfit.cli.streams import echo
 )
 @force_option
 def report(result: Path, output: Path | None, pdf: bool, against: Path | None, force: bool) -> None:
-    """Make a verification report of RESULT: one HTML file, to be read, printed and handed in.
+    """Make a verification report of RESULT: one HTML file, to read, print and hand in.
 
     RESULT is the result.json of a fit, the validation.json of exfit validate, or the folder that
-    holds it: nothing else is read, and nothing is run. A former report is replaced, another file
-    only with --force. With --pdf it is a PDF, which needs the package WeasyPrint:
-    pip install 'exfit[pdf]'.
+    holds it. Nothing else is read, and nothing is run. A former report is replaced, another file
+    only with --force.
+
+    --pdf, or a FILE that ends in .pdf, writes the report as PDF too, with bookmarks and page
+    numbers. It needs the package WeasyPrint: pip install 'exfit[pdf]'.
     """
     from exfit.features.report.writing import write_report
 
-    echo(f"written to {write_report(result, output, force, pdf, against)}")
+    for path in write_report(result, output, force, pdf, against):
+        echo(f"written to {path}")

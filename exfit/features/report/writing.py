@@ -1,6 +1,7 @@
 """The report of a fit: one page that can be handed in, as HTML or PDF."""
 
 import re
+from os import PathLike
 from pathlib import Path
 
 from exfit.errors import ExfitError
@@ -18,40 +19,61 @@ from exfit.results.model import FitResult
 from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
 from exfit.util.files import write
 
-PAGE, PRINT = "report.html", "report.pdf"
+PAGE = "report.html"
 MARK = b"% report of exfit\n"  # a comment behind the end of a file
 DRAWING = re.compile(r"<svg class=\"(?:static|sample)[^>]*>")
 
 
 def write_report(
-    result: Path,
-    output: Path | None = None,
+    result: FitResult | str | PathLike[str],
+    output: str | PathLike[str] | None = None,
     force: bool = False,
     pdf: bool = False,
-    against: Path | None = None,
-) -> Path:
-    """Write the report of a fit, validation or programme, by default to its folder; return where.
+    against: FitResult | str | PathLike[str] | None = None,
+) -> tuple[Path, ...]:
+    """Write the report of a fit, validation or programme as an HTML page; return its path.
 
-    ``result`` is a programme.json, result.json or validation.json, or a folder, of which the first
-    of these is taken; nothing is read but results, and nothing is simulated. With ``pdf`` it is a
-    PDF, else an HTML page. ``against`` is the result of another fit, of an earlier revision or
-    another unit, to be shown beside it. A report that is there already is replaced, any other file
-    only with ``force``. Raises ExfitError for what cannot be used.
+    Nothing is read but results, and nothing is simulated.
+
+    Args:
+        result: a fit; or a programme.json, result.json or validation.json, or the folder of one.
+        output: the file; by default report.html beside the result.
+        force: replace files that are no reports.
+        pdf: write a PDF too, beside the page with the same name; so does an output ``*.pdf``.
+        against: the result of another fit, an earlier revision or another unit, to compare with.
+
+    Raises ExfitError where results cannot be used, a place cannot be written, or WeasyPrint is
+    missing, which makes the PDF; the HTML page is then there.
+
+    Example:
+        >>> html, pdf = exfit.report("runs/ac1a_typical-fit", pdf=True)
     """
-    page, folder = _page(result, None if against is None else load_result(against))
-    place = output or folder / (PRINT if pdf else PAGE)
-    is_report = _is_pdf if pdf else is_page
-    if place.is_dir():
-        raise ExfitError(f"{place}: cannot be written: it is a folder")
-    if place.exists() and not force and not is_report(place):
-        raise ExfitError(f"{place}: exists already, and is no report; --force writes over it")
-    write(place, page_pdf(page) if pdf else page_html(page))
-    return place
+    if against is not None and not isinstance(against, FitResult):
+        against = load_result(against)
+    page, folder = _page(result, against)
+    place = folder / PAGE if output is None else Path(output)
+    places = {place: is_page}
+    if pdf or place.suffix.lower() == ".pdf":
+        pages = (place, place.with_suffix(".pdf"))
+        if place.suffix.lower() not in (".html", ".htm"):
+            pages = (place.with_suffix(".html"), place)
+        places = dict(zip(pages, (is_page, _is_pdf), strict=True))
+    for path, is_report in places.items():
+        if path.is_dir():
+            raise ExfitError(f"{path}: cannot be written: it is a folder")
+        if path.exists() and not force and not is_report(path):
+            raise ExfitError(f"{path}: exists already, and is no report; --force writes over it")
+    for path, is_report in places.items():
+        write(path, page_html(page) if is_report is is_page else page_pdf(page))
+    return tuple(places)
 
 
-def _page(result: Path, other: FitResult | None) -> tuple[Page, Path]:
-    """Return the page of a result that a file or folder holds, and its folder."""
-    summary = result / WHOLE_PROGRAMME if result.is_dir() else result
+def _page(result: FitResult | str | PathLike[str], other: FitResult | None) -> tuple[Page, Path]:
+    """Build the page of a result; return it with the folder of the result."""
+    if isinstance(result, FitResult):
+        return fit_page(result, Path(), other), Path()
+    given = Path(result)
+    summary = given / WHOLE_PROGRAMME if given.is_dir() else given
     if summary.name == WHOLE_PROGRAMME and summary.is_file():
         from exfit.features.programme.folder import load_summary
         from exfit.features.programme.programme_page import programme_page
@@ -59,9 +81,9 @@ def _page(result: Path, other: FitResult | None) -> tuple[Page, Path]:
         if other is not None:
             raise ExfitError(f"{summary}: --against compares fits, and this is a programme")
         return programme_page(load_summary(summary.parent), summary.parent), summary.parent
-    source = result_file(result)
-    if result.is_dir() and not source.exists() and (result / VALIDATION).is_file():
-        source = result / VALIDATION
+    source = result_file(given)
+    if given.is_dir() and not source.exists() and (given / VALIDATION).is_file():
+        source = given / VALIDATION
     if source.name == VALIDATION:
         if other is not None:
             raise ExfitError(f"{source}: --against compares fits, and this is a validation")

@@ -10,7 +10,7 @@ from exfit.case.other_model import BOUNDS, bounds_of, free_of
 from exfit.case.suggestion import relative
 from exfit.case.yaml import read_yaml
 from exfit.errors import ExfitError
-from exfit.features.planner.export import comment_lines, export, place_of
+from exfit.features.planner.export import comment_lines, export
 from exfit.features.planner.records import alternatives
 from exfit.features.translate.result import TranslatedParameter, Translation
 from exfit.features.translate.steps import network_of
@@ -72,7 +72,7 @@ def _figure(translation: Translation) -> PlannedFigures:
 def records_of_translation(translation: Translation, result: FitResult) -> str:
     """Return the PSS/E records of a translation, or a comment that says why there are none."""
     try:
-        return export(result, *place_of(result), translation=translation).text
+        return export(result, translation=translation).text
     except ExfitError as fault:
         texts = [f"No record is written: {text}." for text in str(fault).splitlines()]
         return "\n".join([*(line for text in texts for line in comment_lines(text)), ""])

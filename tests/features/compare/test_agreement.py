@@ -13,12 +13,10 @@ import exfit
 from exfit import cli
 from exfit.errors import RecordError
 from exfit.features.compare.agreement import compare
-from exfit.features.compare.curves import ColumnChoice
 from exfit.features.compare.figure import agreement as agreement_figure
 from exfit.output import figures as plots
 from exfit.output import run_folder
 
-BY_NAME = ColumnChoice()
 LAG = 0.25  # s
 AT, SIZE = 1.0, 0.05
 
@@ -72,7 +70,7 @@ def of(agreement, signal="vt", first="A", second="B"):
 
 def test_a_response_does_not_differ_from_itself():
     a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
-    difference = of(compare([a, a], None, BY_NAME))
+    difference = of(compare([a, a]))
     assert (difference.rms, difference.largest[0], difference.interpolation) == (0.0, 0.0, 0.0)
 
 
@@ -80,7 +78,7 @@ def test_a_response_does_not_differ_from_itself():
 def test_an_offset_is_the_difference_on_any_two_clocks(step):
     a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
     b = write("b.csv", t=clock(step), vt=rise(clock(step)) + 0.003)
-    difference = of(compare([a, b], None, BY_NAME))
+    difference = of(compare([a, b]))
     assert len(difference.time) == pytest.approx(10.0 / min(step, 0.01), abs=2)
     assert difference.rms == pytest.approx(0.003, abs=difference.interpolation + 1e-9)
     assert difference.largest[0] == pytest.approx(0.003, abs=difference.interpolation + 1e-9)
@@ -93,7 +91,7 @@ def test_the_stated_error_of_interpolation_is_more_than_the_true_one():
     time, fine = clock(0.05), clock(0.001)
     a = write("a.csv", t=time, vt=np.sin(time))
     b = write("b.csv", t=fine, vt=np.sin(fine))
-    difference = of(compare([a, b], None, BY_NAME))
+    difference = of(compare([a, b]))
     assert 0.0 < np.max(np.abs(difference.error)) < difference.interpolation
 
 
@@ -102,7 +100,7 @@ def test_the_rms_is_over_time_whatever_the_samples():
     uneven = np.concatenate([np.linspace(0.0, 0.1, 500), np.linspace(0.11, 1.0, 90)])
     a = write("a.csv", t=uneven, vt=np.ones(len(uneven)))
     b = write("b.csv", t=uneven, vt=1.0 + uneven)
-    difference = of(compare([a, b], None, BY_NAME))
+    difference = of(compare([a, b]))
     assert difference.rms == pytest.approx(3.0**-0.5, rel=1e-4)  # of the trapezoids
     assert difference.largest == pytest.approx((1.0, 1.0))
 
@@ -113,13 +111,13 @@ def test_the_largest_difference_has_its_sign_and_its_instant(side):
     bump = side * (0.03 * np.exp(-((time - 4.0) ** 2)) - 0.01 * np.exp(-((time - 8.0) ** 2)))
     a = write("a.csv", t=time, vt=np.ones(len(time)))
     b = write("b.csv", t=time, vt=1.0 + bump)
-    assert of(compare([a, b], None, BY_NAME)).largest == pytest.approx((0.03 * side, 4.0), rel=1e-6)
+    assert of(compare([a, b])).largest == pytest.approx((0.03 * side, 4.0), rel=1e-6)
 
 
 def test_nothing_is_compared_beyond_what_both_cover():
     a = write("a.csv", t=clock(0.01, 4.0, -1.0), vt=rise(clock(0.01, 4.0, -1.0)))
     b = write("b.csv", t=clock(0.02, 9.0, 0.5), vt=rise(clock(0.02, 9.0, 0.5)))
-    difference = of(compare([a, b], None, BY_NAME))
+    difference = of(compare([a, b]))
     assert (difference.time[0], difference.time[-1]) == pytest.approx((0.5, 4.0))
     assert np.isfinite(difference.error).all()
 
@@ -132,11 +130,11 @@ def test_a_shift_puts_two_clocks_together_and_is_proposed():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", t=time, vt=rise(time, at=3.0))
-    (note,) = compare([a, b], None, BY_NAME).notes
+    (note,) = compare([a, b]).notes
     assert proposed(note) == pytest.approx(AT - 3.0, abs=1e-4)
-    (note,) = compare([a, b], None, BY_NAME, {"B": -1.2}).notes
+    (note,) = compare([a, b], shifts={"B": -1.2}).notes
     assert proposed(note) == pytest.approx(AT - 3.0, abs=1e-4)
-    agreement = compare([a, b], None, BY_NAME, {"B": -2.0})
+    agreement = compare([a, b], shifts={"B": -2.0})
     assert agreement.notes == ()
     assert of(agreement).rms == pytest.approx(0.0, abs=1e-9)
 
@@ -146,7 +144,7 @@ def test_final_values_are_the_means_of_the_last_twentieth():
     ripple = 0.01 * np.sin(2.0 * np.pi * time / 0.1)  # five periods of it
     a = write("a.csv", t=time, vt=np.ones(len(time)) + ripple)
     b = write("b.csv", t=time, vt=np.full(len(time), 1.05))
-    assert of(compare([a, b], None, BY_NAME)).finals == pytest.approx((1.0, 1.05), abs=1e-4)
+    assert of(compare([a, b])).finals == pytest.approx((1.0, 1.05), abs=1e-4)
 
 
 def test_final_values_are_of_the_time_that_both_show():
@@ -156,7 +154,7 @@ def test_final_values_are_of_the_time_that_both_show():
     for name, vt in (("a", falls), ("b", np.where(time < 8.0, 1.01, np.nan))):
         rows = (f"{t:.9g},{'' if np.isnan(y) else y}" for t, y in zip(time, vt, strict=True))
         Path(f"{name}.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
-    difference = of(compare([Path("a.csv"), Path("b.csv")], None, BY_NAME))
+    difference = of(compare([Path("a.csv"), Path("b.csv")]))
     assert difference.finals == pytest.approx((1.0, 1.01))
 
 
@@ -166,11 +164,11 @@ def test_features_stand_beside_each_other_with_the_step_found():
     time = clock(0.002)
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", t=time, vt=rise(time, lag=2.0 * LAG))
-    agreement = compare([a, b], None, BY_NAME)
+    agreement = compare([a, b])
     assert agreement.step_at == pytest.approx(AT, abs=0.05)  # by the shape of the rise
     assert agreement.features["A"].rise_time == pytest.approx(3.3579 * LAG, rel=1e-3)
     assert agreement.features["B"].rise_time == pytest.approx(2.0 * 3.3579 * LAG, rel=1e-3)
-    given = compare([a, b], None, BY_NAME, step_at=AT)
+    given = compare([a, b], step_at=AT)
     assert given.step_at == AT
 
 
@@ -179,14 +177,14 @@ def test_features_are_of_the_time_before_the_first_ends():
     short, long = clock(0.01, 5.0), clock(0.01, 9.0)
     a = write("a.csv", t=short, vt=rise(short))
     b = write("b.csv", t=long, vt=rise(long) + np.where(long > 5.5, 0.02, 0.0))
-    features = compare([a, b], None, BY_NAME).features
+    features = compare([a, b]).features
     assert features["B"].final_value == pytest.approx(features["A"].final_value, abs=1e-9)
 
 
 def test_without_a_step_there_are_no_features():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=np.ones(len(time)))
-    agreement = compare([a, a], None, BY_NAME)
+    agreement = compare([a, a])
     assert agreement.features == {}
     assert agreement.step_at is None
 
@@ -198,7 +196,7 @@ def test_a_record_is_never_interpolated():
     b = write("b.csv", t=time, vt=rise(time) + 0.001)
     measured = rise(coarse) + 1e-3 * rng.standard_normal(len(coarse))
     record = write("record.csv", t=coarse, vt=measured)
-    agreement = compare([a, b], record, BY_NAME)
+    agreement = compare([a, b], record)
     difference = of(agreement, first="record", second="A")
     np.testing.assert_allclose(difference.time, coarse)
     np.testing.assert_allclose(difference.values[0], measured, rtol=0, atol=1e-11)
@@ -210,10 +208,10 @@ def test_all_signals_in_common_are_compared_and_no_others():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time), efd=2 * rise(time), ifd=time, VA=time)
     b = write("b.csv", t=time, vt=rise(time), efd=2 * rise(time) + 0.1, q=time, VA=time)
-    agreement = compare([a, b], None, BY_NAME)
+    agreement = compare([a, b])
     assert [each.signal for each in agreement.between] == ["vt", "efd"]
     assert of(agreement, "efd").rms == pytest.approx(0.1)
-    by_name = compare([a, b], None, ColumnChoice({"VA": ["VA"]}))
+    by_name = compare([a, b], None, {"VA": ["VA"]})
     assert "VA" in [each.signal for each in by_name.between]
 
 
@@ -223,9 +221,9 @@ def test_a_fit_is_compared_with_an_export_of_another_program():
     Path("fit/result.json").write_text("{}")
     export = {"Time(s)": time, "VOLT 1 [GEN]": rise(time), "EFD": time}
     b = write("psse.csv", **export)
-    choice = ColumnChoice({"vt": ["VOLT 1 [GEN]"]})
+    columns = {"vt": ["VOLT 1 [GEN]"]}
     for fit in (Path("fit"), Path("fit/result.json"), Path("fit/response.csv")):
-        agreement = compare([fit, b], Path("fit/response.csv"), choice)
+        agreement = compare([fit, b], Path("fit/response.csv"), columns)
         assert of(agreement).rms == 0.0
         assert of(agreement, first="record").finals[0] == pytest.approx(2.05, abs=1e-6)
 
@@ -235,15 +233,15 @@ def test_a_column_of_time_is_named_where_it_has_a_name_of_its_own():
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", vt=rise(time), sec=time)
     with pytest.raises(RecordError, match=r"b\.csv: no column seems .*--time .*'vt', 'sec'"):
-        compare([a, b], None, BY_NAME)
-    assert of(compare([a, b], None, ColumnChoice({}, ["sec"]))).rms == 0.0
+        compare([a, b])
+    assert of(compare([a, b], time=["sec"])).rms == 0.0
 
 
 def test_of_instants_that_repeat_the_last_row_is_taken():
     """A simulator writes the instant of a step twice: before and after it."""
     a = write("a.csv", t=[0, 1, 1, 2], vt=[1, 1, 2, 2])
     b = write("b.csv", t=[0, 1, 2], vt=[1, 2, 2])
-    agreement = compare([a, b], None, BY_NAME)
+    agreement = compare([a, b])
     assert of(agreement).rms == 0.0
     assert any("1 instants repeat" in note for note in agreement.notes)
 
@@ -253,7 +251,7 @@ def test_nothing_is_read_across_a_gap():
     gappy = np.where((time > 4.0) & (time < 5.0), np.nan, time)
     a = write("a.csv", t=time, vt=gappy)
     b = write("b.csv", t=fine, vt=fine)
-    difference = of(compare([a, b], None, BY_NAME))
+    difference = of(compare([a, b]))
     inside = (difference.time > 4.0 + 1e-6) & (difference.time < 5.0 - 1e-6)
     assert np.isnan(difference.error[inside]).all()
     assert np.isfinite(difference.error[~inside]).all()
@@ -340,7 +338,7 @@ def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(recor
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time), efd=rise(time))
     b = write("b.csv", t=time, vt=rise(time) + 1e-3, efd=rise(time))
-    figure = agreement_figure(compare([a, b], a if record else None, BY_NAME))
+    figure = agreement_figure(compare([a, b], a if record else None))
     assert plots.png(figure)
     assert len(figure.axes) == 4
     curves, differences = figure.axes[:2]
@@ -563,7 +561,7 @@ def test_a_result_that_cannot_be_read_costs_its_parameters_only(fits):
     time = clock(0.01)
     write("fit/response.csv", t=time, vt_simulated=rise(time))
     Path("fit/result.json").write_text("{}")
-    agreement = compare([Path("fit"), fits / "both"], None, BY_NAME)
+    agreement = compare([Path("fit"), fits / "both"])
     assert [*agreement.results] == ["B"]
     assert any(
         "A: its parameters are not shown: fit/result.json" in note for note in agreement.notes

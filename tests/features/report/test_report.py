@@ -25,9 +25,10 @@ from exfit import cli, workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.planner.export import export
+from exfit.features.report import writing
 from exfit.features.report.charts import Axis, drawing, ticks
 from exfit.features.report.matches import fitted_matches, live_data
-from exfit.features.report.page import headline, html
+from exfit.features.report.page import headline, html, is_page
 from exfit.features.report.writing import write_report
 from exfit.models import from_file
 from exfit.output import run_folder
@@ -518,15 +519,15 @@ def test_a_result_with_a_hole_is_refused_with_its_place(own, key):
 
 
 def test_a_report_is_replaced_and_another_file_is_not(own):
-    path = write_report(own)
+    (path,) = write_report(own)
     assert path == own / "report.html"
     first = path.read_text(encoding="utf-8")
-    assert write_report(own / "result.json").read_text(encoding="utf-8") == first
+    assert write_report(own / "result.json")[0].read_text(encoding="utf-8") == first
     path.write_text("my own words")
     with pytest.raises(ExfitError, match="exists already"):
         write_report(own)
     assert path.read_text() == "my own words"
-    assert write_report(own, force=True).read_text(encoding="utf-8") == first
+    assert write_report(own, force=True)[0].read_text(encoding="utf-8") == first
 
 
 def test_the_command_writes_the_page_and_says_where(own, capsys):
@@ -623,8 +624,8 @@ def printed(fits):
         pytest.skip(f"WeasyPrint cannot be imported: {fault}")
     from pypdf import PdfReader
 
-    place = write_report(fits("first order"), pdf=True)
-    assert place.name == "report.pdf"
+    page, place = write_report(fits("first order"), pdf=True)
+    assert (page.name, place.name) == ("report.html", "report.pdf")
     return PdfReader(place)
 
 
@@ -681,14 +682,36 @@ def test_a_heading_is_on_the_page_of_what_follows_it(fits, printed, pages):
 
 @pytest.mark.long
 def test_a_pdf_is_replaced_and_another_file_is_not(fits, printed, tmp_path):
-    assert write_report(fits("first order"), pdf=True).name == "report.pdf"
+    assert write_report(fits("first order"), pdf=True)[1].name == "report.pdf"
     other = tmp_path / "letter.pdf"
     other.write_bytes(b"%PDF-1.7")
     with pytest.raises(ExfitError, match="is no report"):
         write_report(fits("first order"), other, pdf=True)
+    assert [*tmp_path.iterdir()] == [other]
 
 
-def test_what_a_pdf_needs_and_is_missing_is_named(fits, monkeypatch):
+@pytest.mark.parametrize(
+    ("output", "pdf", "names"),
+    [
+        ("a.html", False, ["a.html"]),
+        ("a.html", True, ["a.html", "a.pdf"]),
+        ("a.pdf", False, ["a.html", "a.pdf"]),
+        ("a.pdf", True, ["a.html", "a.pdf"]),
+        ("a.htm", True, ["a.htm", "a.pdf"]),
+        ("a", True, ["a", "a.html"]),
+    ],
+)
+def test_one_call_writes_the_page_and_the_pdf(fits, tmp_path, monkeypatch, output, pdf, names):
+    monkeypatch.setattr(writing, "page_pdf", lambda page: writing.MARK)
+    result = load_result(fits("first order"))
+    paths = write_report(result, tmp_path / output, pdf=pdf)
+    assert sorted(paths) == sorted(tmp_path.iterdir()) == [tmp_path / name for name in names]
+    assert is_page(paths[0])
+    assert all(path.read_bytes() == writing.MARK for path in paths[1:])
+
+
+def test_what_a_pdf_needs_and_is_missing_is_named(fits, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     with pytest.raises(ExfitError, match=r"pip install 'exfit\[pdf\]'"):
-        write_report(fits("first order"), pdf=True)
+        write_report(fits("first order"), tmp_path / "a.pdf")
+    assert is_page(tmp_path / "a.html")

@@ -49,7 +49,7 @@ def report(tmp_path_factory):
             path.write_text(text)
             folder = room / name
             run_folder.write_fit(workflows.fit(parse_case(text, path)), folder)
-            known[name] = write_report(folder)
+            (known[name],) = write_report(folder)
         return known[name]
 
     return made
@@ -273,7 +273,7 @@ def test_no_text_of_a_result_acts_in_a_browser(browser, report, tmp_path):
     page.on("dialog", lambda dialog: (acts.append(dialog.message), dialog.dismiss()))
     page.on("pageerror", lambda fault: acts.append(str(fault)))
     page.on("request", lambda request: acts.append(request.url))
-    page.goto(write_report(tmp_path).as_uri())
+    page.goto(write_report(tmp_path)[0].as_uri())
     page.wait_for_selector("html[data-ready]", timeout=60_000)
     page.mouse.move(*middle(page))
     page.wait_for_timeout(200)

@@ -47,7 +47,7 @@ def result(folder):
 
 @pytest.fixture(scope="module")
 def page(folder):
-    return Page(write_report(folder).read_text(encoding="utf-8"))
+    return Page(write_report(folder)[0].read_text(encoding="utf-8"))
 
 
 def test_every_event_is_judged_by_p_and_q_and_shown(page):
@@ -99,7 +99,7 @@ def test_the_model_as_found_is_shown_where_it_is_another_one(page, folder, resul
     content = json.loads((folder / "validation.json").read_text())
     content["as_found"]["values"] = dict(result.values)
     (tmp_path / "validation.json").write_text(json.dumps(content))
-    same = Page(write_report(tmp_path).read_text(encoding="utf-8"))
+    same = Page(write_report(tmp_path)[0].read_text(encoding="utf-8"))
     assert "as-found" in page.ids
     assert "as-found" not in same.ids
 

@@ -1,0 +1,65 @@
+"""A stored result, printed again: exfit show."""
+
+from os import PathLike
+from pathlib import Path
+
+from exfit.errors import ExfitError
+from exfit.output import fits, run_folder, terminal, validations
+from exfit.output.blocks import Table, columns, paragraph, row
+from exfit.output.iterations import iterations
+from exfit.results.io import load_result, load_validation, result_file
+from exfit.results.model import FitResult
+from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
+
+
+def show(
+    result: FitResult | str | PathLike[str], everything: bool = False, history: bool = False
+) -> None:
+    """Print the result of a fit or a validation, as the run printed it.
+
+    Args:
+        result: a fit, or a result.json, a validation.json, or the folder that holds one of them.
+        everything: print also sensitivities, correlations, steps, sources and figures.
+        history: print the iterations, and the result only with ``everything``.
+
+    Raises ExfitError where the file cannot be read, holds a programme, or has no iterations.
+
+    Example:
+        >>> exfit.show("runs/ac1a_typical-fit", everything=True)
+    """
+    console, folder = terminal.console(), None
+    if isinstance(result, FitResult):
+        fit = result
+    else:
+        place = Path(result)
+        source = result_file(place)
+        programme = place / WHOLE_PROGRAMME if place.is_dir() else place
+        if programme.name == WHOLE_PROGRAMME and programme.is_file():
+            raise ExfitError(f"{place}: a programme; `exfit report` makes a page of it")
+        validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
+        if source == validated or (validated.is_file() and not source.exists()):
+            if history:
+                text = "a validation has no iterations: give the result of a fit"
+                raise ExfitError(f"{place}: {text}")
+            validation = load_validation(validated)
+            terminal.show(console, [paragraph(validation.origin)])
+            terminal.show(console, validations.validation(validation.matches))
+            return
+        fit, folder = load_result(source), source.parent
+    if history:
+        terminal.show(console, iterations(fit.history))
+        if not everything:
+            return
+        console.print()
+    if not everything:
+        terminal.show_shortest(console, fits.briefs(fit, folder))
+        return
+    figures = tuple(
+        row(name, planned.shows)
+        for name, planned in run_folder.figures_of_fit(fit).items()
+        if folder is not None and (folder / name).is_file()
+    )
+    if figures:
+        terminal.show(console, [Table(columns("figure", "shows"), figures)])
+        console.print()
+    terminal.show(console, fits.whole(fit, folder))
