@@ -86,9 +86,10 @@ BY_DIFFERENCES = (
 
 
 def table(heads, rows):
-    """A table in Markdown."""
+    """A table in Markdown, between marks that say that a script wrote it."""
     lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+    body = "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+    return f"<!-- table -->\n{body}\n<!-- /table -->"
 
 
 def place(start):

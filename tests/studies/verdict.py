@@ -67,7 +67,7 @@ MARKERS = {
     "another verdict": ("X", SIMULATED),
     "not to be seen in its record": (".", MEASURED),
 }
-MARKS = ("<!-- made by tests/studies/verdict.py -->", "<!-- end of what it made -->")
+MARKS = ("<!-- verdict -->", "<!-- /verdict -->")
 
 
 class Outcome(NamedTuple):

@@ -62,9 +62,10 @@ SHOWN = {
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table of Markdown."""
+    """Return a table of Markdown, between marks that say that a script wrote it."""
     lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    body = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return f"<!-- table -->\n{body}\n<!-- /table -->"
 
 
 def scientific(value: float) -> str:
