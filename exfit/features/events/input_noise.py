@@ -1,15 +1,15 @@
 """The noise of recorded signals that drive a simulation: errors in variables.
 
-A simulation that recorded signals drive carries their noise into its response, so that it is in the
-errors of all channels at once, coloured by the unit. To first order these errors are
+A simulation that recorded signals drive propagates their noise into its response, so that it is in
+the errors of all channels at once, coloured by the unit. To first order these errors are
 
     e = J n_u - n_y
 
 with n_y the noise of the channels, n_u that of the driving signals, and J the response to each of
-their samples. Weighing errors by this covariance is what greatest likelihood asks for where the
-true course of the driving signals is unknown at every sample, and eliminated. To second order the
-derivatives by the parameters hold the same noise as the errors, which moves the parameters: by how
-much is found by adding as much noise again (simulation-extrapolation), and taken away.
+their samples. Weighting errors by this covariance is maximum likelihood where the true values of
+the driving signals are unknown at every sample, and eliminated. To second order the derivatives by
+the parameters have the same noise as the errors, which biases the parameters: this bias is
+estimated by adding as much noise again (simulation-extrapolation), and removed.
 
 Source: Seber & Wild 1989, sections 2.1.4 and 10.2 (generalised least squares; errors in variables);
 Carroll, Ruppert, Stefanski & Crainiceanu 2006, chapter 5 (simulation-extrapolation).
@@ -56,8 +56,8 @@ REFUTED = 4.0  # times the least cost: such a minimum stays refuted whatever the
 NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
 TURN = 2.0 * np.pi  # rad
 NOT_WEIGHTED = (
-    "the noise of the signals that drive the simulation biases the parameters, and the intervals "
-    "do not hold all of it: it cannot be weighted"
+    "the noise of the driving signals biases the parameters, and the intervals do not include all "
+    "of it: it cannot be weighted"
 )
 
 
@@ -228,14 +228,14 @@ def weighted_search(
     proceed: Callable[[FitProblem, SearchResult, Array], SearchResult],
     watch: Callable[[Progress], object] = lambda _: None,
 ) -> tuple[FitProblem, SearchResult]:
-    """Weigh a problem by the noise of what drives its tests, and search on from where that leads.
+    """Weight a problem by the noise of the driving signals, and continue the search with it.
 
     ``found`` is the search of the problem without it, ``setups`` its tests as fitted; ``proceed``
     searches on, by the weighted problem, from a point (N,). The noise moves the minimum no longer:
-    where it moved it by much, weights and bias are found anew from the better point. Minima far
-    above the best one stay as they are. Where errors cannot be weighted the problem and the search
-    remain, with a note that says why; so they do at an interruption. Raises SimulationError where
-    there is no response.
+    where it moved it by much, weights and bias are computed again from the better point. Minima
+    far above the best one stay as they are. Where errors cannot be weighted, or at an
+    interruption, problem and search remain, with a note. Raises SimulationError where there is no
+    response.
     """
     own, theta = problem.residuals, found.best.x
     reason = why_not_weighted(own, setups)
@@ -271,7 +271,7 @@ def weighted_search(
 
 
 def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
-    """Reason why errors cannot be weighted by the noise of driving signals, None if they can."""
+    """Reason why errors cannot be weighted by the noise of driving signals; None if they can."""
     if residuals.robust is not None:
         return "with a robust loss"
     for setup in setups:
@@ -361,10 +361,10 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
         name = f" of {experiment.name}" if len(residuals.experiments) > 1 else ""
         levels = listed(_levels(experiment.with_inputs(values)))
         yield (
-            f"the noise of what drives the simulation{name}, {levels}, is in the errors of all "
-            "signals: they are weighted by its covariance, and the intervals hold it"
+            f"the noise of the driving signals{name}, {levels}, is in the errors of all compared "
+            "signals: these are weighted by its covariance, and the intervals include it"
         )
-    yield f"the bias by that noise is taken out: it was at most {share}{large}"
+    yield f"the bias by that noise is removed: it was at most {share}{large}"
 
 
 def _levels(simulator: Simulator) -> list[str]:

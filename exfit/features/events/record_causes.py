@@ -59,7 +59,7 @@ GAINED_BY_DELAY = 0.15  # of the correlation
 DRIVING = ("vt", "angle", "frequency")
 Values = Mapping[str, float]
 DEGREES = 180.0 / pi
-# what may have become of an angle -> the words for it, and what turns it back
+# fault of an angle -> the words for it, and the remedy
 WRONG_ANGLES: Mapping[float, tuple[str, str]] = {
     -1.0: ("with the other sign", "scale: -1 on the channel angle turns it"),
     1.0 / DEGREES: (
@@ -97,15 +97,15 @@ def record_causes(record: Record, steady: float) -> tuple[Cause, ...]:
 
 
 def clock_causes(record: Record) -> Iterator[Cause]:
-    """Yield gaps of the clock, over which the unit would be driven blindly, and slow sampling."""
+    """Yield gaps of the clock, in which the driving signals are unknown, and slow sampling."""
     sampling = sampling_of(record.time)
     for gap in sampling.gaps[:1]:
         more = f" ({len(sampling.gaps)} such gaps)" if len(sampling.gaps) > 1 else ""
         yield Cause(
             f"the clock jumps from {gap.start:g} to {gap.end:g} s, about {gap.lost} samples are "
             f"missing{more}",
-            "the voltage and the angle that drive the unit are not known there: give a record "
-            "without the gap, or a window beside it",
+            "the voltage and the angle that drive the unit are unknown there: use a record "
+            "without the gap, or a window before or after it",
         )
     if sampling.step > SLOWEST:
         yield Cause(
@@ -129,7 +129,7 @@ def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
                 text = f"{text}; it is about {what}"
                 remedy = (
                     "a voltage from phase to ground is taken for one from phase to phase, or the "
-                    "other way round: check the base, or record.phasors.voltage.connection"
+                    "reverse: check the base, or record.phasors.voltage.connection"
                 )
         yield Cause(text, remedy)
     p, q = level.get("p"), level.get("q", 0.0)
@@ -138,8 +138,8 @@ def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
     if p < MOTORING:
         yield Cause(
             f"p rests at {p:.3g} pu: a generator feeds power, p is above {MOTORING:g} pu",
-            "if the channel counts what the unit takes, scale: -1 on p, and on q if that is of the "
-            "same meter, turns it",
+            "if the channel counts power into the unit, give scale: -1 on p, and on q if the same "
+            "meter measures it",
         )
     apparent = hypot(p, q)
     if apparent > MOST_POWER:
@@ -156,7 +156,7 @@ def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
     elif abs(q) > MOST_REACTIVE and abs(q) > abs(p):
         yield Cause(
             f"q rests at {q:.3g} pu, above {MOST_REACTIVE:g}, and p at {p:.3g} pu",
-            "are p and q exchanged? Check their columns",
+            "check whether the columns of p and q are exchanged",
         )
 
 
@@ -171,7 +171,7 @@ def _held(record: Record, steady: float) -> Iterator[Cause]:
             yield Cause(
                 f"{name} does not change from {start:.4g} to {end:.4g} s, in the event, and then "
                 "jumps",
-                "the recorder held its last sample: mask that part, or give a record of the PMU "
+                "the recorder held its last sample: mask that part, or use a record of the PMU "
                 "itself, not of a historian that stores changes",
             )
 
@@ -203,14 +203,14 @@ def _longest_hold(time: Array, samples: Array) -> tuple[float, float] | None:
 
 
 def _spiky(record: Record) -> Iterator[Cause]:
-    """Yield driving and compared signals with single samples that are none."""
+    """Yield driving and compared signals with outliers."""
     voltage = record.signals.get("vt", np.ones(0))
     lost = np.flatnonzero(voltage < LOST_VOLTAGE)
     if 0 < len(lost) <= LONGEST_LOSS:
         yield Cause(
             f"vt is {voltage[lost[0]]:.2g} pu at {record.time[lost[0]]:.4g} s, in {len(lost)} "
             f"of {len(voltage)} samples: below {LOST_VOLTAGE:g} pu",
-            "the measurement was lost there: correct these samples, or give a window beside them",
+            "the measurement was lost there: correct these samples, or give a window without them",
         )
     for name, samples in record.signals.items():
         present = np.isfinite(samples)
@@ -228,12 +228,12 @@ def _spiky(record: Record) -> Iterator[Cause]:
                 if name in DRIVING
                 else "outliers: 6 on the channel leaves them out"
             )
-            count = "a single sample" if len(outlying) == 1 else f"{len(outlying)} single samples"
-            yield Cause(f"{name} has {count} far off its course, at {at} s", remedy)
+            count = "an outlier" if len(outlying) == 1 else f"{len(outlying)} outliers"
+            yield Cause(f"{name} has {count}, at {at} s", remedy)
 
 
 def _others_bend(record: Record, name: str, at: float) -> bool:
-    """Test whether another signal bends beside an instant (s) as no noise does: a switching."""
+    """Test whether another signal bends near a time (s) more than noise does: a switching."""
     row = int(np.searchsorted(record.time, at))
     near = slice(max(row - BESIDE_SPIKE, 1), row + BESIDE_SPIKE + 1)
     for other, samples in record.signals.items():
@@ -257,23 +257,23 @@ def _jumping_angle(record: Record) -> Iterator[Cause]:
         size = float(jumps[k])
         if float(np.nanmax(near) - np.nanmin(near)) < LEAST_STIFFNESS * abs(size):
             yield Cause(
-                f"angle jumps by {size:+.2g} rad at {record.time[k + 1]:.4g} s, and p moves by "
-                f"less than {LEAST_STIFFNESS:g} pu a rad beside it",
-                "the clock of the PMU was set there, or the sample is none: give a window beside "
+                f"angle jumps by {size:+.2g} rad at {record.time[k + 1]:.4g} s, while p moves by "
+                f"less than {LEAST_STIFFNESS:g} pu for each rad",
+                "the clock of the PMU was set there, or the sample is wrong: give a window without "
                 "it, or correct the angle",
             )
             return
 
 
 def swing_causes(comparison: Comparison, steady: float) -> Iterator[Cause]:
-    """Yield powers that swing otherwise than any unit with such a machine would."""
+    """Yield powers that swing unlike any unit with such a machine."""
     for name in ("p", "q"):
         if name in comparison.overlays:
             yield from _swing_cause(name, comparison, steady)
 
 
 def both_swings(comparison: Comparison, name: str, steady: float) -> tuple[Array, Array, Array]:
-    """Return the instants (M,) of the event, the swings of a signal and those of its response."""
+    """Return the times (M,) of the event, the swings of a signal and those of its response."""
     overlay = comparison.overlays[name]
     known = np.isfinite(overlay.error)
     t = comparison.time[known]
@@ -308,7 +308,7 @@ def _swing_cause(name: str, comparison: Comparison, steady: float) -> Iterator[C
         )
         if not 0.1 <= ratio <= 10.0:
             remedy = (
-                "check the unit of the angle, which is by 57.3 too large where degrees are taken "
+                "check the unit of the angle, 57.3 times too large where degrees are taken "
                 "for radians, the unit of the frequency, and the bases of p, q and vt"
             )
         yield Cause(f"{place}: {ratio:.2g} times as far, not {low:g} ... {high:g}", remedy)
@@ -316,7 +316,7 @@ def _swing_cause(name: str, comparison: Comparison, steady: float) -> Iterator[C
     late, better = _delay(time, measured, simulated)
     if alike < AGAINST and -alike > better - SIGN_BEFORE_DELAY:
         yield Cause(
-            f"{place}, against each other (correlation {alike:.2f})",
+            f"{place}, in opposite directions (correlation {alike:.2f})",
             f"check the signs of {name} and of the angle: scale: -1 turns a channel",
         )
     elif abs(late) > LATEST and better > max(alike + GAINED_BY_DELAY, LEAST_ALIKE):
@@ -327,14 +327,14 @@ def _swing_cause(name: str, comparison: Comparison, steady: float) -> Iterator[C
         )
     elif alike < UNLIKE and name == "p":
         yield Cause(
-            f"{place}, with little in common (correlation {alike:.2f}, above {UNLIKE:g} expected)",
-            "is the angle that of the voltage of this unit, and are H and the reactances its own? "
-            "Check the columns and the data of the machine",
+            f"{place}, hardly correlated ({alike:.2f}, above {UNLIKE:g} expected)",
+            "check that the angle is that of the voltage of this unit, and H and the reactances "
+            "those of its machine",
         )
 
 
 def swings(time: Array, samples: Array) -> Array:
-    """Return a signal (M,) less its mean over two seconds about each instant."""
+    """Return a signal (M,) less its mean over two seconds about each time."""
     step = float(np.median(np.diff(time)))
     half = min(max(round(0.5 * SMOOTHED_OVER / step), 1), len(samples) // 2)
     padded = np.pad(samples, half, mode="edge")
@@ -419,8 +419,8 @@ def _other_angle(
         if after < min(FAR_BETTER * before, STILL_UNLIKE):
             return (
                 Cause(
-                    f"with the angle {words}, p swings as the response: {100.0 * after:.2g} % of "
-                    f"both is left between them, with the angle as it is {100.0 * before:.2g} %",
+                    f"with the angle {words}, p swings like the response: they differ by "
+                    f"{100.0 * after:.2g} %, with the angle as recorded by {100.0 * before:.2g} %",
                     remedy,
                 ),
             )

@@ -35,7 +35,7 @@ STARTS = {
 }
 NUMBERS_OF_STAND_IN = 3
 WIDE = 20.0  # times: from the start to the bounds
-MOST_LEFT = 0.5  # of the error beyond the noise, by a stand-in that is like the unit's own
+MOST_LEFT = 0.5  # of the error beyond the noise, by a stand-in that is like the unit's control
 LIKELIER_THAN_MODEL = 1.0  # log-likelihood
 INERTIA, DAMPING, REACTANCE = f"{MACHINE}H", f"{MACHINE}D", f"{NETWORK}X"
 FORMS = {
@@ -55,7 +55,7 @@ def with_control(
     section: Governor | Stabiliser | None = None,
     model: Model | None = None,
 ) -> Case:
-    """Return a case with a governor or stabiliser in place of its own; without any by default."""
+    """Return a case with another governor or stabiliser; without any by default."""
     kind = prefix.rstrip(".")
     others = tuple(part for part in case.parts.all if part.kind != kind)
     added = () if model is None else (added_part(kind, prefix, model),)
@@ -117,7 +117,7 @@ def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
         len(STARTS[name]),
         Cause(
             f"a governor that the case lacks: P follows the speed; a {name} would match",
-            "if it was in service, give the unit's own: governor: {model: ..., parameters: {...}}",
+            "if one was in service, add it: governor: {model: ..., parameters: {...}}",
         ),
         of_stand_in(evidence, costs[name]),
     )
@@ -126,7 +126,7 @@ def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
 def of_stand_in(evidence: Evidence, cost: float) -> float:
     """Gain in likelihood of a control over its simple stand-in, at the cost with that.
 
-    Where the stand-in explains most, what it leaves may be that the unit's own is of another kind.
+    Where the stand-in explains most, the rest may show that the unit's control is of another kind.
     """
     noise = evidence.noise_cost
     if cost - noise > MOST_LEFT * (evidence.cost - noise):
@@ -156,9 +156,9 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
             amplification = trial.values[gain] * trial.values[washout]
             cause = Cause(
                 f"a stabiliser that the case lacks: one with input {heard} and a gain of "
-                f"{amplification:.2g}, would match",
-                "if it was in service, give the unit's own: stabiliser: {model: ..., "
-                f"inputs: [{heard}], parameters: {{...}}}}, or its output as channel vs",
+                f"{amplification:.2g} would match",
+                f"if one was in service, add it: stabiliser: {{model: ..., inputs: [{heard}], "
+                "parameters: {...}}, or give its output as channel vs",
             )
             prior = of_stand_in(evidence, trial.cost)
             yield from suspected(evidence, trial.cost, len(freed), cause, prior)

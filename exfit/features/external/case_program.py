@@ -46,10 +46,10 @@ Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared
 
 TOLERANCE = 1e-5  # of the cost: no gain that is less is worth a run
 STEP = 1e-4  # of scaled parameters: no step that is less
-BY_QUOTIENTS = "no twin: derivatives are quotients of its runs; the search is local"
+BY_QUOTIENTS = "no twin: derivatives are difference quotients of its runs; the search is local"
 
 
-# ---- the descent by a twin
+# ---- the local optimisation by a twin
 
 FAILED_STEPS = 2  # in a row, after which the derivatives of the twin are doubted
 VISIBLE_GAIN = 1e-3  # of the cost: what a step must promise to be missed
@@ -290,7 +290,7 @@ class CaseProgram:
     def _simulators(self, tests: Sequence[Test]) -> list[Simulator]:
         recorded = dict.fromkeys(signal for twin, _ in tests for signal in twin.inputs.recorded)
         if recorded:
-            text = f"steps and ramps only are allowed with plant {self.section.type}"
+            text = f"only steps and ramps are allowed with plant {self.section.type}"
             raise CaseError([f"{self.case.path}: test: {', '.join(recorded)}: {text}"])
         faults = dict.fromkeys(self._variable_faults(tests))
         if faults:
@@ -344,7 +344,7 @@ class CaseProgram:
                 raise SimulationError(text) from fault
 
     def coarser(self, descent: Descent) -> Descent:
-        """Give a descent the tolerances that its runs allow."""
+        """Give a local optimisation the tolerances that its runs allow."""
         error = descent.jacobian_error
         if error is None and not self.has_twin:
             error = jacobian_error("forward", QUOTIENT_STEP)
@@ -404,14 +404,17 @@ class CaseProgram:
         }
 
     def own_value_notes(self) -> Iterator[str]:
-        """Name the parameters of the case that an FMU does not take, and has its own values of."""
+        """Name the parameters of the case that cannot be set in an FMU."""
         if self.description is not None:
             taken, names = self.description.usable_as("parameter"), self.section.names
             parts = self.case.parts.all
             symbols = [part.prefix + symbol for part in parts for symbol in part.symbols]
-            own = [name for name in (*symbols, OF_RECORD[0]) if names.get(name, name) not in taken]
-            if own:
-                yield f"{self.section.simulator} has values of its own in place of {', '.join(own)}"
+            unset = [
+                name for name in (*symbols, OF_RECORD[0]) if names.get(name, name) not in taken
+            ]
+            if unset:
+                listed = ", ".join(unset)
+                yield f"no parameters of {self.section.simulator}, which uses its values: {listed}"
 
     def response_notes(self, simulator: Simulator, shown: Iterable[str]) -> Iterator[str]:
         """Name the shown signals that the twin gives, without a correction."""
@@ -421,8 +424,8 @@ class CaseProgram:
         given = responder.given.signals
         if {*shown} - {*given}:
             yield (
-                f"{self.section.simulator} gives {', '.join(given)}; all other signals are "
-                f"by the twin {self.section.twin}, not corrected"
+                f"{self.section.simulator} gives {', '.join(given)}; all other signals are those "
+                f"of the twin {self.section.twin}, not corrected"
             )
 
     def notes(self, setups: Setups, followed: str = "intervals and diagnoses") -> Iterator[str]:
@@ -432,7 +435,7 @@ class CaseProgram:
         """
         counts = self.program.counts
         failed = f", of which {counts.failed} failed" if counts.failed else ""
-        restarts = f"; it was started anew {counts.restarts} times" if counts.restarts else ""
+        restarts = f"; it was restarted {counts.restarts} times" if counts.restarts else ""
         yield f"simulated by {self.section.simulator}: {counts.runs} runs{failed}{restarts}"
         yield from self.own_value_notes()
         if not self.has_twin:

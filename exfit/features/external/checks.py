@@ -53,7 +53,7 @@ def _named_faults(content: ContentNode, plant: ContentNode, parts: Parts) -> Ite
                 key for key in ("fixed", "free") if symbol in content.at("parameters", key)
             )
             if not symbol.isidentifier() or symbol in OF_RECORD:
-                text = "not a name, as KA is; plant.names has the name in the program"
+                text = "not a name such as KA; give the program's name in plant.names"
                 yield content.at("parameters", place, symbol).fault(text)
 
 

@@ -1,6 +1,6 @@
 """A functional mock-up unit (FMU): what its file says of itself, and the program that runs it.
 
-That is a process of its own, which the machine code of an FMU may end or hang: a line of JSON asks
+That is a separate process, which the machine code of an FMU may end or hang: a line of JSON asks
 it, a line is its answer.
 """
 
@@ -33,7 +33,7 @@ class FmuError(Exception):
 
 
 class FmuVariable(NamedTuple):
-    """A variable of an FMU: in its own words what it is, and what can be done with it."""
+    """A variable of an FMU: what it is by its description, and how it can be used."""
 
     kind: str
     uses: tuple[Use, ...]
@@ -122,7 +122,7 @@ def laid_out(path: Path) -> Iterator[Path]:
 def worker_command(settings: str) -> list[str]:
     """Return the command of the program that simulates an FMU, with its settings as JSON.
 
-    It finds exfit and FMPy where this process has found them, and nothing in its own folder.
+    It imports exfit and FMPy from where this process did, and nothing from its folder.
     """
     places = [str(Path(place).absolute()) for place in sys.path]
     return [sys.executable, "-P", "-c", _PROGRAM.format(places=places), settings]
@@ -139,7 +139,7 @@ ROUNDING = 1e-6  # of a step
 
 
 class Grid(NamedTuple):
-    """The instants of communication, evenly from the first to the last one, s."""
+    """The times of communication, evenly from the first to the last one, s."""
 
     start: float
     step: float
@@ -248,7 +248,7 @@ def grid_of(
 ) -> Grid:
     """Return a grid that has samples of a test, evenly spaced as most of them are.
 
-    That of an FMU with a step of its own has the first step of the test.
+    That of an FMU with a fixed step has the first step of the test.
     """
     begins = [step["at"] for step in steps]
     first = min([float(times[0]), *begins])
@@ -267,7 +267,7 @@ def grid_of(
 def corners(
     steps: Sequence[Mapping[str, Any]], grid: Grid, ahead: float
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the instants of a table from the start, two where a step is, the other one after it.
+    """Return the times of a table from the start, two where a step is, the other one after it.
 
     Between them inputs are lines; ramps are so much ``ahead``, s.
     """
@@ -285,7 +285,7 @@ def corners(
 def share(
     step: Mapping[str, Any], grid: Grid, ahead: float, instants: Array, after: NDArray[np.bool_]
 ) -> Array:
-    """Share of a step, or ramp, that is complete at the instants of a table."""
+    """Share of a step, or ramp, that is complete at the times of a table."""
     begin = step["at"] - grid.start
     if step["ramp"]:
         complete: Array = (instants - begin + ahead) / step["ramp"]

@@ -35,9 +35,9 @@ class ProgramError(Exception):
 
 
 class ExternalProcess:
-    """A process of a command: started when it is first asked, and anew after each ProgramError.
+    """A process of a command: started when it is first asked, and again after each ProgramError.
 
-    It runs in ``folder``, in a session of its own, which Ctrl-C does not reach. Standard input
+    It runs in ``folder``, in a separate session, which Ctrl-C does not reach. Standard input
     and output are for the lines of JSON; what it writes about errors is quoted where it ends.
     """
 
@@ -160,7 +160,7 @@ class ExternalRun(NamedTuple):
 
 
 class RunCounts(NamedTuple):
-    """How many runs a program was asked for, how many failed, how often it was started anew."""
+    """How many runs a program was asked for, how many failed, how often it was restarted."""
 
     runs: int
     failed: int
@@ -277,7 +277,7 @@ def run_of(answer: Mapping[str, Any], signals: Sequence[str], samples: int) -> E
         try:
             array = np.array(given[name], dtype=np.float64)
         except (TypeError, ValueError):
-            return ExternalRun({}, f"signals.{name}: {show_value(given[name])} is no list")
+            return ExternalRun({}, f"signals.{name}: {show_value(given[name])} is not a list")
         if array.shape != (samples,):
             size = len(array) if array.ndim == 1 else f"an array {array.shape} of"
             return ExternalRun({}, f"signals.{name}: {size} samples, not {samples}")

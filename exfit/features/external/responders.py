@@ -48,7 +48,7 @@ class ProgramSignals:
         direction: Direction | None = None,
         step: float = 0.0,
     ) -> dict[str, Any]:
-        """Make the request for a run: all values, the steps, the instants without the delay.
+        """Make the request for a run: all values, the steps, the times without the delay.
 
         Values and inputs are a ``step`` away in a ``direction`` where one is given.
         """

@@ -89,8 +89,8 @@ def test_the_intervals_hold_the_truth_and_the_output_says_why(fitted):
         wider = 0.5 * (high - low)  # 3.9 standard errors on either side
         assert low - wider < true < high + wider
     notes = " ".join(fitted.notes)
-    assert re.search(r"the noise of what drives the simulation, vt 0\.0002\d? pu and angle", notes)
-    assert "the bias by that noise is taken out" in notes
+    assert re.search(r"the noise of the driving signals, vt 0\.0002\d? pu and angle", notes)
+    assert "the bias by that noise is removed" in notes
 
 
 @pytest.mark.long

@@ -338,6 +338,8 @@ def test_another_exciter_as_found_is_not_compared(record):
 def test_what_the_twin_alone_shows_is_named(record):
     shown = exfit.simulate(external(record))
     (note,) = [note for note in shown.notes if "not corrected" in note]
-    assert note.endswith("gives vt; all other signals are by the twin open-circuit, not corrected")
+    assert note.endswith(
+        "gives vt; all other signals are those of the twin open-circuit, not corrected"
+    )
     assert identify(external(record)).notes[0].startswith("these are the standard errors of the tw")
     assert not any("twin" in note for note in exfit.simulate(without_twin(record)).notes)

@@ -27,7 +27,7 @@ with open('runs', 'a') as runs:
         ({"signals": {"efd": [1.0, 1.0]}}, "signals.vt: missing in the answer"),
         ({"signals": {"vt": [1.0]}}, "signals.vt: 1 samples, not 2"),
         ({"signals": {"vt": [1.0, float("nan")]}}, "signals.vt: 1 of 2 samples are not finite"),
-        ({"signals": {"vt": "high"}}, "signals.vt: 'high' is no list"),
+        ({"signals": {"vt": "high"}}, "signals.vt: 'high' is not a list"),
     ],
 )
 def test_an_answer_that_is_no_run_has_a_reason(answer, reason):
