@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     help="Write a page with the block diagram and a figure of NAME, or of every model.",
 )
 def models(name: str | None, folder: Path | None) -> None:
-    """List the models, or print the drawing, data sheet and states of one."""
+    """List the models, or print the block diagram, data sheet and states of one."""
     from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
     from exfit.output import models as shown
@@ -68,7 +68,7 @@ def _model(name: str) -> "Model | Machine":
 
 @click.command(short_help="Print the JSON Schema of a case file.")
 def schema() -> None:
-    """Print the JSON Schema of a case file, for editors that complete and check."""
+    """Print the JSON Schema of a case file, with which editors complete and check it."""
     from exfit.case.json_schema import json_schema
 
     print_json(json_schema())

@@ -61,7 +61,7 @@ def check(case: Path) -> None:
     "--all",
     "everything",
     is_flag=True,
-    help="Print everything: sensitivities, what moves together, steps, sources, figures.",
+    help="Print everything, also sensitivities, correlated parameters, step figures and sources.",
 )
 @click.option(
     "--history",
@@ -92,10 +92,10 @@ def show(result: Path, everything: bool, history: bool) -> None:
 def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
     """Fit CASE, then find the 95 % interval of each PARAM from its profile likelihood.
 
-    A parameter is moved away from its fitted value and the others are fitted again, until the cost
-    shows that the record excludes it. Use it where the linear theory of `exfit fit` does not apply.
-    Without PARAM all free parameters are profiled. Writes profile.json, profile.csv and profile.png
-    to runs/CASE-profile, or to DIR. Ctrl-C keeps the profiles found so far.
+    Each parameter is moved away from its fitted value, and the others are fitted again, until the
+    cost shows that the record rejects the value. Use it where the linear theory of `exfit fit` does
+    not apply. Without PARAM all free parameters are profiled. Writes profile.json, profile.csv and
+    profile.png to runs/CASE-profile, or to DIR. Ctrl-C keeps the profiles completed.
     """
     from exfit import workflows
     from exfit.output import fits, run_folder
@@ -126,13 +126,13 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
 @click.option(
     "--as-found",
     is_flag=True,
-    help="Values before any fit: of the model as found, or else the start values.",
+    help="Use the values before any fit: those of the model as found, or else the start values.",
 )
 @click.option(
     "--record",
     type=GivenFile(Kind.RECORD),
     metavar="FILE",
-    help="Record in place of those under validate; its steps are found in it.",
+    help="Record, instead of those under validate; its steps are detected.",
 )
 @click.option(
     "--step",
@@ -140,15 +140,15 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
     type=float,
     multiple=True,
     metavar="SIZE",
-    help="Size of the step of --record, pu, in place of the one found.",
+    help="Size of the step of --record, pu, instead of the one detected.",
 )
 @click.option(
     "--at",
     "instants",
     type=float,
     multiple=True,
-    metavar="INSTANT",
-    help="Instant of the step of --record, s, in place of the one found.",
+    metavar="TIME",
+    help="Time of the step of --record, s, instead of the one detected.",
 )
 @output_options
 def validate(
@@ -163,13 +163,12 @@ def validate(
     """Compare fitted values with the records of CASE that were not fitted.
 
     The values are those of the last fit of the case, or of --parameters. With --as-found they are
-    those of a planner's model as it is, and where nothing is free in CASE its own: all records of
-    the case are validated then. The steps of --record are
-    found in it and shown; --step -0.05 and --at 1.0 replace what is found, each of several steps
-    has its own. Writes validation.json, samples and overlays to runs/CASE-validate, or to DIR;
-    exfit report makes a report of that folder.
-    Exit code 1: bad input, no step found, or no record to validate on; 3: a validation is not
-    accepted.
+    those of the model before any fit, and all records of the case are validated; the same holds if
+    CASE has no free parameter. The steps of --record are detected and shown; --step -0.05 and
+    --at 1.0 replace the sizes and times detected, once for each step. Writes validation.json,
+    samples and overlays to runs/CASE-validate, or to DIR; exfit report makes a report of that
+    folder. Exit code 1: bad input, no step detected, or no record to validate on; 3: a validation
+    is not accepted.
     """
     from exfit import workflows
     from exfit.output import run_folder, validations
@@ -179,7 +178,7 @@ def validate(
     from exfit.workflows.given_values import read_parameters, sources_in
 
     if as_found and parameters is not None:
-        raise ExfitError("--as-found and --parameters: only one of them says whose values they are")
+        raise ExfitError("--as-found and --parameters exclude each other: give one of them")
     loaded, source = (load(case), None) if as_found else _with_source(case, parameters)
     folder = output.folder_of(loaded, "validate", run_folder.OF_VALIDATION, after_records=True)
     if record is not None:
@@ -218,7 +217,7 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
     if not case.free():
         return case, parameters
     if source is None:
-        text = f"no earlier fit of this case; run exfit fit, or give {OTHER_VALUES}"
+        text = f"this case was not fitted yet: run exfit fit, or give {OTHER_VALUES}"
         raise CaseError([f"{path}: {text}"])
     return case, source
 

@@ -45,17 +45,21 @@ SERIES = "fits"  # the folder of a series by default
     "strategies",
     type=click.Choice([*STRATEGIES]),
     multiple=True,
-    help=f"Strategy in place of that of the case; may be repeated. {EXPLAINED}.",
+    help=f"Strategy, instead of that of the case; may be repeated. {EXPLAINED}.",
 )
 @click.option(
     "--search",
     type=click.Choice([*SEARCHES]),
-    help=f"How far to search, in place of what the case says. {SEARCHES_EXPLAINED}.",
+    help=f"Search, instead of that of the case. {SEARCHES_EXPLAINED}.",
 )
 @set_option
 @parameters_option
-@click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
-@click.option("-v", "--verbose", is_flag=True, help="Print all of the result, as exfit show --all.")
+@click.option(
+    "--watch", is_flag=True, help="Repeat the fit when the case or one of its files changes."
+)
+@click.option(
+    "-v", "--verbose", is_flag=True, help="Print the complete result, as exfit show --all."
+)
 @progress_option
 @output_options
 def fit(
@@ -70,42 +74,42 @@ def fit(
 ) -> None:
     """Fit the free parameters of each CASE to its records.
 
-    By default the search is global: further descents, from points distributed over the bounds,
-    look for a lower minimum than the one that the start of CASE leads to.
+    By default the search is global: besides the run from the start of CASE, runs from points
+    distributed over the bounds look for a lower minimum.
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
     runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far.
 
     The last line of the result is the verdict: good | matches, not all determined | misses the
-    record | no match | not converged. The likeliest causes stand above it, at most five, each with
-    what to do. What else the fit shows stands in the report, and is printed with --verbose or later
-    by exfit show. Exit code 0: the first two verdicts; 1: bad input; 3: the others, or a validation
-    that is not accepted: beyond the limit of accept in the case, without it no better than a
-    constant or beyond 3 times the error of the fit.
+    record | no match | not converged. Above it stand up to five causes, the likeliest first, each
+    with a remedy. --verbose prints everything else, as does exfit show later; exfit report writes a
+    page of it. Exit code 0: the first two verdicts; 1: bad input; 3: the others, or a validation
+    that is not accepted. Its limit is accept in the case; without it, it must be better than a
+    constant and within 3 times the error of the fit.
 
     --set overrides --parameters, and both override the case: they give the start of a free
-    parameter, and the value of another. The result says which values they changed.
+    parameter, and the value of another. The result lists the values changed.
 
-    Several cases, or several strategies, are all checked first, then fitted one after the other,
-    every case with every strategy: each fit has a folder CASE-STRATEGY in runs/fits, or in DIR,
-    and fits.csv, fits.json and fits.png there show them side by side. Several strategies are
-    compared by the descent from the start of each case alone, unless --search or the case says how
-    far to search. Ctrl-C ends them and keeps what is done. Exit code 3: not all are done and well.
+    Several cases or strategies are checked first, then every case is fitted with every strategy.
+    Each fit has a folder CASE-STRATEGY in runs/fits, or in DIR, where fits.csv, fits.json and
+    fits.png compare them. Strategies are compared by one run from the start of each case, unless
+    --search or the case asks for a global search. Ctrl-C ends the fits and keeps those completed.
+    Exit code 3: not all completed with a good verdict.
 
-    With --watch it fits again when CASE, its model file, one of its records or the file of
-    --parameters changes, and shows the former values beside the new ones; a case with a fault
-    waits for the next change. Ctrl-C ends that with exit code 0.
+    --watch repeats the fit when CASE, its model file, a record or the file of --parameters changes,
+    and shows the previous values beside the new ones; after an error in the case it waits for the
+    next change. Ctrl-C ends it with exit code 0.
     """
     from exfit.output import run_folder
 
     given = Given(parameters, changes)
     several = len(cases) > 1 or len(strategies) > 1
     if verbose and (several or not output.shown):
-        raise click.UsageError("--verbose shows one fit: not with several, --quiet or --json.")
+        raise click.UsageError("--verbose is for one fit, without --quiet or --json.")
     if watch and several:
-        raise click.UsageError("--watch fits one case with one strategy.")
+        raise click.UsageError("--watch takes one case and one strategy.")
     if watch and not output.shown:
-        raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
+        raise click.UsageError("--watch cannot be combined with --quiet or --json.")
     if several:
         fit_several(cases, given, strategies, search, output)
         return
@@ -276,7 +280,7 @@ def run_planned(
     with nullcontext() if progress is None else progress.running():
         series = run_all(plan, progress or (lambda *_: None), finished)
     if not series.runs and series.interrupted:
-        raise Interruption("no fit is done")
+        raise Interruption("no fit was completed")
     return series
 
 

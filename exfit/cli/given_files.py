@@ -34,16 +34,13 @@ class Kind(StrEnum):
 
 # what takes a file of a kind
 COMMANDS = {
-    Kind.CASE: "exfit fit {path} fits it, exfit simulate {path} simulates it",
-    Kind.RECORD: (
-        "exfit inspect {path} shows it, exfit new --model NAME --record {path} makes a case of it"
-    ),
+    Kind.CASE: "use exfit fit {path} or exfit simulate {path}",
+    Kind.RECORD: "use exfit inspect {path}, or exfit new --model NAME --record {path}",
     Kind.RESULT: (
-        "exfit report {path} and exfit export {path} take it, "
-        "exfit validate CASE --parameters {path} its values"
+        "use exfit report {path}, exfit export {path}, or exfit validate CASE --parameters {path}"
     ),
-    Kind.PARAMETERS: "give it beside a case: exfit simulate CASE --parameters {path}",
-    Kind.DYNAMICS: "exfit import {path} makes a case of it",
+    Kind.PARAMETERS: "give it with a case: exfit simulate CASE --parameters {path}",
+    Kind.DYNAMICS: "make a case of it: exfit import {path}",
 }
 
 
@@ -71,7 +68,7 @@ class GivenFile(click.Path):
             command, folder = f"exfit {ctx.info_name}", Path("runs") / f"{path.stem}-fit"
             advice = f"fit it first: exfit fit {path}, then {command} {folder}"
             if (folder / RESULT).is_file():
-                advice = f"{command} {folder} takes that of its fit"
+                advice = f"for the result of its fit use {command} {folder}"
             if ctx.info_name == "report":
                 advice += f"; or, without a fit, exfit validate {path}"
         raise ExfitError(f"{path}: {kind}, not {self.kinds[0]}; {advice}")
@@ -90,7 +87,7 @@ class ParameterFile(GivenFile):
         if not folder.is_dir():
             return path
         if not (folder / PARAMETERS).is_file():
-            raise ExfitError(f"{path}: holds no {PARAMETERS} of a fit")
+            raise ExfitError(f"{path}: contains no {PARAMETERS} of a fit")
         return folder / PARAMETERS
 
 

@@ -48,9 +48,9 @@ file_option = click.option(
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="File to write; without it, to the terminal.",
+    help="File to write; default: the terminal.",
 )
-force_option = click.option("--force", is_flag=True, help="Write over a file that exists.")
+force_option = click.option("--force", is_flag=True, help="Overwrite an existing file.")
 
 
 class Output(NamedTuple):
@@ -322,7 +322,7 @@ def refuse_existing(output: Path, force: bool) -> None:
     if output.is_dir():
         raise ExfitError(f"{output}: cannot be written: it is a folder")
     if output.exists() and not force:
-        raise ExfitError(f"{output}: exists already; --force writes over it")
+        raise ExfitError(f"{output}: exists already; --force overwrites it")
 
 
 def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:

@@ -17,13 +17,13 @@ time_option = click.option(
     "clock",
     multiple=True,
     metavar="COLUMN",
-    help="Column of the time; given twice, of date and time. Default: as the file shows.",
+    help="Time column; twice for date and time. Default: detected.",
 )
 unit_option = click.option(
     "--time-unit",
     "unit",
     type=click.Choice(("s", "ms", "us", "min")),
-    help="Unit of the time's numbers. Default: as the file says, else s.",
+    help="Unit of a numeric time. Default: as in the file, else s.",
 )
 steps_option = click.option(
     "--step",
@@ -40,7 +40,7 @@ memory_option = click.option(
     "--memory",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="GB",
-    help="Memory that reading a file may take. Default: 1, or four times the file's size up to 4.",
+    help="Limit of memory for reading. Default: 1, or four times the size of the file, 4 at most.",
 )
 
 
@@ -61,7 +61,7 @@ def inspect_(
 ) -> None:
     """Show the content of FILE, a record: channels, sampling, gaps, noise, spikes, steps.
 
-    Suggests the record, test and estimate sections of a case; guesses are marked. Writes
+    Suggests the sections record, test and estimate of a case; guesses are marked. Writes
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
     from exfit.case.case_draft import CaseDraft

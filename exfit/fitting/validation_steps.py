@@ -41,7 +41,7 @@ Test = Mapping[str, Any]  # keys of a test with what they become
 
 OWN_REFERENCE = "the reference is the one recorded beside the response"
 EARLIER_STEPS = "the steps before the record are those of the case under validate"
-GIVE_STEP = "give it by --step SIZE and --at INSTANT (step and at in Python)"
+GIVE_STEP = "give it by --step SIZE and --at TIME (step and at in Python)"
 REST_SHARE = 0.5  # of the rest before a step: its instant is not sought farther back
 FIRST_SAMPLE_WITHIN = 8.0  # times the noise: how far a level may be from one sample
 SAME_LEVEL = 0.1  # of the largest step: how far a record may begin from where earlier steps led

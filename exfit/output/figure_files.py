@@ -53,7 +53,7 @@ class FigureFiles(NamedTuple):
             return tuple(self._missing(left, announce))
         except KeyboardInterrupt:
             names = f": {', '.join(left)}" if left else ""
-            message = f"{self.main.parent}: the numbers are whole, figures are missing{names}"
+            message = f"{self.main.parent}: all numbers are written, figures are missing{names}"
             raise KeyboardInterrupt(message) from None
 
     def _missing(self, left: list[str], announce: Announce) -> Iterator[str]:
@@ -73,7 +73,7 @@ class FigureFiles(NamedTuple):
                     content = picture.result()
                     if _version_of(self.main) != self.version:
                         folder = self.main.parent
-                        yield f"{folder}: another run writes there: figures of this one are missing"
+                        yield f"{folder}: another run writes there: figures of this run are missing"
                         return
                     write(path, content)
                 except ExfitError as fault:

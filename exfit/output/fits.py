@@ -162,7 +162,7 @@ def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
     """Yield in one sentence which parameter matters first."""
     ranked = (f"{effect.label}{NO_BREAK}{number(effect.of_noise, 2)}" for effect in effects)
     if effects:
-        yield f"1 % of each moves the response by, in units of the noise: {', '.join(ranked)}"
+        yield f"effect of 1 % of each on the response, in units of the noise: {', '.join(ranked)}"
 
 
 def fitted_table(

@@ -30,9 +30,9 @@ def inspection(result: Inspection, record: Sequence[str]) -> Iterator[Block]:
     if result.pmu is not None:
         yield paragraph(_of_pmu(result.pmu))
     elif result.plays_in:
-        yield paragraph("a play-in file: voltage and frequency, which drive a grid-playback")
+        yield paragraph("a play-in file: voltage and frequency, for a plant grid-playback")
     elif result.is_event:
-        yield paragraph("a grid event: voltage, angle and power, and no reference")
+        yield paragraph("a grid event: voltage, angle and power, no reference")
     elif not result.steps:
         yield paragraph("no step in any channel")
     else:
@@ -40,7 +40,7 @@ def inspection(result: Inspection, record: Sequence[str]) -> Iterator[Block]:
         yield from _more(len(result.steps) - MOST_ROWS)
     yield from notes(result.findings[:MOST_ROWS])
     yield from _more(len(result.findings) - MOST_ROWS)
-    yield paragraph("for a case; what is in # comments is a guess to check:")
+    yield paragraph("sections of a case; check the guesses in # comments:")
     yield Verbatim("\n".join(record))
 
 
@@ -123,7 +123,7 @@ def _signals(channels: Sequence[InspectedChannel]) -> Iterator[str]:
             yield f"{channel.name} is {channel.signal}: {surely}, by {channel.why}"
     others = [channel.name for channel in channels if not channel.signal]
     if others:
-        yield f"taken for no signal: {_some(others)}"
+        yield f"not recognised: {_some(others)}"
 
 
 def _steps(result: Inspection) -> Table:

@@ -41,7 +41,7 @@ STAGES = {
     "screening": ("screening", "points"),
     "refining": ("search", "further starts"),
     "profiling": ("profiles", "sides"),
-    "weighing": ("weighing by noise", "passes"),
+    "weighing": ("weighting by noise", "passes"),
     "causes": ("causes", "tried"),
 }  # in words, and what is counted
 

@@ -80,7 +80,7 @@ def check(result: "Check") -> Iterator[Block]:
     from exfit.workflows.model_check import STEPS
 
     if not result.has_equations:
-        yield paragraph("without a twin there are no equations to check")
+        yield paragraph("an external program without a twin: no equations to check")
     elif result.deviations:
         heads = [*(f"{step:.0e}" for step in STEPS), "best"]
         rows = (
@@ -94,17 +94,17 @@ def check(result: "Check") -> Iterator[Block]:
     else:
         yield paragraph("no free parameter: no derivative to check")
     if result.has_equations:
-        stays = "stays" if result.flat else "is NOT"
-        text = f"a run without a step {stays} flat: it drifts by {result.drift:.1e} pu in 60 s"
+        stays = "stays" if result.flat else "does NOT stay"
+        text = f"a run without a step {stays} at rest: drift {result.drift:.1e} pu in 60 s"
         yield paragraph(text, "ok" if result.flat else "bad")
         yield paragraph(f"sub-steps: {result.substeps} in each step of {result.step:g} s")
-        yield paragraph(f"halving every step moves the response by {result.step_error:.1e} pu")
-        yield paragraph(f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
+        yield paragraph(f"halving the steps changes the response by {result.step_error:.1e} pu")
+        yield paragraph(f"bypassed: {', '.join(result.bypassed) or 'none'}")
     other = "twin" if result.has_equations else "record"
     for record, differences in result.from_program.items():
         listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
         yield paragraph(
-            f"largest difference of program and {other} at the start, {record}: {listed}"
+            f"largest difference between program and {other} at the start, {record}: {listed}"
         )
     yield from remarks("warning:", result.warnings, kind="warning")
     yield from notes(result.notes)

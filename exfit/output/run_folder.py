@@ -97,7 +97,7 @@ def refuse_inputs(
     for path in inputs:
         if path.name in written and path.resolve().parent == folder.resolve():
             raise ExfitError(
-                f"{path}: would be written over by the results of that name; "
+                f"{path}: would be overwritten by the results; "
                 f"choose another folder than {folder} with -o"
             )
 
@@ -147,7 +147,7 @@ def figures_of_fit(result: "FitResult") -> PlannedFigures:
     if result.knowledge is not None:
         plan |= figures_of_uncertainty(result.knowledge, result.name)
     if result.minima is not None:
-        shows = "the cost that each start led to"
+        shows = "the cost reached from each start"
         draw = partial(plots.waterfall, result.minima, result.name)
         plan["starts.png"] = PlannedFigure(shows, draw)
     return {**plan, **figures_of_comparisons([*several, *result.validation])}
@@ -160,7 +160,7 @@ def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> Pla
     moves = partial(plots.sensitivity, uncertainty, name)
     together = partial(plots.correlation, uncertainty, name)
     return {
-        "sensitivity.png": PlannedFigure("what 1 % of each parameter does to the response", moves),
+        "sensitivity.png": PlannedFigure("effect of 1 % of each parameter on the response", moves),
         "correlation.png": PlannedFigure("the correlation of the estimates", together),
     }
 

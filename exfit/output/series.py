@@ -72,7 +72,7 @@ def fit_series(series: FitSeries) -> Iterator[Block]:
     for name in series.failed:
         yield Note("failed", "verdict", f"{name}:", "bad")
     if series.not_run:
-        yield paragraph(f"not run, interrupted: {', '.join(series.not_run)}", "bad")
+        yield paragraph(f"not run (interrupted): {', '.join(series.not_run)}", "bad")
 
 
 def _outcomes(results: Mapping[str, FitResult]) -> Iterator[Note]:

@@ -35,7 +35,7 @@ def show(
         source = result_file(place)
         programme = place / WHOLE_PROGRAMME if place.is_dir() else place
         if programme.name == WHOLE_PROGRAMME and programme.is_file():
-            raise ExfitError(f"{place}: a programme; `exfit report` makes a page of it")
+            raise ExfitError(f"{place}: the result of a programme: use exfit report {result}")
         validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
         if source == validated or (validated.is_file() and not source.exists()):
             if history:

@@ -84,7 +84,7 @@ def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
                 TableColumn("peak sim.", number=True),
             ),
             tuple(rows),
-            "simulated less recorded, pu, and the peaks of both from rest:",
+            "simulated minus recorded, pu, and the peaks of both from rest:",
         )
 
 

@@ -66,15 +66,15 @@ def notes(
             rmse = float(np.sqrt(np.nanmean(error**2)))
             if change > min(max(COARSE * rmse, INVISIBLE), LARGEST_STEP_ERROR):
                 yield (
-                    f"halving the step of {case.simulation.step:g} s moves {signal} by "
+                    f"halving the step of {case.simulation.step:g} s changes {signal} by "
                     f"{change:.1e} pu, its error is {rmse:.1e} pu: reduce simulation.step"
                 )
         used = simulator.substeps(at)
         if comparison.substeps > 2 * used:
             step = case.simulation.step * used / comparison.substeps
             yield (
-                f"the response needs {comparison.substeps} sub-steps along its way, {used} were "
-                f"taken: set simulation.step to {step:.2g}"
+                f"the response needs {comparison.substeps} sub-steps, {used} were taken: "
+                f"set simulation.step to {step:.2g}"
             )
 
 
@@ -89,7 +89,7 @@ def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator
     else:
         yield (
             f"{ended}: parameters may be {distance:.2g} standard errors away from it, "
-            "and the errors and intervals assume that they are there"
+            "which errors and intervals do not include"
         )
 
 
@@ -110,9 +110,8 @@ def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
         if error > 0.0:
             share = 100.0 * error / np.ptp(samples)
             yield (
-                f"{signal} was recorded with noise of {scatter(samples):.1e} pu: its mean at rest "
-                f"leaves the size of its change uncertain by {share:.1g} %, and the intervals do "
-                "not include that error"
+                f"{signal} was recorded with noise of {scatter(samples):.1e} pu: the size "
+                f"of its change is uncertain by {share:.1g} %, which the intervals do not include"
             )
 
 
@@ -159,8 +158,8 @@ def search_range_notes(case: Case) -> Iterator[str]:
     ]
     if beyond:
         yield (
-            f"{listed(beyond)} may leave the range of the data sheet, where values are not "
-            "physical: there is no bound, or one beyond it"
+            f"{listed(beyond)} may leave the range of the data sheet, beyond which values are not "
+            "physical: set bounds within it"
         )
 
 
@@ -192,12 +191,12 @@ def case_warnings(case: Case) -> Iterator[str]:
             continue
         common = f"{show(begin)} ... {show(end)} s"
         if begin == -inf:
-            common = "the whole" if end == inf else f"what is before {show(end)} s"
+            common = "all" if end == inf else f"the part before {show(end)} s"
         elif end == inf:
-            common = f"what is after {show(begin)} s"
+            common = f"the part after {show(begin)} s"
         yield (
-            f"validate {validation.name}: {common} of {validation.record.file} is fitted as well, "
-            "and validates nothing: give both a window, [start, end] in s, that do not overlap"
+            f"validate {validation.name}: {common} of {validation.record.file} is fitted as well: "
+            "give both a window, [start, end] in s, without overlap"
         )
 
 

@@ -87,7 +87,7 @@ def verdict_alone(evidence: Evidence) -> Verdict:
 def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[VerdictWords, str]:
     solution = evidence.solution
     if evidence.interrupted:
-        return NOT_CONVERGED, "interrupted: the values are the best until then"
+        return NOT_CONVERGED, "interrupted: the values are the best so far"
     no_match = next(_no_match(evidence, tests), None)
     if no_match is not None:
         return NO_MATCH, no_match
@@ -149,7 +149,7 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
         verb = "is" if len(undetermined) == 1 else "are"
         yield f"{len(undetermined)} of {len(evidence.own)} parameters {verb} not determined"
     elif evidence.without_profile:
-        yield "intervals are missing, which linear theory does not give"
+        yield "intervals are missing where linear theory does not apply"
     for match in evidence.validation:
         if not match.accepted:
             yield f"{match.name} is not accepted"

@@ -47,7 +47,7 @@ def unstable_rest_notes(simulator: Simulator, values: Values) -> Iterator[str]:
     value = f"{growth:.3g} ± {oscillation:.3g}j 1/s" if oscillation > 0.0 else f"{growth:.3g} 1/s"
     what = f"an oscillation of {oscillation / (2.0 * np.pi):.3g} Hz" if oscillation else "it"
     yield (
-        f"unstable at rest: eigenvalue {value}: {what} grows by e in {1.0 / growth:.3g} s, also "
+        f"unstable at rest: eigenvalue {value}: {what} grows e-fold in {1.0 / growth:.3g} s, also "
         "before the first step"
     )
 
@@ -79,7 +79,7 @@ def step_error_notes(
         size = max(1.0, float(np.max(np.abs(simulated[signal]))))
         if errors[signal] > LARGEST_STEP_ERROR * size:
             yield (
-                f"halving the step of {case.simulation.step:g} s moves {signal} by "
+                f"halving the step of {case.simulation.step:g} s changes {signal} by "
                 f"{errors[signal]:.1e} pu: reduce simulation.step"
             )
 
@@ -141,9 +141,9 @@ def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str
     until = opened[0] + GOVERNOR_ACTS
     if inputs.end > until:
         yield (
-            f"from {opened[0]:.6g} s on the speed, and vt with it, is that of constant mechanical "
-            f"power, {power:g} pu, which holds for some {GOVERNOR_ACTS:g} s: record the speed, or "
-            f"end the window at {until:.4g} s"
+            f"from {opened[0]:.6g} s on, speed and vt are those at constant mechanical power, "
+            f"{power:g} pu, which is valid for some {GOVERNOR_ACTS:g} s: record the speed, or end "
+            f"the window at {until:.4g} s"
         )
 
 
@@ -164,7 +164,7 @@ def simulation_notes(
     delta = response.signals.get("delta")
     if delta is not None and np.max(np.abs(delta)) > np.pi:
         at = float(response.time[np.argmax(np.abs(delta) > np.pi)])
-        yield f"the machine falls out of step at {at:.3g} s: delta passes half a turn"
+        yield f"the machine loses synchronism at {at:.3g} s: delta exceeds 180 degrees"
 
 
 def rest_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
@@ -189,7 +189,7 @@ def other_levels(
         if abs(measured - simulated) > far * max(abs(simulated), LEAST_LEVEL):
             yield Cause(
                 f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu",
-                "check its base, and the data and the power that the case gives the machine",
+                "check its base, and the data and power of the machine in the case",
             )
 
 

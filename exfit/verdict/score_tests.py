@@ -238,7 +238,7 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
             )
     if not kinds & {"at", "shift", "delay"} and steps:
         remedy = correct_instant(experiment.simulator.delay)
-        held = Held(f"the instant of the step{of_record}", remedy, unit="s")
+        held = Held(f"the time of the step{of_record}", remedy, unit="s")
         yield held, opened("delay", experiment.simulator.delay)
     if VT0 in experiment.own and "vt0" not in kinds:
         given = evidence.records[number].given_vt0

@@ -143,9 +143,11 @@ def test_a_fault_of_the_angle_of_the_source_is_reported_with_its_place(tmp_path,
 
 
 def test_a_machine_that_falls_out_of_step_is_reported(tmp_path):
-    assert not any("out of step" in n for n in simulate(load_case(written(tmp_path)), {}).notes)
+    assert not any(
+        "loses synchronism" in n for n in simulate(load_case(written(tmp_path)), {}).notes
+    )
     case = load_case(written(tmp_path, ("{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}", "{at: 3, X: 5}")))
-    assert any("falls out of step at" in note for note in simulate(case, {}).notes)
+    assert any("loses synchronism at" in note for note in simulate(case, {}).notes)
 
 
 def test_a_stabiliser_hears_what_the_case_says(tmp_path):

@@ -289,7 +289,7 @@ def test_all_faults_of_a_case_are_reported_at_once(run):
         (["--set", "k=-1"], ["--set", "-1 is below 1e-06", "the equations"]),
         (["--parameters", "none.yaml"], ["none.yaml", "No such file"]),
         (["--parameters", "up.csv"], ["up.csv"]),
-        (["--parameters", "."], ["holds no parameters.yaml of a fit"]),
+        (["--parameters", "."], ["contains no parameters.yaml of a fit"]),
         (["--parameters", "other.yaml"], ["other.yaml", "AC8B", "FIRST_ORDER"]),
         (["--parameters", "text.yaml"], ["text.yaml", "parameters.k", "'four'"]),
         (["--parameters", "symbol.yaml"], ["symbol.yaml", "KQ"]),
@@ -384,7 +384,7 @@ def test_a_stored_result_is_shown_as_its_run_showed_it(run):
     assert run("show", "runs").code == 1
     Path("programme.json").write_text("{}")
     for place in (".", "programme.json"):
-        assert "a programme; `exfit report`" in run("show", place).err
+        assert "the result of a programme: use exfit report" in run("show", place).err
     for beside in (("--quiet",), ("--json",), ("--strategy", "lm", "--strategy", "dgn")):
         assert run("fit", case_file(), "--verbose", *beside).code == 2
 
@@ -552,7 +552,7 @@ def test_the_parameters_of_a_fit_give_its_response_again(run, source):
 
 def test_a_validation_without_a_fit_says_what_to_give(run, workplace):
     case, before = case_file(), listing(workplace)
-    words = ["case.yaml", "no earlier fit of this case", "--parameters"]
+    words = ["case.yaml", "this case was not fitted yet", "--parameters"]
     is_refused(run("validate", case), words, before, workplace)
 
 
@@ -616,7 +616,7 @@ def test_a_model_as_found_is_validated_before_any_fit(run):
     assert "\nvalidated: record (up.csv), down-step (" in ran.out
     refused = run("validate", "case.yaml", "--as-found", "--parameters", "values.yaml")
     assert (refused.code, refused.out) == (1, "")
-    assert "--as-found and --parameters: only one" in refused.err
+    assert "--as-found and --parameters exclude each other" in refused.err
 
 
 def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
@@ -634,7 +634,7 @@ def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--record", "flat.csv"], ["flat.csv", "no step found", "--step SIZE and --at INSTANT"]),
+        (["--record", "flat.csv"], ["flat.csv", "no step found", "--step SIZE and --at TIME"]),
         (["--record", "down.csv", "--at", 7], ["at: 7 s lies outside", "down.csv", "0 ... 3 s"]),
         (
             ["--record", "down.csv", "--step", 1, "--step", 2],
@@ -801,7 +801,7 @@ def test_results_never_go_over_the_record_of_a_case(run, workplace, command):
     case = case_file(changed(CASE, ("validate.0.record.file", "down-step.csv")))
     before = listing(workplace)
     ran = run(*arguments(command, case), "-o", ".")
-    is_refused(ran, ["down-step.csv", "written over", "-o"], before, workplace)
+    is_refused(ran, ["down-step.csv", "overwritten", "-o"], before, workplace)
     assert run(*arguments(command, case), "-o", "elsewhere").code == 0
 
 
@@ -809,7 +809,7 @@ def test_a_comparison_never_goes_over_what_it_compares(run, workplace):
     Path("up.csv").rename("compare.csv")
     before = listing(workplace)
     ran = run("compare", "compare.csv", "down.csv", "-o", ".")
-    is_refused(ran, ["compare.csv", "written over", "-o"], before, workplace)
+    is_refused(ran, ["compare.csv", "overwritten", "-o"], before, workplace)
     Path("compare.csv").rename("response.csv")  # which no comparison writes
     columns = ["--columns", "vt=v", "--time", "t"]
     assert run("compare", "response.csv", "down.csv", *columns, "--no-plots", "-o", ".").code == 0
@@ -860,7 +860,7 @@ def test_ctrl_c_while_drawing_ends_with_130_and_says_what_stands(run, monkeypatc
     place = Path("runs/case-fit")
     assert ran.code == 130
     missing = "convergence.png, trajectories.png, sensitivity.png, correlation.png"
-    text = f"{place}: the numbers are whole, figures are missing: {missing}"
+    text = f"{place}: all numbers are written, figures are missing: {missing}"
     assert ran.err.startswith(f"Interrupted: {text}")
     assert "verdict: " in ran.out
     assert (place / "overlay.png").is_file()
@@ -1076,7 +1076,7 @@ def test_every_case_of_configs_simulates_and_passes_its_check(run, path):
     ran = run("check", path)
     assert ran.code == 0, ran.out
     assert "derivatives agree" in ran.out
-    assert "stays flat" in ran.out
+    assert "stays at rest" in ran.out
     assert max(map(len, ran.out.splitlines())) <= WIDTH
 
 

@@ -54,7 +54,7 @@ def test_the_result_of_a_case_that_was_fitted_is_pointed_at(run, folder):
     shutil.copytree(folder / "fitted", folder / "runs" / "t-fit")
     code, _, err = run("report", "t.yaml")
     assert code == 1
-    assert "exfit report runs/t-fit takes that of its fit" in err
+    assert "for the result of its fit use exfit report runs/t-fit" in err
 
 
 def test_a_column_that_differs_in_capitals_alone_is_the_one_meant(run, folder):

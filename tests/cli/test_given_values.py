@@ -77,7 +77,7 @@ def test_the_file_of_an_earlier_fit_is_not_written_over(run, workplace):
     before = (workplace / "out" / "parameters.yaml").read_bytes()
     ran = run("fit", "case.yaml", "--parameters", "out/parameters.yaml", "-o", "out")
     assert ran.code == 1
-    assert "would be written over" in ran.err
+    assert "would be overwritten" in ran.err
     assert (workplace / "out" / "parameters.yaml").read_bytes() == before
 
 

@@ -37,7 +37,7 @@ def test_a_terminal_of_any_kind_ends_no_command(run, monkeypatch, kind):
         monkeypatch.setenv(name, value)
     ran = run("check", CASE)
     assert (ran.code, ran.err) == (0, "")
-    assert "halving every step" in ran.out
+    assert "halving the steps" in ran.out
 
 
 @pytest.mark.long

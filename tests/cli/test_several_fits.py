@@ -158,14 +158,14 @@ def test_results_never_replace_a_file_of_a_case(run):
     record = {"file": str(Path("fits.csv").absolute()), "time": "t", "channels": {"vt": "v"}}
     ran = run("fit", case_file("a.yaml", record=record), *BOTH, "-o", ".")
     assert (ran.code, ran.out) == (1, "")
-    assert "written over" in ran.err
+    assert "overwritten" in ran.err
     assert "-o" in ran.err
 
 
 def test_watch_is_for_one_fit(run):
     ran = run("fit", case_file("a.yaml"), *BOTH, "--watch")
     assert ran.code == 2
-    assert "one case with one strategy" in ran.err
+    assert "one case and one strategy" in ran.err
 
 
 def test_a_folder_that_cannot_be_written_costs_no_other_fit(run, monkeypatch):
@@ -242,7 +242,7 @@ def test_ctrl_c_keeps_what_is_done_and_ends_with_3():
         check=False,
     )
     assert (ran.returncode, ran.stderr) == (3, "")
-    assert "not run, interrupted: c-lm" in ran.stdout
+    assert "not run (interrupted): c-lm" in ran.stdout
     folder = Path("runs/fits")
     stored = json.loads((folder / "fits.json").read_text())
     done, stopped = (entry["outcome"] for entry in stored["runs"])

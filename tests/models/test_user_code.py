@@ -100,7 +100,7 @@ def test_a_file_without_parameters_is_refused_before_the_model_is_run(case, comm
     assert run("fit", case, "-o", "run-1", "--no-plots", "--quiet") == 0
     (case.parent / "mine.py").write_text(SOURCE.read_text() + trap(case.parent))
     (case.parent / "run-1" / "parameters.yaml").unlink()
-    file, fault = "run-1/result.json", "holds no parameters.yaml of a fit"
+    file, fault = "run-1/result.json", "contains no parameters.yaml of a fit"
     if text is not None:
         (case.parent / "other.yaml").write_text(text)
         file, fault = "other.yaml", "parameters: missing"

@@ -70,7 +70,7 @@ def test_what_drove_a_simulation_is_drawn_above_what_came_of_it():
     ]
     assert legends == [["measured", "not compared", "simulated"], ["measured", "simulated"]]
     titles = [axes.get_title(loc="right") for axes in figure.axes]
-    assert titles[0] == "recorded vt, played in; from rest by +0.05 pu at 1 s"
+    assert titles[0] == "recorded vt, played in; deviation +0.05 pu at 1 s"
     assert titles[2] == "recorded vs, played in"
     assert plots.png(figure).startswith(PNG)
 

@@ -324,7 +324,7 @@ def test_an_interruption_while_drawing_leaves_the_numbers_and_nothing_half(twice
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plots, "trajectories", interrupted)
-    with pytest.raises(KeyboardInterrupt, match="the numbers are whole, figures are missing"):
+    with pytest.raises(KeyboardInterrupt, match="all numbers are written, figures are missing"):
         run_folder.write_fit(result, folder).draw()
     assert names(folder) < FILES_OF_A_FIT
     assert value_in(folder) == 7.0

@@ -87,7 +87,7 @@ def test_a_fault_is_reported_once_with_what_to_do(tmp_path, fault):
 @pytest.mark.parametrize(
     ("fitted", "validated", "common"),
     [
-        (None, None, "the whole of record.csv"),
+        (None, None, "all of record.csv"),
         ([0.0, 4.0], None, "0 ... 4 s"),
         ([0.0, 4.0], [0.5, 5.0], "0.5 ... 4 s"),
         ([0.0, 2.5], [2.5, 5.0], None),

@@ -24,7 +24,7 @@ def of_rest(notes):
 
 def test_an_unstable_rest_is_noted_with_its_eigenvalue(case):
     (note,) = of_rest(simulate(case, UNSTABLE).notes)
-    assert "eigenvalue 2.44 ± 24.8j 1/s: an oscillation of 3.95 Hz grows by e in 0.41 s" in note
+    assert "eigenvalue 2.44 ± 24.8j 1/s: an oscillation of 3.95 Hz grows e-fold in 0.41 s" in note
     assert of_rest(simulate(case).notes) == []
 
 
@@ -47,5 +47,5 @@ def test_a_voltage_that_no_unit_has_is_noted_with_its_instant(case):
 
 def test_a_step_that_is_too_long_is_noted(case):
     coarse = replace(case, simulation=case.simulation.model_copy(update={"step": 0.05}))
-    assert any("halving the step of 0.05 s moves vt" in note for note in simulate(coarse).notes)
+    assert any("halving the step of 0.05 s changes vt" in note for note in simulate(coarse).notes)
     assert not any("halving" in note for note in simulate(case).notes)

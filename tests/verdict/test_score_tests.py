@@ -106,7 +106,7 @@ def test_the_scores_of_noise_are_chi_square(evidence):
 @pytest.mark.parametrize(
     ("of_case", "words"),
     few_of(
-        [({"step": 0.0499}, "the step of +0.0499 pu"), ({"at": 1.004}, "the instant of the step")],
+        [({"step": 0.0499}, "the step of +0.0499 pu"), ({"at": 1.004}, "the time of the step")],
         1,
     ),
     ids=str,

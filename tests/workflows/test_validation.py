@@ -187,7 +187,7 @@ def test_spikes_that_condemn_a_good_model_are_named():
 def test_a_record_without_a_step_is_refused_and_the_message_says_what_to_give():
     samples = np.random.default_rng(3).normal(1.0, 1e-4, 400)
     record = Record.from_arrays(0.01 * np.arange(400), {"vt": samples})
-    with pytest.raises(RecordError, match=r"no step found .* --step SIZE and --at INSTANT"):
+    with pytest.raises(RecordError, match=r"no step found .* --step SIZE and --at TIME"):
         validate(case_of("ac1a_typical"), TRUTH["ac1a_typical"], record)
 
 

@@ -67,7 +67,7 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
     for own, (name, signal) in zip(axes[:above], driving.items(), strict=True):
         own.plot(*envelope(comparison.time, signal.samples), "-", color=START, linewidth=1.1)
         own.set_ylabel(f"{name} ({signal.unit})")
-        departs = signal.excursion and f"; from rest by {signal.excursion.text(signal.unit)}"
+        departs = signal.excursion and f"; deviation {signal.excursion.text(signal.unit)}"
         own.set_title(f"recorded {name}, played in{departs or ''}", fontsize=9, loc="right")
         tidy(own)
     for k, name in enumerate(comparison.overlays):

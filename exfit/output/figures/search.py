@@ -254,7 +254,7 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     column[-1].set_xlabel("time (s)")
     handles, texts = column[0].get_legend_handles_labels()
     figure.legend(handles, texts, loc="outside right upper", frameon=False)
-    figure.suptitle(f"{title}: what each parameter does to the response", fontsize=11)
+    figure.suptitle(f"{title}: effect of each parameter on the response", fontsize=11)
     return figure
 
 
@@ -281,7 +281,7 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     bar.imshow(shades, cmap=COLOUR_MAP, aspect="auto", extent=(0.0, 1.0, -1.0, 1.0), origin="lower")
     bar.set_xticks([])
     bar.set_ylabel("correlation of the estimates")
-    figure.suptitle(f"{title}: which parameters move together", fontsize=11)
+    figure.suptitle(f"{title}: correlation of the parameters", fontsize=11)
     return figure
 
 
@@ -322,7 +322,7 @@ def profiles(profiled: Profiles) -> Figure:
     figure.supylabel("rise of the cost / rise at the 95 % limit", fontsize=10)
     why = profiled.verdict.misfit
     figure.suptitle(
-        f"{profiled.name}: the cost along each parameter, the others fitted"
+        f"{profiled.name}: cost along each parameter, the others fitted"
         f"{f'; no interval: {why}' if why else ''}",
         fontsize=11,
     )

@@ -77,7 +77,7 @@ def _other_scale(
     if found < 0.0:
         cause = Cause(f"{place} is inverted{starts}", "check the polarity; scale: -1 turns it")
     elif is_wrong_base(signal, found) and (not with_voltage or nearer_to_rated(levels, trial)):
-        text = f"the base of {place}{starts}; times {found:.4g} it would match"
+        text = f"the base of {place}{starts}; values {found:.4g} times as large would match"
         cause = Cause(text, CHECK_BASE)
     else:
         return

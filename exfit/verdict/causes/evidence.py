@@ -87,7 +87,11 @@ class Pace:
         """Causes that were not tried, with the reason; "" where all were."""
         if not self.untried:
             return ""
-        why = "interrupted" if self.interrupted else f"beyond estimate.causes, {self.seconds:.3g} s"
+        why = (
+            "interrupted"
+            if self.interrupted
+            else f"time limit estimate.causes, {self.seconds:.3g} s"
+        )
         return f"not tried as causes ({why}): {', '.join(self.untried)}"
 
 

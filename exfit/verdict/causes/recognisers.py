@@ -35,7 +35,7 @@ WITHOUT_TRIAL: Mapping[str, Recogniser] = {
 BY_TRIAL: Mapping[str, Recogniser] = {
     "sign of the step": wrong_sign,
     "size of the step": wrong_size,
-    "instant of the step": wrong_instant,
+    "time of the step": wrong_instant,
     "base of a channel": wrong_scale,
     "zero of a channel": wrong_offset,
     "vt0": wrong_start,

@@ -122,7 +122,7 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
         rate = 1.0 / float(median(np.diff(own.time)))
         cycles = [mains / rate for mains in MAINS]
         folded = any(abs(each - round(each)) < FOLDED and each > 0.5 for each in cycles)
-        folding = ", or ripple of the mains that its sampling folds," if folded else ""
+        folding = ", or aliased ripple of the mains," if folded else ""
         cause = Cause(
             f"a drift{'' if of_event else folding} of "
             f"{own.channel.signal}{evidence.name_of(own.number)}: {change:+.1e} pu from start to "

@@ -48,7 +48,7 @@ def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"the record{evidence.name_of(number)} goes the other way ({way:+.2g} pu) than the "
             "response",
-            "turn the sign of the step, or check the polarity of vt",
+            "reverse the sign of the step, or check the polarity of vt",
         )
         yield from tried(evidence, with_experiment(evidence.residuals, number, turned), cause)
 
@@ -114,14 +114,13 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
         late = trial.values["cause.delay"] - delay
         size = f"{1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'}"
         cause = Cause(
-            f"the instant of the step{of_record}, or a delay of the recorder: the record is {size} "
+            f"the time of the step{of_record}, or a delay of the recorder: the record is {size} "
             "than the case",
             correct_instant(delay + late),
         )
         if evidence.case.kind.finds_rest:
             cause = Cause(
-                f"the clocks: what is compared{of_record} is recorded {size} than what drives the "
-                "unit",
+                f"the clocks: the compared channels{of_record} are {size} than the driving ones",
                 "put all channels on one clock, or let the fit find it: "
                 f"{delay_found(delay + late, FARTHEST_DELAY)}; phasors and powers may be "
                 "filtered differently",

@@ -235,7 +235,7 @@ def typical_values(evidence: Evidence) -> Iterator[Suspicion]:
     moved = moved_parameters(first, evidence.values)
     cause = Cause(
         f"{first_of(names)} {'is' if len(names) == 1 else 'are'} typical: if {names[0]} "
-        f"({first.value:g}) were {100.0 * DEVIATION:g} % off, that would move {moved}",
+        f"({first.value:g}) were {100.0 * DEVIATION:g} % off, it would change {moved}",
         "give the unit's own values, and say under sources where they come from",
     )
     yield Suspicion(cause, LAST)

@@ -171,7 +171,7 @@ def test_a_file_that_exists_is_kept_unless_forced(run, fitted, command):
     Path("taken").write_text("mine")
     code, _, err = run(command, source, "-o", "taken")
     assert code == 1
-    assert err == "Error: taken: exists already; --force writes over it\n"
+    assert err == "Error: taken: exists already; --force overwrites it\n"
     assert Path("taken").read_text() == "mine"
     assert run(command, source, "-o", "taken", "--force")[0] == 0
     assert Path("taken").read_text() != "mine"

@@ -137,7 +137,7 @@ def test_the_planner_s_own_file_and_files_that_exist_are_kept(run, fleet):
     assert "is the planner's own file" in ran.err
     Path("fitted.csv").write_text("mine")
     ran = run("export", "--all", fleet, "-o", "fitted.dyr")
-    assert "fitted.csv: exists already; --force writes over it" in ran.err
+    assert "fitted.csv: exists already; --force overwrites it" in ran.err
     assert not Path("fitted.dyr").exists()
 
 
