@@ -23,23 +23,22 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Run all tests of a unit, each feeding the later ones.")
 @click.argument("programme", type=GivenFile(Kind.CASE))
-@click.option("--again", is_flag=True, help="Run every test, whatever is kept of an earlier run.")
+@click.option("--again", is_flag=True, help="Run every test again, even if its result is kept.")
 @progress_option
 @output_options
 def run(programme: Path, again: bool, output: Output) -> None:
     """Run the tests of PROGRAMME in the order in which one feeds the next.
 
-    Saturation tests come first, then points on load, then tests that determine data of the machine:
-    what they measured enters the tests after them, with its source. Last all bump tests are fitted
-    together. A case is the programme of one test.
+    Saturation tests come first, then points on load, then tests that determine data of the machine.
+    Their results are passed on to the later tests, with their source. Last, all bump tests are
+    fitted together. A case is a programme of one test.
 
-    Writes a folder for each test to runs/PROGRAMME-run, or to DIR, and beside them programme.json
-    and one report.html. A test that is done there is not run again unless its section, its files,
-    the values that enter it or exfit have changed since: after an interruption, whatever it was,
-    the next run goes on with the rest.
+    Writes a folder for each test, programme.json and one report.html to runs/PROGRAMME-run, or to
+    DIR. A finished test is run again only if its section, its files, the values passed on to it or
+    exfit have changed: after an interruption the next run continues with the rest.
 
-    Exit code 0: every test is matched; 1: bad input, or a test that failed; 3: a test that is not
-    matched, a validation that is not accepted, or not all tests are run.
+    Exit code 0: every test is matched; 1: bad input, or a test failed; 3: a test is not matched, a
+    validation is not accepted, or not all tests were run.
     """
     from exfit.features.programme import folder as programme_folder
     from exfit.features.programme import programme_terminal
@@ -65,7 +64,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
     else:
         result = run_programme(loaded, folder, again, keep=programme_folder.write_test)
     if result.interrupted and not result.tests:
-        raise Interruption("no test is done")
+        raise Interruption("no test is finished")
     try:
         programme_folder.write_programme(result, folder)
         if not result.interrupted:
@@ -92,7 +91,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
 
 
 def check(path: Path) -> bool:
-    """Check each test of a programme and show what comes of it; False: something speaks against."""
+    """Check each test of a programme and show the result; False: a test has a fault."""
     from exfit.features.programme import programme_blocks
     from exfit.features.programme.programme import load_programme
     from exfit.features.programme.run import check_programme

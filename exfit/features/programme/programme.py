@@ -1,6 +1,6 @@
 """A programme: all tests of a unit in one file, checked like a case; its steps and its cases.
 
-A case of a programme is what a fit of it would have as a case file of its own.
+A case of a programme is the case file that a fit of it alone would have.
 """
 
 from collections.abc import Iterator, Mapping
@@ -307,7 +307,7 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
     yield from name_faults(tests)
     bumps = [test for test in tests if test.content.get("kind", BUMP) == BUMP]
     if bumps and all(test.at("use").text == "validate" for test in bumps):
-        yield bumps[0].at("use").fault("no bump test is fitted that it could validate")
+        yield bumps[0].at("use").fault("no bump test is fitted: nothing to validate")
     if any(test.at("kind").text == SATURATION for test in tests):
         content = with_bases(content, BASES_TO_COME)
     yield from _machine_faults(ContentNode((), content))

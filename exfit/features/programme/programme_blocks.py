@@ -78,7 +78,7 @@ def _at_rest(test: FinishedTest) -> Iterator[Block]:
 
 
 def values_table(values: Sequence[EnteredValue]) -> Table:
-    """Make the table of values that tests gave, each beside the one of the file."""
+    """Make the table of values that tests gave, each with the value in the file."""
     rows = []
     for value in values:
         known = value.given is not None
@@ -105,7 +105,7 @@ def values_table(values: Sequence[EnteredValue]) -> Table:
         TableColumn("in the file"),
         TableColumn("used"),
     )
-    return Table(heads, tuple(rows), "values that tests gave to those after them")
+    return Table(heads, tuple(rows), "values passed on to later tests")
 
 
 def saturation(result: SaturationResult) -> Iterator[Block]:
@@ -120,7 +120,7 @@ def saturation(result: SaturationResult) -> Iterator[Block]:
         ("resistance of the field", result.resistance, f"{result.efd_unit}/{unit}"),
         ("S(1.0)", curve.S10, "pu"),
         ("S(1.2)", curve.S12, "pu"),
-        ("field current beside a line through zero", curve.offset, "pu"),
+        ("offset of the field current", curve.offset, "pu"),
         ("hysteresis, rising less falling", curve.hysteresis, "pu"),
         (
             "residual voltage",
@@ -141,7 +141,7 @@ def saturation(result: SaturationResult) -> Iterator[Block]:
     rows = []
     for each in result.curves:
         cells = (value.rounded(value.value) for value in (each.ifd_base, each.S10, each.S12))
-        words = ["used"] * (each.form == result.form) + ["refuted"] * each.refuted
+        words = ["used"] * (each.form == result.form) + ["rejected"] * each.refuted
         rows.append(row(each.form, *cells, f"{each.rms:.2g}", ", ".join(words)))
     forms = (f"base ({unit})", "S(1.0)", "S(1.2)", "rms (pu)")
     yield Table(columns("form", *forms, "", numbers=forms), tuple(rows), "forms of the curve")

@@ -69,7 +69,7 @@ def _overview(result: ProgrammeResult) -> Iterator[Block]:
         rows.append(row(test.name + tests, test.kind, test.verdict, test.reason, mark=mark))
     rows += [row(name, "", "failed", why, mark="doubt") for name, why in result.failed.items()]
     heads = (*columns("test", "kind", "verdict"), TableColumn("why", folds=True))
-    yield Table(heads, tuple(rows), "Tests in the order in which one feeds the next")
+    yield Table(heads, tuple(rows), "Tests in their order")
     if result.values:
         yield values_table(result.values)
     yield from remarks("", result.warnings, "", "warning")

@@ -59,11 +59,11 @@ class FittedCurve:
 
     ifd_base   field current that gives 1 pu on the air-gap line, in the unit of the points
     S10, S12   saturation at 1.0 and 1.2 pu: excess of the field current over the air-gap line
-    offset     field current by which the points lie beside a line through zero, pu: the mean of
+    offset     field current by which the points lie off a line through zero, pu: the mean of
                the branches
     hysteresis  field current of the rising less that of the falling branch, pu; None with one
     rms        of the residuals, pu of ifd_base
-    refuted    whether another form fits so much better that this one is none of the curve's
+    refuted    whether another form fits so much better that this one is rejected
     extrapolated  the levels of S10 and S12 that lie beyond the highest point, pu
     vt, ifd    the mean curve (K,), pu; low and high its 95 % band
     """
@@ -152,15 +152,15 @@ class SaturationResult:
     def verdict(self) -> Verdict:
         """The verdict: good only if the form is that of the points, and all is measured.
 
-        A form that another one refutes matches as long as its residuals are within the limit: the
-        intervals hold the values of the other.
+        A form that another one rejects matches as long as its residuals are within the limit: the
+        intervals include the values of the other.
         """
         curve, best = self.curve, self.curves[0]
         ifd = np.delete(self.ifd, self.left_out) / curve.ifd_base.value
         limit = LARGEST_SHARE * float(np.sqrt(np.mean(ifd**2)))
         if curve.rms > limit:
-            beside = f"{curve.rms:.2g} pu rms beside a curve of form {curve.form}"
-            return Verdict(NO_MATCH, f"the points lie {beside}, beyond {limit:.2g} pu")
+            off = f"{curve.rms:.2g} pu rms off a curve of form {curve.form}"
+            return Verdict(NO_MATCH, f"the points lie {off}, beyond {limit:.2g} pu")
         doubts = []
         values = {"the base of ifd": curve.ifd_base, "S10": curve.S10, "S12": curve.S12}
         names = [name for name, value in values.items() if not value.determined]
@@ -169,7 +169,7 @@ class SaturationResult:
         if curve.refuted:
             doubts.append(
                 f"form {curve.form} leaves {curve.rms:.2g} pu rms, {best.form} {best.rms:.2g}: "
-                "the intervals hold the values of both"
+                "the intervals include the values of both"
             )
         if curve.extrapolated:
             levels = listed([f"S({level:.1f})" for level in curve.extrapolated])

@@ -64,7 +64,7 @@ def run(
         folder: keeps the result of each test as soon as it is there. A test whose result is there
             already is not run again, unless its section, its files, the values that enter it or
             exfit have changed since. None: nothing is kept.
-        again: runs all tests, whatever is kept.
+        again: runs all tests again, also those whose result is kept.
         progress: called with the test that runs and its iteration, or how far its search from
             further starts is; None as it begins.
         finished: called with every test that has ended.
@@ -149,7 +149,7 @@ def finished_test(
         result = _result_of(programme, step, values, partial(progress, step), settings)
         if isinstance(result, FitResult) and not result.interrupted:
             inputs = {**result.inputs, KEY: key}
-            files = {**result.files, KEY: "all that goes into it"}
+            files = {**result.files, KEY: "all its inputs"}
             result = replace(result, inputs=inputs, files=files)
     elif isinstance(result, FitResult):  # with what the file says now beside its tests
         inputs = dict(result.inputs)

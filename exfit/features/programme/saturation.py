@@ -444,10 +444,10 @@ def _curve_of(fit: FormFit, best: FormFit) -> FittedCurve:
 def _beside_others(
     curve: FittedCurve, curves: Sequence[FittedCurve], highest: float
 ) -> FittedCurve:
-    """Return a curve that is no surer than the points are of their form, the best match first.
+    """Widen the intervals of a curve by the uncertainty of its form; ``curves`` by their match.
 
-    The intervals of a form that the points refute hold what the best one has; those of the
-    saturation beyond the highest point what all have that the points do not refute.
+    The intervals of a form that the points reject include the values of the best one; those of the
+    saturation beyond the highest point include those of all forms that are not rejected.
     """
     fitting = [other for other in curves if not other.refuted]
     rivals = curves[:1] if curve.refuted else []
@@ -471,7 +471,7 @@ def _widened(own: MeasuredValue, others: Sequence[MeasuredValue]) -> MeasuredVal
 def _hot_resistance(ifd: Array, efd: Array | None, winding: FieldWinding) -> MeasuredValue | None:
     """Return the resistance of the hot field winding, given or as the slope of efd over ifd.
 
-    The line need not pass through zero: brushes take a voltage of their own.
+    The line need not pass through zero: brushes have a voltage drop.
     """
     if winding.resistance is not None:
         resistance = winding.resistance * winding.rise
@@ -510,8 +510,8 @@ def _notes(result: SaturationResult) -> Iterator[str]:
     if used.hysteresis is None:
         going = "rising" if np.delete(result.direction, result.left_out)[0] > 0.0 else "falling"
         yield (
-            f"hysteresis cannot be seen: all points were taken with {going} voltage; the numbers "
-            "are those of this branch, moved through zero"
+            f"hysteresis cannot be seen: all points were taken with {going} voltage; the values "
+            "are those of this branch, shifted through zero"
         )
     low = int(np.sum(vt < AIR_GAP_END))
     if low < FEWEST_LOW_POINTS:
@@ -526,7 +526,7 @@ def _notes(result: SaturationResult) -> Iterator[str]:
             f"the points are not on a curve of form {used.form} (rms {used.rms:.2g} pu); "
             f"{best.form} (rms {best.rms:.2g} pu) has S(1.0) {best.S10.value:.3g}, S(1.2) "
             f"{best.S12.value:.3g} and a base of {best.ifd_base.value:.4g} {result.unit}, which "
-            "the intervals hold"
+            "the intervals include"
         )
     elif others:
         yield f"the points do not distinguish {used.form} from {listed(others)}"
@@ -541,8 +541,8 @@ def _of_range(curve: FittedCurve, highest: float) -> Iterator[str]:
             yield f"{name} is not determined: {end}"
         elif level in curve.extrapolated:
             yield (
-                f"{name} is extrapolated: {end}; the interval holds what all forms have there that "
-                "the points do not refute"
+                f"{name} is extrapolated: {end}; the interval includes its value by each form that "
+                "the points do not reject"
             )
     if not curve.ifd_base.determined:
         yield "the air-gap line is not determined by the points"
@@ -554,6 +554,6 @@ def _outlier(result: SaturationResult) -> Iterator[str]:
     if abs(residuals[farthest]) > FAR_FROM_CURVE * result.curve.rms:
         yield (
             f"point {farthest + 1} ({result.vt[farthest]:.3g} pu, {result.ifd[farthest]:.4g} "
-            f"{result.unit}) lies {abs(residuals[farthest]):.2g} pu of field current beside the "
-            "curve: a misreading?"
+            f"{result.unit}) lies {abs(residuals[farthest]):.2g} pu of field current off the "
+            "curve: check the reading"
         )

@@ -212,7 +212,7 @@ def v_curve(
         std_errors: of machine data by symbol, and of bases such as ``ifd.base`` (in their unit):
             the intervals allow for them.
 
-    Raises RecordError for a point at which the model has no rest.
+    Raises RecordError for a point at which the model has no steady state.
 
     Source: IEEE Std 115, cf. the saturation curves and the excitation on load; the model's
     equations are those of its dynamics at rest.
@@ -220,7 +220,7 @@ def v_curve(
     ifd = field_on_load(machine, data, points.p, points.q, points.vt)
     for row in np.flatnonzero(~np.isfinite(ifd))[:1]:
         place = f"p {show(points.p[row])}, q {show(points.q[row])}, vt {show(points.vt[row])} pu"
-        raise RecordError(f"point {row + 1} ({place}): the machine has no rest there")
+        raise RecordError(f"point {row + 1} ({place}): the machine has no steady state there")
     fields = FieldsOnLoad(machine, points)
     problem = fields.problem(data, free)
     fit = None

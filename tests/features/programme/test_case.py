@@ -140,7 +140,7 @@ def test_all_faults_of_a_programme_come_together(loaded):
 def test_a_validation_needs_a_test_that_is_fitted(loaded):
     content = json.loads(json.dumps(PROGRAMME))
     content["tests"] = content["tests"][:1]
-    text = "tests[0].use: no bump test is fitted that it could validate"
+    text = "tests[0].use: no bump test is fitted: nothing to validate"
     assert faults_of(loaded, content) == [text]
 
 

@@ -54,7 +54,7 @@ def test_its_table_has_a_line_for_each_test_and_fits_the_terminal(run, place, co
     assert [line.split()[0] for line in lines[:7]] == ["test", *STEPS, "up", "down"]
     assert [line.split()[-1] for line in lines[1:5]] == ["kept"] * 4
     assert max(map(len, lines)) <= columns
-    for words in ("values that tests gave", "machine.S10", "written to out"):
+    for words in ("values passed on to later tests", "machine.S10", "written to out"):
         assert words in ran.out
 
 

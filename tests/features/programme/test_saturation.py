@@ -118,7 +118,7 @@ def test_a_curve_on_points_that_determine_it_is_good():
     assert saturation_curve(*noisy_loop()).verdict.verdict == GOOD
 
 
-def test_a_form_that_another_refutes_is_not_good_and_the_verdict_names_both():
+def test_a_form_that_another_rejects_is_not_good_and_the_verdict_names_both():
     verdict = saturation_curve(*noisy_loop("quadratic"), "exponential-se").verdict
     assert verdict.verdict == MATCHES
     assert "form exponential-se leaves" in verdict.reason
@@ -137,7 +137,7 @@ def test_points_that_lie_far_beside_their_curve_do_not_match_it():
     scattered = ifd * (1.0 + 0.1 * np.resize([1.0, -1.0], len(ifd)))  # five times the limit
     result = saturation_curve(vt, scattered)
     assert result.verdict.verdict == NO_MATCH
-    assert "pu rms beside a curve of form quadratic, beyond" in result.verdict.reason
+    assert "pu rms off a curve of form quadratic, beyond" in result.verdict.reason
     for value in (result.curve.ifd_base, result.curve.S10, result.curve.S12):
         assert (value.interval, value.why) == ((None, None), result.verdict.no_interval)
 
