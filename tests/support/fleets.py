@@ -31,7 +31,7 @@ VERDICTS = (
 )
 FAILURES = (
     ("failed", "plant.machine_parameters.Tpd0: 0 must be above 0"),
-    ("timed out", "no end after 300 s"),
+    ("timed out", "not finished after 300 s"),
     ("crashed", "the process ended by signal 11"),
     ("refused", "avr.py: code of a case runs in a batch only with --trust"),
     ("no record", "the case has no record: nothing to fit"),

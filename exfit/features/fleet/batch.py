@@ -64,7 +64,7 @@ class BatchObserver:
         """A worker begins the fit of a case."""
 
     def finished(self, summary: CaseSummary) -> None:
-        """A case has come to its end, whatever it is: done, failed, refused, no record ..."""
+        """A case has ended: done, failed, refused, no record ..."""
 
 
 def batch(
@@ -105,9 +105,9 @@ def batch(
         retry_failed: fits again what failed, crashed, or took too long.
         trust: runs the code of cases whose model is a file of Python or whose plant is a command.
         time_limit: of a case, s; inf: none.
-        strategy: of the descent from the start of each case; None: the case's own.
-        search: "global" or "local"; None: the case's own.
-        observer: is told how the batch goes on.
+        strategy: of the local optimisation of each case; None: that of the case.
+        search: "global" or "local"; None: that of the case.
+        observer: is called as the batch proceeds.
         further: make files of each result, to lie beside those of every fit; as they travel to
             workers they are functions of a module.
         compute: has the cases fitted in another way than in processes of this computer.
@@ -164,13 +164,13 @@ def _refuse(
         faults.append(f"time limit: {time_limit:g} s must be above 0")
     for word, given, known in (("strategy", strategy, STRATEGIES), ("search", search, SEARCHES)):
         if given is not None and given not in known:
-            faults.append(f"{word}: {given} is none; {near(given, known)}")
+            faults.append(f"{word}: {given} is unknown; {near(given, known)}")
     if faults:
         raise ExfitError("\n".join(faults))
 
 
 class BatchRun:
-    """A run over some cases, by their names: it keeps what they come to, and announces it."""
+    """A run over some cases, by their names: it keeps their outcomes, and announces them."""
 
     def __init__(
         self,
@@ -240,7 +240,7 @@ class BatchRun:
         self.observer.finished(row)
 
     def _note_the_others(self) -> None:
-        """Enter the cases that were not even planned when the run came to an early end."""
+        """Enter the cases that were not even planned when the run ended early."""
         for name in self.files:
             if not has_entry(self.folder, name):
                 write_entry(self.folder, IndexEntry(name))

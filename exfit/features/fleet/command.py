@@ -51,8 +51,8 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     "--workers",
     type=click.IntRange(min=0),
     metavar="N",
-    help="Processes at work, with one thread each (default: as many as there are processors); "
-    "0: in this process, without a time limit.",
+    help="Worker processes, one thread each (default: one for each processor); 0: in this process, "
+    "without a time limit.",
 )
 @click.option(
     "--scheduler",
@@ -64,7 +64,7 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     callback=_part,
     default="1/1",
     metavar="3/40",
-    help="Fit this share of the cases only: 1/40 to 40/40, on any computers that see DIR, fit all.",
+    help="Fit only this share of the cases; 1/40 to 40/40, on computers that share DIR, fit all.",
 )
 @click.option(
     "--retry",
@@ -117,15 +117,14 @@ def batch(
     A table, CSV or a workbook, lists records with what is known of each; the rows of a unit become
     a case in DIR/cases, as `exfit new` makes it. A programme is one case: `exfit run` runs it.
 
-    Each case is fitted as `exfit fit` does it, in worker processes. Its files lie in a folder of
-    DIR that is named after a hash of all that goes into the fit: the case, its records, its model
-    file, the options, the version of exfit. What is there is not fitted again, so that the same
-    command goes on after an interruption, whatever it was, and with what has changed. Ctrl-C stops
-    all at once and keeps what is done.
+    Each case is fitted as by `exfit fit`, in worker processes. Its files are in a folder of DIR,
+    named after a hash of all inputs of the fit: the case, its records, its model file, the
+    options, the version of exfit. What is there is not fitted again: after an interruption or a
+    change, the same command continues. Ctrl-C stops at once and keeps what is finished.
 
     A case that cannot be read, fails, crashes or does not end is a row with its reason, and the
-    others go on; it is tried again with --retry failed. A case whose model is a file of Python,
-    or whose plant is a command, is run with --trust only.
+    others continue; --retry failed fits it again. A case whose model is a file of Python, or whose
+    plant is a command, runs only with --trust.
 
     With --scheduler the workers of a Dask cluster fit the cases: they need exfit in the versions of
     this computer, but none of its files. The package distributed comes with exfit[cluster].

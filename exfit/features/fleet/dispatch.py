@@ -73,7 +73,7 @@ def connected(address: str) -> Iterator["Client"]:
         text = 'needs the package distributed: pip install "exfit[cluster]"'
         raise ClusterError(f"--scheduler: {text}") from None
     with _silent(), dask.config.set(SETTINGS):
-        with ThreadPoolExecutor(1) as apart:  # a notebook has a loop of its own in this thread
+        with ThreadPoolExecutor(1) as apart:  # a notebook has its loop in this thread
             kind = apart.submit(lambda: asyncio.run(_kind_at(address))).result()
         if kind != "Scheduler":
             text = f"a {kind} of Dask, not a scheduler" if kind else "not a scheduler of Dask"
@@ -339,7 +339,7 @@ class Dispatch:
         if self.losses[name] < MOST_LOSSES:
             self.waiting.add(sent.case)
         else:
-            reason = f"its worker was lost {MOST_LOSSES} times in the middle of it"
+            reason = f"its worker was lost {MOST_LOSSES} times while fitting it"
             self._fail(sent.case, "crashed", reason)
 
     def _fail(self, case: PlannedCase, kind: FailureKind, reason: str) -> None:
@@ -411,7 +411,7 @@ class Dispatch:
         except (FutureCancelledError, KilledWorker, OSError):
             self._take_back(key)
         except Exception as fault:
-            self.refused[sent.worker] = f"can fit no case: {type(fault).__name__}: {fault}"
+            self.refused[sent.worker] = f"cannot fit any case: {type(fault).__name__}: {fault}"
             self._lose(sent.worker)
         else:
             del self.sent[key]
@@ -430,7 +430,7 @@ class Dispatch:
         if self.deaths[case.entry.case] < MOST_DEATHS:
             self.waiting.add(case)
         else:
-            self._fail(case, "crashed", f"{reply.death}; so it was {MOST_DEATHS} times")
+            self._fail(case, "crashed", f"{reply.death}, {MOST_DEATHS} times")
 
 
 def _in_worker() -> Callable[[bytes], Any]:

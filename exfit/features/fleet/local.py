@@ -42,7 +42,7 @@ ONE_THREAD = (THREADS, "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREA
 NO_PLUGINS = {"PYDANTIC_DISABLE_PLUGINS": "__all__"}  # else all packages are searched for some
 TO_END = 5.0  # s: for a process without its pipe, and for the thread that listens to it
 
-# whether a case is to be fitted still, as a worker is about to begin it; and what it came to
+# whether a case is to be fitted still, as a worker is about to begin it; and its outcome
 Begin = Callable[[PlannedCase], bool]
 End = Callable[[PlannedCase, CaseOutcome], None]
 # fits the cases of an iterator, and calls these two from the thread that it is called in
@@ -125,10 +125,10 @@ class WorkerProcess:
 
 @contextmanager
 def signals_held_back() -> Iterator[None]:
-    """Let processes that are started inside have what interrupts a program held back, for good.
+    """Block the signals that interrupt a program, also in processes started inside.
 
     A terminal sends Ctrl-C, and its own end, to all of its processes; only the batch shall act on
-    it. Windows has no such mask: there the process is in a group of its own, which Ctrl-C does not
+    it. Windows has no such mask: there the process is in a separate group, which Ctrl-C does not
     reach.
     """
     if sys.platform == "win32":
@@ -226,7 +226,7 @@ class Pool:
             now = time.monotonic()
             for worker in [*self.workers]:
                 if worker.began is not None and now - worker.began > self.time_limit:
-                    reason = f"no end after {self.time_limit:g} s"
+                    reason = f"not finished after {self.time_limit:g} s"
                     self._dismiss(worker)
                     self._fail(worker, Failure("timed out", reason, self.time_limit))
             self._employ()

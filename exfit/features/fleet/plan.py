@@ -64,7 +64,7 @@ def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
     if missing:
         raise FileError(missing)
     if not paths:
-        raise ExfitError(f"{', '.join(map(str, given))}: no case (*.yaml) in there")
+        raise ExfitError(f"{', '.join(map(str, given))}: no case (*.yaml) there")
     return tuple(paths.values())
 
 
@@ -140,7 +140,7 @@ def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool)
     code += [f"command {word}" for word in command_of(content)[:1]]
     code += [f"FMU {file}" for file in fmu_of(content)]
     if code and not trust:
-        return f"{', '.join(code)}: code that the case names; it is run with --trust only"
+        return f"{', '.join(code)}: code named by the case: it runs only with --trust"
     return ""
 
 

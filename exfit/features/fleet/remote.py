@@ -68,7 +68,7 @@ class PackedFile:
         except zlib.error as fault:
             raise ExfitError(f"{self.path}: damaged on its way to the worker: {fault}") from None
         if hashlib.sha256(content).hexdigest() != self.sha256:
-            raise ExfitError(f"{self.path}: damaged on its way to the worker: another SHA-256")
+            raise ExfitError(f"{self.path}: damaged on its way to the worker: its SHA-256 differs")
         return content
 
 
@@ -105,7 +105,7 @@ def bundle_of(paths: Sequence[Path]) -> Bundle:
         except (OSError, ValueError) as fault:
             raise ExfitError(f"{path}: cannot be read: {why_unreadable(fault)}") from None
         if files.setdefault(place, file) != file:
-            raise ExfitError(f"{path}: another file than {place}: a link is before the dots")
+            raise ExfitError(f"{path}: is not {place}: a link stands before ..")
     return Bundle(str(paths[0]), str(Path.cwd()), tuple(files.values()))
 
 
@@ -243,7 +243,7 @@ class Seat:
                 return Reply(_packed(content))
         self.process.dismiss()
         self.gone()
-        failure = Failure("timed out", f"no end after {limit:g} s", limit)
+        failure = Failure("timed out", f"not finished after {limit:g} s", limit)
         return Reply(_packed(CaseOutcome(failure=failure)))
 
     def gone(self) -> str:

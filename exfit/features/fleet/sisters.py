@@ -1,7 +1,7 @@
-"""Sister units, those of the same model, make and rating, beside each other; what stands out.
+"""Similar units, those of the same model, make and rating, side by side; which of them stand out.
 
-Sisters have the same settings, or nearly: one that differs from the others by more than their
-spread and its own interval allow was set, built or recorded otherwise, and is to be looked at.
+Similar units have the same settings, or nearly: one that differs from the others by more than their
+spread and its interval was set, built or recorded differently, and should be examined.
 """
 
 from collections import defaultdict
@@ -19,7 +19,7 @@ from exfit.results.facts import MAKER, MODEL, PLANT, RATED, TYPE, UNIT, stated
 from exfit.results.verdict import WITHOUT_INTERVALS
 
 ERRORS_IN_HALF = NormalDist().inv_cdf(0.975)  # standard errors in half of a 95 % interval
-ALIKE = (MAKER, MODEL, TYPE, RATED)  # facts that sisters share where they are stated
+ALIKE = (MAKER, MODEL, TYPE, RATED)  # facts that similar units share where they are stated
 OUTLIER = "outlier"
 UNDETERMINED = "not determined"
 WITHOUT_INTERVAL = "no interval"  # that was looked for, as without a global search
@@ -36,7 +36,7 @@ def missing_interval(case: CaseSummary, name: str) -> str:
 
 
 class SisterValue(NamedTuple):
-    """A parameter of one of several sisters, with its 95 % interval.
+    """A parameter of one of several similar units, with its 95 % interval.
 
     ``deviation`` from the others is in standard deviations of such a difference, ``probability``
     that of chance alone to let any of them deviate as much; None where that is not known.
@@ -58,13 +58,13 @@ class SisterValue(NamedTuple):
 
     @property
     def is_outlier(self) -> bool:
-        """Whether it differs from those of its sisters."""
+        """Whether it differs from those of similar units."""
         return self.remark == OUTLIER
 
 
 @dataclass(frozen=True)
 class SisterParameter:
-    """A parameter of sisters: their values, in the order of their names.
+    """A parameter of similar units: their values, in the order of their names.
 
     ``centre`` and ``spread`` are the mean and the standard deviation of the units without outliers,
     None where fewer than four are determined.
@@ -104,16 +104,16 @@ class SisterGroup:
 
     @property
     def outliers(self) -> int:
-        """Number of values that differ from those of the sisters."""
+        """Number of values that differ from those of similar units."""
         return sum(v.is_outlier for parameter in self.parameters for v in parameter.values)
 
 
 def sisters(cases: Iterable[CaseSummary]) -> tuple[SisterGroup, ...]:
-    """Return the units that have sisters, by what they share, with their parameters.
+    """Return groups of similar units, by what they share, with their parameters.
 
-    Of a unit with several cases the first that matches its records counts. With four sisters or
-    more outliers are found by `exfit.inference.outliers`; of fewer only those are named whose 95 %
-    intervals do not meet.
+    Of a unit with several cases the first that matches its records counts. With four units or more
+    outliers are detected by `exfit.inference.outliers`; with fewer only those are named whose 95 %
+    intervals do not overlap.
     """
     groups: dict[tuple[str, ...], list[CaseSummary]] = defaultdict(list)
     for case in cases:

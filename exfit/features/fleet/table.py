@@ -70,7 +70,7 @@ def fleet_table(cases: Sequence[CaseSummary]) -> str:
 
 
 def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup]) -> str:
-    """Return the fitted parameters of all cases as CSV, a line for each beside its sisters'."""
+    """Return the fitted parameters of all cases as CSV, each with those of similar units."""
     compared = {
         (value.case, parameter.name): (parameter, value)
         for group in groups

@@ -1,4 +1,4 @@
-"""A batch in the terminal: how far it is while it runs, and what all its cases came to."""
+"""A batch in the terminal: its progress while it runs, then the outcomes of its cases."""
 
 import time
 from collections import Counter
@@ -88,7 +88,7 @@ class BatchProgress(BatchObserver):
 
     @property
     def done(self) -> int:
-        """How many cases have come to their end, those of earlier runs among them."""
+        """How many cases have ended, those of earlier runs among them."""
         return self._kept + self._outcomes.total()
 
     @property
@@ -185,7 +185,7 @@ class BatchEvents(BatchObserver):
 
 
 def batch(console: Console, fleet: Fleet) -> None:
-    """Show what the cases of a batch came to, and which of them need attention."""
+    """Show the outcomes of a batch, and which cases need attention."""
     console.print()
     show(console, _outcomes(fleet))
     console.print()

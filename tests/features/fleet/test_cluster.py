@@ -68,7 +68,7 @@ def test_a_cluster_leaves_the_files_that_this_computer_leaves(user):
     rows = {case.name: case for case in fleet.cases}
     assert rows["hanging"].status == "timed out"
     assert rows["crashing"].status == "crashed"
-    assert "SIGABRT: of the model; so it was 3 times" in rows["crashing"].reason
+    assert "SIGABRT: of the model, 3 times" in rows["crashing"].reason
     Path("cases/hanging.yaml").unlink()
     Path("cases/crashing.yaml").unlink()
     exfit.batch(folder, "here", workers=1, trust=True)

@@ -224,7 +224,7 @@ def test_a_case_whose_process_dies_is_tried_again_and_then_has_crashed(tmp_path)
     assert len(tries) == MOST_DEATHS
     failure = ended.pop("m3").failure
     assert failure.kind == "crashed"
-    assert failure.reason == f"the worker was ended by SIGSEGV; so it was {MOST_DEATHS} times"
+    assert failure.reason == f"the worker was ended by SIGSEGV, {MOST_DEATHS} times"
     assert {outcome.failure.kind for outcome in ended.values()} == {"failed"}
 
 
@@ -274,7 +274,7 @@ def test_a_worker_that_can_fit_nothing_is_used_no_more(tmp_path):
     ended = run.until_done(reply)
     assert len(ended) == 20
     assert {outcome.failure.kind for outcome in ended.values()} == {"failed"}
-    assert run.dispatch.refused == {"a": "can fit no case: NoProcess: no memory"}
+    assert run.dispatch.refused == {"a": "cannot fit any case: NoProcess: no memory"}
 
 
 def test_where_no_worker_is_left_the_batch_ends_with_the_reasons(tmp_path, monkeypatch):
@@ -285,7 +285,7 @@ def test_where_no_worker_is_left_the_batch_ends_with_the_reasons(tmp_path, monke
             client.finish(future, remote.NoProcess("no memory"))
 
     run = Run(client, planned(["m1", "m2"], tmp_path))
-    with pytest.raises(ClusterError, match="worker a: can fit no case: NoProcess: no memory"):
+    with pytest.raises(ClusterError, match="worker a: cannot fit any case: NoProcess: no memory"):
         run.until_done(break_all)
     run = Run(WordyClient(a=1), planned(["m1", "m2"], tmp_path))
     monkeypatch.setattr(dispatch, "WITHOUT_WORKERS", 0.0)

@@ -45,7 +45,7 @@ def folder(tmp_path, result):
     """Return a folder with a case that is done, one that failed, one refused and one not run."""
     outcome = CaseOutcome({"result.json": result_text(result)}, summary_of(result, "a" * 32, 1.5))
     write_outcome(tmp_path, "a" * 32, outcome)
-    failure = CaseOutcome(failure=Failure("timed out", "no end after 60 s", 60.0))
+    failure = CaseOutcome(failure=Failure("timed out", "not finished after 60 s", 60.0))
     write_outcome(tmp_path, "b" * 32, failure)
     entries = [
         IndexEntry("cases/one.yaml", "a" * 32, facts=FACTS),
@@ -77,7 +77,11 @@ def test_a_fleet_has_a_row_for_every_case_of_the_index(folder, result):
     assert done.parameters["k"][1:3] == result.parameters["k"].interval
     assert (done.parameters["k"].source, [*done.fitted]) == ("fitted", ["k", "a"])
     assert done.rmse == {"vt": result.rmse}
-    assert (slow.unit, slow.bus, slow.reason) == ("bus 101, machine 1", 101, "no end after 60 s")
+    assert (slow.unit, slow.bus, slow.reason) == (
+        "bus 101, machine 1",
+        101,
+        "not finished after 60 s",
+    )
     assert read_fleet(folder).counts["done"] == 2
 
 

@@ -54,7 +54,7 @@ def test_the_death_of_a_worker_is_a_row_and_the_rest_goes_on(fleet):
         "large": "crashed",
         "unpicklable": "crashed",
     }
-    assert rows["hanging"].reason == "no end after 6 s"
+    assert rows["hanging"].reason == "not finished after 6 s"
     assert rows["large"].reason.startswith("MemoryError")
     if os.name != "nt":
         assert "ended by SIGKILL" in rows["killed"].reason

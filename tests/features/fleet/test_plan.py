@@ -74,7 +74,7 @@ def test_a_case_has_the_key_of_its_content_and_not_of_its_place(tmp_path, record
     ("content", "status", "reason"),
     [
         ("model: SEXS\nplant: {type: open-circuit}\n", "no record", "the case has no record"),
-        ("model: own.py\nrecord: {file: r.csv}\n", "refused", "own.py: code that the case names"),
+        ("model: own.py\nrecord: {file: r.csv}\n", "refused", "own.py: code named by the case"),
     ],
 )
 def test_a_case_without_a_task_has_a_reason(tmp_path, content, status, reason):
