@@ -62,13 +62,13 @@ def jumps(time: Array, samples: Array) -> Places:
 def rest_end(samples: Array) -> int:
     """Find the first sample of a reference (M,) that is not at rest any more.
 
-    Raises ValueError where it never moves out of its noise, or moves from its first samples on.
+    Raises ValueError where it never leaves its noise, or moves from its first samples on.
     """
     noise, span = scatter(samples), float(np.ptp(samples))
     away = np.abs(samples - median(samples[:FEWEST_SAMPLES]))
     far = np.flatnonzero(away > max(DEPARTURE[0] * span, DEPARTURE[1] * noise))
     if span == 0.0 or not len(far):
-        raise ValueError("never moves out of its noise: there is no test")
+        raise ValueError("never leaves its noise: there is no step")
     near = np.flatnonzero(away[: far[0]] <= max(NEAR_LEVEL[0] * span, NEAR_LEVEL[1] * noise))
     end = int(near[-1]) + 1 if len(near) else 0
     if end < FEWEST_SAMPLES:

@@ -153,7 +153,7 @@ def weight_notes(residuals: Residuals) -> Iterator[str]:
     if len(deviations) > 1 and weighted_by_noise:
         yield (
             "weights balanced: only up to the phase noise; from there the covariance of the noise "
-            "alone weighs the errors"
+            "alone weights the errors"
         )
     elif len(deviations) > 1:
         listed = ", ".join(deviations)

@@ -73,8 +73,8 @@ def with_rest(test: BumpTest, record: Record) -> BumpTest:
                 text = f"{signal}: {fault}; give test.steady_until, or a record that begins earlier"
                 raise RecordError(f"{record.source}: {text}") from None
     if not ends:
-        text = "no signal moves out of its noise: there is no event; test.steady_until says"
-        raise RecordError(f"{record.source}: {text} until when the record is at rest")
+        text = "no signal leaves its noise: there is no event; give test.steady_until"
+        raise RecordError(f"{record.source}: {text}, the end of the rest")
     return test.model_copy(update={"steady_until": min([*ends, *test.instants])})
 
 

@@ -151,7 +151,7 @@ def global_search(
         why_local = "a tolerance of the case ended the run from its start"
     elif searches.unbounded:
         names = ", ".join(searches.unbounded)
-        why_local = f"they are distributed between bounds, and {names} has no min or no max"
+        why_local = f"{names} has no min or no max"
     if why_local:
         alone = _best_of(searches, descents)
         return alone._replace(notes=(*alone.notes, f"no search from further starts: {why_local}"))
@@ -175,7 +175,7 @@ def global_search(
     last = _confirmed(last, doubt, like)
     notes = [*_notes((*descents.doubts, doubt), like, minima.end_costs)]
     if further.why_direct:
-        notes.append(f"the search goes without its linear phase: {further.why_direct}")
+        notes.append(f"the search has no linear phase: {further.why_direct}")
     place = next(k for k, end in enumerate(ends) if end is best)
     return SearchResult(last, minima, path, descents.best, place, ways, tuple(notes), place > 0)
 

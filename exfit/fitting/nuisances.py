@@ -17,10 +17,10 @@ NuisanceKind = Literal[
 ]  # fmt: skip
 
 NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
-    "at": ("s", "instant of a step"),
-    "shift": ("s", "instant of a step"),
+    "at": ("s", "time of a step"),
+    "shift": ("s", "time of a step"),
     "step": ("pu", "size of a step"),
-    "switching": ("s", "instant of a switching in the grid"),
+    "switching": ("s", "time of a switching in the grid"),
     "drift": ("Hz", "offset of the frequency"),
     "vt0": ("pu", "voltage before the first step"),
     "delay": ("s", "delay of the recorder"),
@@ -28,8 +28,8 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "offset": ("pu", "offset of a channel"),
     "driving": ("", "factor of a channel that drives the machine"),
     "frequency": ("Hz", "frequency of a periodic disturbance"),
-    "cosine": ("pu", "cosine of it, about the middle of the record"),
-    "sine": ("pu", "sine of it, about the middle of the record"),
+    "cosine": ("pu", "cosine amplitude of the disturbance, phase zero at mid-record"),
+    "sine": ("pu", "sine amplitude of the disturbance, phase zero at mid-record"),
 }  # unit and meaning of each kind
 
 

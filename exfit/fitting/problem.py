@@ -87,7 +87,7 @@ def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[
     sizeless = [each.name for each in shared if each.width == 0.0 or each.divisor == 0.0]
     if sizeless:
         raise CaseError(
-            f"{case.path}: {name}: a start of 0 gives no size by which to search: give min and max"
+            f"{case.path}: {name}: a start of 0 sets no scale for the search: give min and max"
             for name in sizeless
         )
     return [*shared, *(parameter for setup in setups for parameter in setup.free)]

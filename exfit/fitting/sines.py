@@ -191,7 +191,7 @@ def with_found_lines(
             if place in lines:
                 notes[place] = (
                     f"no sine is fitted: beside {_words(lines.pop(place))} the residuals are not "
-                    "white; of coloured noise a sine takes what is not periodic"
+                    "white, and a sine would also take up parts of coloured noise"
                 )
     for place, line in lines.items():
         notes[place] = (

@@ -131,7 +131,8 @@ class ValidatedStep(NamedTuple):
     @property
     def text(self) -> str:
         """The step in words."""
-        source = f"{' and '.join(self.found)} found in the record" if self.found else "given"
+        found = " and ".join(self.found).replace("instant", "time")
+        source = f"{found} found in the record" if found else "given"
         step = f"{self.signal} {self.size:+.4g} pu at {self.at:.4g} s, {source}"
         if self.rmse is None:
             return step

@@ -67,7 +67,7 @@ class CriteriaVerdict:
             ]
             return f"{len(missed)} of {count} criteria are not met: {'; '.join(missed)}"
         if met < count:
-            return f"{met} of {count} criteria are met, the noise of the records leaves the others"
+            return f"{met} of {count} criteria are met, noise of the records leaves the others open"
         return f"all {count} criteria are met"
 
 
@@ -107,7 +107,7 @@ def _judged(match: Comparison, fitted: bool, result: Reported) -> Iterator[Judge
             difference = response - getattr(measured, name)
             met, why = bool(abs(difference) <= limit), ""
             if half > limit:
-                met, why = None, f"its noise leaves the recorded one ±{half:.2g} {unit}"
+                met, why = None, f"by noise the recorded one is uncertain by ±{half:.2g} {unit}"
         yield JudgedCriterion(match.name, fitted, label, difference, limit, unit, met, why)
 
 

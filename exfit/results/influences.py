@@ -108,10 +108,10 @@ class WindowSpread:
         each = f"{self.name} is {values} {self.unit} by the {len(steps)} steps one by one"
         spread = f"{ends} {self.unit} over {len(self.windows)} windows"
         if not self.moves:
-            return f"{each}, {spread}: no more than noise spreads them"
+            return f"{each}, {spread}: the spread is that of the noise"
         return (
-            f"{each}, {spread}: more than noise spreads them (p {self.p_value:.1g}), as the "
-            "hysteresis of the iron does; an interval that is given holds all of them"
+            f"{each}, {spread}: the spread exceeds that of the noise (p {self.p_value:.1g}), as with "
+            "hysteresis of the iron; an interval, where given, includes all of them"
         )
 
 
@@ -152,8 +152,8 @@ class RecorderAverages(NamedTuple):
             from exfit.util.text import digits
 
             chi_square = digits(self.chi_square)
-            return f"the record shows averages {over}, no single instants (chi-square {chi_square})"
-        return f"whether the recorder averages, {over}, is not known and matters"
+            return f"the record shows averages {over}, not instantaneous values (chi-square {chi_square})"
+        return f"whether the recorder averages {over} is unknown and matters"
 
     @property
     def cause(self) -> Cause:

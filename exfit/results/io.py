@@ -105,7 +105,7 @@ def load_result(path: str | PathLike[str]) -> FitResult:
 
     source = result_file(Path(path))
     if not source.exists() and source.with_name(VALIDATION).is_file():
-        raise ExfitError(f"{path}: holds a validation, no result of a fit")
+        raise ExfitError(f"{path}: a validation, not the result of a fit")
     content = read_json(source)
     if not {"model", "parameters", "fixed"} <= content.keys():
         raise ExfitError(f"{source}: not the result of a fit: model, parameters or fixed missing")

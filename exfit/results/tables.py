@@ -152,7 +152,7 @@ def parameter_file(result: "FitResult") -> str:
 
 def phase_end_file(result: "FitResult", end: "PhaseEnd") -> str:
     """Return the values at the end of a phase as YAML, to be read as those of `parameter_file`."""
-    place = f"end of {end.phase}, iteration {end.iteration}, where {end.next_phase} went on"
+    place = f"end of {end.phase}, iteration {end.iteration}, where {end.next_phase} continued"
     own = {name: end.values[name] for name in result.own_values if name in end.values}
     lines = _lines_of_unit(result, f"{result.model}, {_matches(end.comparisons)}; {place}", own, {})
     if result.of_records:

@@ -248,7 +248,7 @@ def _given(
     number, half = identified
     sign = "+" if form.startswith("+") and number > 0.0 else ""
     error = "" if half is None else f" +- {half:.2g}"
-    return f"{sign}{rounded_value(number, half)}{error} {unit} (found by the fit)"
+    return f"{sign}{rounded_value(number, half)}{error} {unit} (fitted)"
 
 
 def identified_values(

@@ -64,7 +64,7 @@ from exfit.workflows.responses import (
 
 Values = Mapping[str, float]
 
-LINEAR_ALONE = "no twin: intervals are those of linear theory, by quotients at the result"
+LINEAR_ALONE = "no twin: intervals are those of linear theory, by finite differences at the result"
 INTERRUPTED_AFTERWARDS = (
     "interrupted after the search: intervals, or comparisons with records that were not fitted, "
     "are missing"

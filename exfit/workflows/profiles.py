@@ -36,10 +36,10 @@ from exfit.verdict.diagnostics import search_range_notes
 from exfit.verdict.rule import verdict_alone
 from exfit.workflows.case_search import SEARCH, SearchState, in_turn
 
-LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
+LOWER = "the profiles reached a lower minimum than the fit and describe that one"
 LOWER_BY_TWIN = (
-    "the profiles led to a lower cost of the corrected twin, which the program need not have: a "
-    "fit from there shows whether it has"
+    "the profiles reached a lower cost of the corrected twin: fit again from there to see whether "
+    "the program confirms it"
 )
 ENCLOSED = "the intervals enclose another minimum, which the record does not reject"
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare

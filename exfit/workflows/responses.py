@@ -271,7 +271,7 @@ def _small_signal(alike: Sequence[TestWithValues]) -> SmallSignalView:
     names, (first, values) = tuple(setup.experiment.name for setup, _ in alike), alike[0]
     system = first.experiment.simulator.system
     if "vref" not in system.inputs:
-        why = "the recorded signals drive the machine: there is no loop"
+        why = "recorded signals drive the machine: there is no closed loop"
         return SmallSignalView(names, None, why)
     try:
         return SmallSignalView(names, small_signal(system, first.experiment.parameters(values)))

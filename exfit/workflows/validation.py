@@ -59,7 +59,7 @@ Values = Mapping[str, float]
 EARLIER_OR_LATER = {"min": ("earlier", "late"), "max": ("later", "early")}
 LONE_RECORD = "record"  # its name, as in the case
 NOTHING_TO_VALIDATE_ON = (
-    "missing: there is no record to validate on but the fitted ones; name one there, or give it by "
+    "missing: all records of the case are fitted; name another one there, or give it by "
     "`exfit validate CASE --record FILE` (record in Python)"
 )
 
@@ -112,7 +112,11 @@ def validate(
     """
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
-        raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
+        raise CaseError(
+            [
+                f"{case.path}: step and at are of a record given with them: give it by --record (record in Python)"
+            ]
+        )
     saw: tuple[Recording, ...] = ()
     if values is None:
         case, own = model_as_found(case)
@@ -254,8 +258,7 @@ def _notes(
     for match in fitted:
         if match.sha256 == comparison.sha256:
             yield (
-                f"{comparison.record} is a file that was fitted ({match.name}): what the fit saw "
-                "does not validate it"
+                f"{comparison.record} was fitted ({match.name}): it is no independent validation"
             )
     for channel in test.setup.channels:  # spikes count as errors of the model
         kept = channel.kept & np.isfinite(channel.measured)
@@ -275,12 +278,12 @@ def _notes(
         if side is not None and parameter.name.endswith(".at"):
             way, late = EARLIER_OR_LATER[side]
             yield (
-                f"a step {way} than the record shows it would match better than the one at "
+                f"a step {way} than the recorded one would match better than that at "
                 f"{parameter.start:.4g} s: the response is too {late}"
             )
 
 
-OF_CASE, GIVEN = "values of the case, in which nothing is free", "given values"
+OF_CASE, GIVEN = "values of the case, which has no free parameter", "given values"
 AS_FOUND = "the model as found, before any fit"
 
 

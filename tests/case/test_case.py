@@ -493,7 +493,7 @@ MEANING = {
         "start: 0.3556, min: 0, max: 3.0",
         "start: 0, min: 0",
         "parameters.free.KD.start",
-        ["0 gives no size", "min and max"],
+        ["0 sets no scale", "min and max"],
     ),
     "many starts without a bound": (
         "max: 3.0, scale: linear}\nestimate:\n",

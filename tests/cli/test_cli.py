@@ -600,7 +600,7 @@ def test_the_report_of_a_validation_has_the_record_by_hand_and_whose_values_they
         "exfit validate case.yaml -o runs/case-validate --parameters runs/case-fit/parameters.yaml"
     )
     assert f"{command} --record {other}" in page
-    assert "instant and size found in the record" in page
+    assert "time and size found in the record" in page
     # of a fit in the same folder the report is that of the fit
     assert run("validate", "case.yaml", "-o", "runs/case-fit", "--no-plots", "-q").code == 0
     assert run("report", "runs/case-fit").code == 0
@@ -641,7 +641,7 @@ def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
             ["step: 2 given for 1 step, at 0.5 s"],
         ),
         (["--record", "down.csv", "--at", 1, "--at", 0.5], ["0.5 s is not after 1 s"]),
-        (["--step", 1], ["case.yaml", "of a record that is given with them"]),
+        (["--step", 1], ["case.yaml", "of a record given with them: give it by --record"]),
         (["--record", "dwon.csv"], ["dwon.csv", "No such file"]),
     ],
 )
@@ -655,7 +655,10 @@ def test_nothing_to_validate_on_is_refused(run, workplace):
     case, before = case_file(changed(CASE, ("validate", []))), listing(workplace)
     ran = run("validate", case, "--parameters", "values.yaml")
     is_refused(
-        ran, ["case.yaml: validate: missing", "but the fitted ones", "--record"], before, workplace
+        ran,
+        ["case.yaml: validate: missing", "all records of the case are fitted", "--record"],
+        before,
+        workplace,
     )
 
 

@@ -57,7 +57,7 @@ def test_no_jump_is_seen_in_a_gap_in_a_slow_clock_or_in_the_steps_of_a_converter
 
 def test_a_reference_that_does_not_move_or_moves_at_once_is_refused():
     for samples in (np.ones(1000), moved(noise=NOISE)[:250]):
-        with pytest.raises(ValueError, match="never moves out of its noise"):
+        with pytest.raises(ValueError, match="never leaves its noise"):
             rest_end(samples)
     with pytest.raises(ValueError, match="moves within its first 10 samples"):
         rest_end(moved(0.045))

@@ -162,7 +162,7 @@ def test_without_bounds_there_are_no_further_starts_and_a_note_says_so():
 
 def test_a_search_without_its_linear_phase_says_why():
     found, _ = searched(Scripted(end(1.0), more=[end(4.0)], why_direct="the network is switched"))
-    assert found.notes == ("the search goes without its linear phase: the network is switched",)
+    assert found.notes == ("the search has no linear phase: the network is switched",)
 
 
 def test_an_interruption_of_the_own_descent_is_the_end():

@@ -229,7 +229,7 @@ def test_the_file_of_a_reference_is_hashed_and_watched(tmp_path):
     ("rows", "message"),
     [
         (([0.0, 1.0, 1.5, 3.0], [1.0, 1.0, 2.0, 2.0]), r"covers 0 \.\.\. 3 s, not the whole test"),
-        ((TIME, np.ones(len(TIME))), "never moves out of its noise"),
+        ((TIME, np.ones(len(TIME))), "never leaves its noise"),
         ((TIME, 1.0 + TIME), "moves within its first 10 samples"),
     ],
 )

@@ -184,7 +184,7 @@ def test_what_the_equations_exclude_is_refused_as_a_value_too(found):
 def test_a_start_of_zero_given_beside_the_case_is_refused_where_it_gives_no_size(found):
     folder, content, _ = found
     case = with_given_values(case_of(content, folder), {"KD": 0.0}, "--set")
-    with pytest.raises(CaseError, match="KD: a start of 0 gives no size"):
+    with pytest.raises(CaseError, match="KD: a start of 0 sets no scale"):
         fit(case)
 
 
@@ -281,7 +281,7 @@ def test_what_a_model_refuses_costs_infinity(found):
         ({"max": 1.0}, "max: not allowed with bounds: none"),
         ({"scale": "log"}, "bounds: none leaves no min above 0"),
         ({"start": 0.0}, "start: 0 is no size"),
-        ({"start": 0.0, "scale": "raw"}, "start: 0 gives no size"),
+        ({"start": 0.0, "scale": "raw"}, "start: 0 sets no scale"),
     ],
 )
 def test_what_bounds_none_contradicts_is_refused(found, section, text):

@@ -77,7 +77,7 @@ def test_a_fitted_parameter_has_value_error_and_interval(texts, tmp_path):
         assert gain.interval[0] < gain.value < gain.interval[1]
         assert (gain.unit, gain.of_record) == ("pu", False)
         assert (instant.unit, instant.of_record) == ("s", True)
-        assert instant.meaning == "instant of a step"
+        assert instant.meaning == "time of a step"
 
 
 def test_a_comparison_without_a_channel_is_refused_wherever_it_is(saved):

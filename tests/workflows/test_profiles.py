@@ -174,7 +174,7 @@ def test_profiles_are_about_a_lower_minimum_that_is_met_on_the_way(search_ends, 
 
     search_ends(beside)
     found = profile(case_of("first_order"))
-    told = "the profiles led to a lower minimum than the fit: they are about that one"
+    told = "the profiles reached a lower minimum than the fit and describe that one"
     assert found.notes == (told,)
     assert found.cost == pytest.approx(nearly_linear.cost, rel=1e-6)
     for one, other in zip(found.profiles, nearly_linear.profiles, strict=True):

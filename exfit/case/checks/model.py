@@ -205,7 +205,7 @@ def _scale_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault
         yield section.at("start").fault("0 is no size by which to search: use another scale")
     elif scale != "log":
         if start == 0.0 and not isfinite(highest - lowest) and lowest in (0.0, -inf):
-            yield section.at("start").fault("0 gives no size by which to search: give min and max")
+            yield section.at("start").fault("0 sets no scale for the search: give min and max")
     elif unbounded:
         text = "none leaves no min above 0, as scale: log needs: use scale: linear, start or raw"
         yield section.at("bounds").fault(text)

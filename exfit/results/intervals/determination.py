@@ -46,8 +46,8 @@ MOST_DECIDING = 2  # samples
 
 NO_MINIMUM = "has no interval: the search did not end at a minimum"
 NEEDS_PROFILE = (
-    "has no interval of linear theory, which does not hold over it: the default search or "
-    "`exfit profile` gives one"
+    "has no interval: linear theory does not hold over it; use the default search or "
+    "`exfit profile`"
 )
 UNFINISHED = "has no interval: its profile was interrupted"
 THE_RECORD_DOES = "the record does"  # not exclude a bound

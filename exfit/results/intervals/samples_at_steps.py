@@ -153,6 +153,6 @@ def _note(problem: FitProblem, samples: ChannelSamples) -> str:
         else f"the {len(times)} samples from {times[0]:.6g} to {times[-1]:.6g} s are"
     )
     return (
-        f"{prefix_from(experiment.name)}{signal}: {which} left out: at the instant of a step, "
-        f"where {signal} may jump, and in contradiction to all others"
+        f"{prefix_from(experiment.name)}{signal}: {which} left out: at the time of a step, "
+        f"where {signal} may jump, and inconsistent with all others"
     )

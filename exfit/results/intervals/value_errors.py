@@ -110,7 +110,7 @@ def allowing_for_bias(
         shift = BIAS_KNOWN_TO * abs(float(moved) * parameter.slope(float(x)))
         own = uncertainty.confidence.parameters[parameter.name]
         widened[parameter.name] = widened_by(
-            shift, own, parameter, float(x), float(size), ["the noise of what drives the unit"]
+            shift, own, parameter, float(x), float(size), ["the noise of the driving signals"]
         )
     return with_parameters(uncertainty, widened)
 
@@ -130,7 +130,7 @@ def given_error_notes(
         for name, own in parameters.items()
         if own.std_error and name not in of_record
     }
-    text = f"the intervals allow for the errors of {listed([*given])} (given)"
+    text = f"the intervals include the errors of {listed([*given])} (given)"
     if ratios:
         widest = max(ratios, key=lambda name: ratios[name])
         value = max(given, key=lambda name: abs(given[name].shifts[widest]))

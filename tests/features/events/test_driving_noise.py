@@ -142,7 +142,7 @@ def test_without_noise_of_what_drives_a_fit_is_that_of_least_squares(fit_of):
         assert abs(own.value - TRUTH[name]) < 4.0 * own.std_error, name
     assert all(test.are_noise for test in weighted.verdict.residuals)
     (note,) = [note for note in weighted.notes if note.startswith("weights balanced")]
-    assert "the covariance of the noise alone weighs the errors" in note
+    assert "the covariance of the noise alone weights the errors" in note
 
 
 @pytest.mark.long

@@ -111,7 +111,7 @@ def test_a_model_as_it_is_is_verified_without_a_fit(events, tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(args=["validate", str(path), "-o", str(tmp_path / "run")], prog_name="exfit")
     assert not ended.value.code
-    assert "values of the case, in which nothing is free" in capsys.readouterr().out
+    assert "values of the case, which has no free parameter" in capsys.readouterr().out
 
 
 @pytest.mark.long

@@ -86,7 +86,7 @@ def test_the_intervals_allow_for_the_errors_of_values_and_bases_that_were_given(
     )
     assert widened == pytest.approx(np.hypot(sides, 1.96 * np.hypot(*moved)), rel=0.02)
     assert np.all(widened > 1.5 * sides)
-    assert "the intervals allow for the errors of S12 and ifd.base (given)" in wider.notes
+    assert "the intervals include the errors of S12 and ifd.base (given)" in wider.notes
     own = v_curve(SALIENT, TRUTH, points(), wanted, std_errors={"Xd": 0.1, "H": 0.5})
     assert own.parameters["Xd"] == alone.parameters["Xd"]  # free, or without effect at rest
     assert own.notes == alone.notes

@@ -62,7 +62,7 @@ def test_every_event_is_judged_by_p_and_q_and_shown(page):
 
 
 def test_it_says_whose_values_they_are_and_has_no_word_of_a_fit(page):
-    assert "Simulated with values of the case, in which nothing is free" in page.text
+    assert "Simulated with values of the case, which has no free parameter" in page.text
     form = page.tables["What a verification report states (cf.: clauses of NERC MOD-026-1)"]
     rows = {row[1]: row[2] for row in form[1:]}
     text = rows["Model response beside a recorded response"]

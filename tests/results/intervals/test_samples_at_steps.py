@@ -80,8 +80,8 @@ def test_a_sample_that_contradicts_all_others_is_left_out(
     outcome = in_turn(STAGES, state_of(tmp_path, model, signals, true_instant, at))
     (note,) = outcome.found.notes
     assert note == (
-        "efd: the sample at 2 s is left out: at the instant of a step, where efd may jump, and in "
-        "contradiction to all others"
+        "efd: the sample at 2 s is left out: at the time of a step, where efd may jump, and "
+        "inconsistent with all others"
     )
     left_out = {
         channel.signal: TIME[~channel.kept].tolist() for channel in outcome.fitted[0].channels

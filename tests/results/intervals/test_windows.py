@@ -40,7 +40,7 @@ def test_the_interval_over_windows_then_holds_both_and_beside_a_misfit_none_is_g
     assert moving.verdict.verdict == MISSES
     assert parameter.interval is None
     assert "misses" in parameter.why
-    assert any("more than noise spreads them" in note for note in moving.notes)
+    assert any("the spread exceeds that of the noise" in note for note in moving.notes)
 
 
 @pytest.mark.long
@@ -48,7 +48,7 @@ def test_a_constant_one_keeps_the_interval_of_the_fit(tmp_path):
     result = fitted(tmp_path, 5.0, 5.0)
     assert not result.windows.moves
     assert result.parameters["machine.Tpd0"].interval == result.windows.interval
-    assert any("no more than noise spreads them" in note for note in result.notes)
+    assert any("the spread is that of the noise" in note for note in result.notes)
 
 
 @pytest.mark.long
