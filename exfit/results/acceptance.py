@@ -79,7 +79,7 @@ def _why_not(
             )
         return (
             f"the response matches {name} no better than a constant would: check vt0 and the "
-            "sign, size and instant of its step, and whether it is a record of this unit"
+            "sign, size and time of its step, and whether it is a record of this unit"
         )
     if within:
         return ""

@@ -110,8 +110,8 @@ class WindowSpread:
         if not self.moves:
             return f"{each}, {spread}: the spread is that of the noise"
         return (
-            f"{each}, {spread}: the spread exceeds that of the noise (p {self.p_value:.1g}), as with "
-            "hysteresis of the iron; an interval, where given, includes all of them"
+            f"{each}, {spread}: the spread exceeds that of the noise (p {self.p_value:.1g}), as "
+            "with hysteresis of the iron; an interval, where given, includes all of them"
         )
 
 
@@ -152,7 +152,7 @@ class RecorderAverages(NamedTuple):
             from exfit.util.text import digits
 
             chi_square = digits(self.chi_square)
-            return f"the record shows averages {over}, not instantaneous values (chi-square {chi_square})"
+            return f"the record shows averages {over}, not samples (chi-square {chi_square})"
         return f"whether the recorder averages {over} is unknown and matters"
 
     @property

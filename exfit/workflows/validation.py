@@ -113,9 +113,7 @@ def validate(
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError(
-            [
-                f"{case.path}: step and at are of a record given with them: give it by --record (record in Python)"
-            ]
+            [f"{case.path}: step and at need a record with them: --record (record in Python)"]
         )
     saw: tuple[Recording, ...] = ()
     if values is None:

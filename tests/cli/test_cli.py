@@ -641,7 +641,7 @@ def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
             ["step: 2 given for 1 step, at 0.5 s"],
         ),
         (["--record", "down.csv", "--at", 1, "--at", 0.5], ["0.5 s is not after 1 s"]),
-        (["--step", 1], ["case.yaml", "of a record given with them: give it by --record"]),
+        (["--step", 1], ["case.yaml", "step and at need a record with them: --record"]),
         (["--record", "dwon.csv"], ["dwon.csv", "No such file"]),
     ],
 )

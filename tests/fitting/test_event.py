@@ -74,7 +74,7 @@ def test_a_record_without_rest_or_event_is_refused():
         setup_of(record(p=moving))
     still = np.ones(len(TIME))
     with pytest.raises(
-        RecordError, match="no signal leaves its noise: there is no event; give test.steady_until"
+        RecordError, match=r"no signal leaves its noise: there is no event; give test\.steady_until"
     ):
         setup_of(record(vt=still, angle=TIME, p=still, q=still))
 

@@ -155,7 +155,7 @@ def test_derivatives_that_are_not_finite_leave_no_interval(monkeypatch):
 
 def test_a_fit_says_for_which_errors_it_allows_and_keeps_them(tmp_path):
     result = fit(first_order(std_errors={"a": A_ERROR}))
-    (note,) = (note for note in result.notes if note.startswith("the intervals allow"))
+    (note,) = (note for note in result.notes if note.startswith("the intervals include"))
     assert note.startswith("the intervals include the errors of a (given): the standard error")
     (tmp_path / "result.json").write_text(result_text(result), encoding="utf-8")
     read = load_result(tmp_path / "result.json")
