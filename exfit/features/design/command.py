@@ -32,8 +32,8 @@ CRITERIA = {
     "D": "geometric mean over the axes of the confidence ellipsoid",
 }
 LOCAL = (
-    "the standard errors are those of linear theory at the values of the case, for a model that "
-    "is right; the size and the instant of each step count as known"
+    "the standard errors are those of linear theory at the values of the case, for a correct "
+    "model; size and time of each step count as known"
 )
 
 
@@ -49,12 +49,12 @@ LOCAL = (
 @click.option(
     "--design",
     is_flag=True,
-    help="Find the best test within limits instead; the options below say which.",
+    help="Find the best test within limits; the options below set them.",
 )
 @click.option(
     "--of",
     metavar="KA[,TE]",
-    help="Parameters to be known best (default: all that are free).",
+    help="Parameters to determine best (default: all that are free).",
 )
 @click.option(
     "--limit",
@@ -68,7 +68,7 @@ LOCAL = (
 @click.option(
     "--channels",
     metavar="vt[,efd]",
-    help="What can be recorded; up to three are chosen (default: all signals).",
+    help="Signals that can be recorded; up to three are chosen (default: all signals).",
 )
 @click.option(
     "--criterion",
@@ -89,12 +89,12 @@ def identify(
 ) -> None:
     """Predict which free parameters of CASE a test determines, and how well; it needs no record.
 
-    Compared at the start values are the test of CASE, steps of 2, 5 and 10 %, a test twice as long,
-    and further channels; the parameters are ranked by what 1 % of each does to the response. Writes
+    Compares, at the start values, the test of CASE, steps of 2, 5 and 10 %, a test twice as long,
+    and further channels; ranks the parameters by the change of the response for 1 % of each. Writes
     identify.json, sensitivities.csv and figures to runs/CASE-identify, or to DIR.
 
     With --design it searches for up to four steps of the reference and up to three channels that
-    make the parameters best known within limits, shows what each addition brings, and prints the
+    determine the parameters best within limits, shows the gain of each addition, and prints the
     test sheet for the plant. Writes designed_test.json, test_sheet.txt, test_sheet.csv, a section
     for the case, test_section.yaml, and a figure.
     """
@@ -161,8 +161,8 @@ def blocks_of_designed_test(design: "DesignedTest") -> Iterator[Block]:
     channels = ", ".join(design.best.channels)
     yield from notes(
         (
-            f"'share of best 1 step': divided by those of the best single step, which "
-            f"is {design.single.steps[0].step:+.5g} pu, with the same limits, duration and "
+            f"'share of best 1 step': divided by those of the best single step, "
+            f"{design.single.steps[0].step:+.5g} pu, with the same limits, duration and "
             f"channels ({channels}); '{spread:g} % off': the largest share with each parameter "
             f"{spread:g} % smaller or larger",
             LOCAL,

@@ -1,6 +1,6 @@
 """The steps of the reference that make chosen parameters best known, within limits of the plant.
 
-The search is a coordinate exchange over instants and levels, from several starts; what it makes
+The search is a coordinate exchange over times and levels, from several starts; what it makes
 small is an alphabetic criterion of the Cramer-Rao bound at the values of the case.
 
 Source: Atkinson, Donev & Tobias 2007, Optimum Experimental Designs, with SAS, chapters 10 and 17.
@@ -99,12 +99,12 @@ class DesignedTest:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What must be known before the test is made."""
+        """Warnings before the test is made."""
         if self.limits.allow(self.other_values.extremes, self.vt0):
             return ()
         spread = f"{100.0 * self.other_values.spread:g} %"
-        text = f"with a parameter {spread} off the test would exceed a limit"
-        return (f"{text}: where the values are that uncertain, give a narrower one",)
+        text = f"with a parameter off by {spread} the test would exceed a limit"
+        return (f"{text}: if the values are that uncertain, give a narrower one",)
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""

@@ -67,14 +67,14 @@ def sheet_lines(design: DesignedTest) -> Iterator[str]:
     yield ""
     yield f"start       at rest, vt = {design.vt0:.4g} pu, all limiters out of reach"
     yield f"record      {', '.join(best.channels)} and the reference, to {best.duration:g} s,"
-    yield f"            {design.rate:.6g} samples a second, in one file, with the instants of steps"
+    yield f"            {design.rate:.6g} samples a second, in one file, with the times of steps"
     yield f"allowed     reference within {design.limits.of_vref:g} pu of its start"
     for signal, (low, high) in design.extremes.items():
         yield f"{'planned' if signal == 'vt' else '':<12}{_extreme(design, signal, low, high)}"
     for number, (signal, (low, high)) in enumerate(design.other_values.extremes.items()):
         if number == 0:
             spread = 100.0 * design.other_values.spread
-            yield f"if others   with a parameter {spread:g} % off, in turn:"
+            yield f"off values  with each parameter {spread:g} % off, in turn:"
         yield f"            {NAMES[signal]} {low:.4f} ... {high:.4f} pu"
     back = -level
     if abs(back) > 0.0:
@@ -96,7 +96,7 @@ def _extreme(design: DesignedTest, signal: str, low: float, high: float) -> str:
 
 
 def sheet_table(design: DesignedTest) -> str:
-    """Return the steps as CSV: instants in s, sizes and levels of the reference per unit."""
+    """Return the steps as CSV: times in s, sizes and levels of the reference per unit."""
     rows, level = ["at_s,step_pu,reference_from_start_pu\n"], 0.0
     for step in design.best.steps:
         level += step.step
@@ -111,7 +111,7 @@ def case_section(design: DesignedTest) -> str:
     test = {"vt0": _digits(design.vt0), "duration": _digits(design.best.duration), "vref": steps}
     return CaseDraft(
         {"test": test},
-        (f"the test that makes {', '.join(design.of)} best known; to be recorded: {channels}",),
+        (f"the test that determines {', '.join(design.of)} best; record {channels}",),
     ).text
 
 

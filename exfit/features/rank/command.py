@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     "--models",
     metavar="NAME[,NAME]",
     help="Exciters, or files of models; AC, DC, ST: all of a type; all: the whole catalogue "
-    "(default: those of the type of CASE's). A type has the form of the edition of IEEE Std 421.5 "
-    "that CASE's is of.",
+    "(default: those of the type of CASE's), in the edition of IEEE Std 421.5 of CASE's.",
     shell_complete=completion.several_exciters,
 )
 @click.option(
@@ -43,16 +42,16 @@ if TYPE_CHECKING:
 def rank(case: Path, models: str | None, search: str, output: Output) -> None:
     """Fit the records of CASE under several exciters, and rank these.
 
-    The exciter of CASE has its values there. Every other one starts from the typical data of its
-    data sheet, within a tenth and ten times of these; what its sheet does not mark as fitted, such
-    as a limit, stays typical and is named. All else is as CASE has it.
+    The exciter of CASE has the values of CASE. Every other one starts from the typical values of
+    its data sheet, with bounds of a tenth and ten times of these. What its sheet does not mark as
+    fitted, such as a limit, stays typical and is named. All else is as in CASE.
 
-    The table is in the order of the error on records that no fit saw, or without any of BIC, the
-    Bayesian information criterion; the lines below it say which models the records tell apart.
+    The table is ordered by the error on records that were not fitted, or without any by BIC, the
+    Bayesian information criterion; the lines below it say which models the records distinguish.
 
     Writes rank.csv, rank.json, a figure, and a folder for the fit of each model to runs/CASE-rank,
-    or to DIR. Ctrl-C keeps the models that are done. Exit code 0: all were fitted, and the first
-    one matches; 1: bad input; 3: otherwise.
+    or to DIR. Ctrl-C keeps the models that are finished. Exit code 0: all were fitted, and the
+    first one matches; 1: bad input; 3: otherwise.
     """
     from exfit.features.rank.ranked_cases import planned_models, ranking_of
     from exfit.features.rank.ranking_output import FILES, ranking_blocks, write_ranking

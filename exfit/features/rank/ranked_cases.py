@@ -75,7 +75,7 @@ def rank(
             form of 2005 and one of 2016, each of these takes that of the edition of the case.
         progress: called with the fit that runs and how far it is.
         finished: called with every fit that has ended.
-        search: "global", or "local" for the descent from the typical data alone.
+        search: "global", or "local" for one run from the typical data alone.
 
     A KeyboardInterrupt ends it with the models that are done. Raises CaseError for a case that
     cannot be fitted, ModelError for a model that does not exist.

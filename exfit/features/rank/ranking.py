@@ -1,9 +1,9 @@
-"""Which of several models of the same records describes them best, and which they refute.
+"""Which of several models of the same records describes them best, and which they reject.
 
 The models need not be nested, so that no likelihood ratio between them has a known distribution;
 they are compared by the Bayesian information criterion (Schwarz 1978), whose difference is a weight
 of evidence (Kass & Raftery 1995, section 3.2: above 10 it is very strong). Residuals that are not
-white say the same over and over: each channel counts as its effective number of samples (the
+white repeat themselves: each channel counts as its effective number of samples (the
 quasi-likelihood of Burnham & Anderson 2002, section 2.5), that of the better model. Vuong's test
 (1989) would need many steps: the difference of two responses is in a part of one.
 """
@@ -26,7 +26,7 @@ from exfit.util.text import listed
 
 Records = Literal["fit", "validation"]
 
-# difference of the criterion from which on a model is refuted: a rival with as many parameters
+# difference of the criterion from which on a model is rejected: a rival with as many parameters
 # fits so much more of the noise by chance in one record of thirty, even with seven of them
 STRONG = 10.0
 # a search that has not ended well says nothing of its model
@@ -39,15 +39,15 @@ class RankedModel:
 
     outcome          the verdict on its fit, or that a validation is not accepted
     rmse             root mean square error of the fitted records, of the judged signals, per unit
-    validation_rmse  of the records that no fit saw; None where there are none
+    validation_rmse  of the records that were not fitted; None where there are none
     bic              Bayesian information criterion, above the lowest of all
     free             how many parameters of the unit were fitted, ``determined`` of them on both
                      sides
     refuted_by       the records, fitted or unseen, that another model describes so much better
-                     that it is refuted; None where its search did not end well
+                     that it is rejected; None where its search did not end well
     typical          the values of the exciter that were typical and not fitted
     typical_machine  the data of the machine that were, and act: as long as there are any, it is
-                     not shown that the records refute a model, which other data may let match
+                     not shown that the records reject a model, which other data may let match
     """
 
     name: str
@@ -70,7 +70,7 @@ class RankedModel:
 
     @property
     def possible(self) -> bool:
-        """Whether no record refutes it."""
+        """Whether no record rejects it."""
         return self.refuted_by == ()
 
 
@@ -204,42 +204,42 @@ def _refuted(
 
 
 def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
-    """Yield the sentences about models that the records tell apart, and about those they do not."""
+    """Yield the sentences about models that the records distinguish, and that they do not."""
     judged = [model for model in models if model.refuted_by is not None]
     if len(judged) > 1:
-        yield _told_apart(judged)
+        yield _comparison(judged)
     if models and not any(model.matches for model in models):
         yield "none of these models matches the records"
     for model in models:
         if model.refuted_by is None:
             yield f"{model.name} is not judged: its search ended {model.outcome}"
     if len(judged) > 1 and judged[0].validation_rmse is None:
-        yield "a record that no fit saw, under `validate`, tells models apart that this one cannot"
+        yield "add a record under `validate`: it may distinguish models that the fitted ones do not"
 
 
-def _told_apart(judged: Sequence[RankedModel]) -> str:
-    """Word which models the records do not refute, and which is best where they refute all."""
+def _comparison(judged: Sequence[RankedModel]) -> str:
+    """Word which models the records do not reject, and which is best where they reject all."""
     possible = [model.name for model in judged if model.possible]
     typical = [*dict.fromkeys(name for model in judged for name in model.typical_machine)]
     best = min(judged, key=lambda model: model.bic).name
     if typical and len(possible) < len(judged):
         return (
-            f"with this machine the records match {listed(possible or [best])} best; that they "
-            f"refute the others is not shown: {listed(typical)} "
-            f"{'is' if len(typical) == 1 else 'are'} typical, and other values may let them match: "
-            "give the machine's own, or free them under plant.free"
+            f"with this machine the records match {listed(possible or [best])} best; the others "
+            f"are not rejected: {listed(typical)} {'is' if len(typical) == 1 else 'are'} typical, "
+            "and with other values they may match: give those of the machine, or free them under "
+            "plant.free"
         )
     if len(possible) > 1:
         return (
-            f"the records cannot tell {listed(possible)} apart: none of them is better by "
-            f"{STRONG:g} of the criterion, apart from what more parameters gain"
+            f"the records do not distinguish {listed(possible)}: their criteria differ by at most "
+            f"{STRONG:g}, apart from what more parameters gain"
         )
     if possible:
-        return f"the records refute all of these models but {possible[0]}"
+        return f"the records reject all of these models but {possible[0]}"
     if judged[0].name == best:
-        return f"no model describes all channels best; {best} is the best on the whole"
+        return f"no model describes all channels best; {best} is the best overall"
     return (
         f"no model describes all records: {best} is the best on those fitted, {judged[0].name} on "
-        "those that no fit saw. What the fitted step does not show, such as a limit that is "
-        "typical here, decides the others: give it, or fit all records together"
+        "the others. These depend on what the fitted step does not show, such as a limit that is "
+        "typical here: give its value, or fit all records together"
     )

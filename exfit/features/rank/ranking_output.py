@@ -25,11 +25,11 @@ MOST_MODELS = 4  # in one figure
 FARTHEST = 10.0  # times the error of the best: beside a larger one no other is seen
 RECORD_HEIGHT = 3.8  # inches
 NOT_REFUTED = "*"  # behind the name of a model
-MEANING = {False: "not refuted by the records", True: "matches best with typical machine data"}
+MEANING = {False: "not rejected by the records", True: "matches best with typical machine data"}
 
 
 def ranking_blocks(ranking: Ranking) -> Iterator[Block]:
-    """Yield models, the best first, and below them which the records tell apart."""
+    """Yield models, the best first, and below them which the records distinguish."""
     models = ranking.models
     if models:
         yield from _table(models)
@@ -61,7 +61,7 @@ def _table(models: Sequence[RankedModel]) -> Iterator[Block]:
     )
     yield Table(columns("model", *heads, "verdict", numbers=heads), tuple(rows))
     if unseen:
-        yield paragraph("unseen: rmse of the records that no fit saw", "faint")
+        yield paragraph("unseen: rmse of the records that were not fitted", "faint")
     meaning = MEANING[any(model.typical_machine for model in models)]
     yield paragraph(f"rmse in pu; BIC above the lowest; {NOT_REFUTED} {meaning}", "faint")
 

@@ -32,7 +32,7 @@ def test_the_table_the_files_and_the_figure_are_of_all_models(run, monkeypatch):
     ran = run("rank", CASE, *TWO)
     assert (ran.code, ran.err) == (0, "")
     assert max(map(len, ran.out.splitlines())) <= WIDTH
-    for words in ("AC8B*", "unseen", "refute all of these models but AC8B", "rank.png"):
+    for words in ("AC8B*", "unseen", "reject all of these models but AC8B", "rank.png"):
         assert words in ran.out
     folder = Path("runs/ac8b_unit1-rank")
     assert {path.name for path in folder.iterdir()} == {

@@ -80,8 +80,8 @@ def test_the_models_of_a_record_are_ranked_and_the_true_one_is_found(case):
     # the case's own model is fitted as it is alone
     assert ranking.results["AC8B"].cost == exfit.fit(plain).cost
     assert ranking.complete
-    assert ranking.sentences[0] == "the records refute all of these models but AC8B"
-    assert "a record that no fit saw" in ranking.sentences[1]
+    assert ranking.sentences[0] == "the records reject all of these models but AC8B"
+    assert "add a record under `validate`" in ranking.sentences[1]
 
 
 def test_a_model_that_cannot_be_simulated_keeps_no_other_from_its_fit(case, monkeypatch):

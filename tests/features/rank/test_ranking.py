@@ -77,7 +77,7 @@ def test_a_model_is_not_refuted_for_being_larger_than_another_that_does_as_well(
     fits = {"A": with_errors(result, errors), "B": with_errors(result, errors, more=3)}
     models = ranked(fits)
     assert all(model.possible for model in models)
-    assert any("cannot tell A and B apart" in text for text in ranking_sentences(models))
+    assert any("do not distinguish A and B" in text for text in ranking_sentences(models))
 
 
 def test_a_larger_model_refutes_a_smaller_one_only_beyond_what_its_parameters_cost(result):
@@ -129,7 +129,7 @@ def test_unseen_records_come_first_and_refute_as_fitted_ones_do(result):
     models = ranked(fits)
     assert [model.name for model in models] == ["B", "A"]
     assert [model.refuted_by for model in models] == [(), ("validation",)]
-    assert [*ranking_sentences(models)] == ["the records refute all of these models but B"]
+    assert [*ranking_sentences(models)] == ["the records reject all of these models but B"]
 
 
 def test_records_that_contradict_each_other_are_reported(result):
@@ -141,7 +141,7 @@ def test_records_that_contradict_each_other_are_reported(result):
     models = ranked(fits)
     assert [model.refuted_by for model in models] == [("fit",), ("validation",)]
     (sentence,) = ranking_sentences(models)
-    assert "A is the best on those fitted, B on those that no fit saw" in sentence
+    assert "A is the best on those fitted, B on the others" in sentence
 
 
 def test_a_search_that_has_not_ended_well_neither_refutes_nor_is_refuted(result):
@@ -183,11 +183,11 @@ def test_no_model_at_all_is_no_ranking():
 def test_with_typical_data_of_the_machine_no_model_is_called_refuted(result):
     errors = 1e-3 * white(1)
     fits = {"A": with_errors(result, errors), "B": with_errors(result, 2.0 * errors)}
-    assert "refute all of these models but A" in " ".join(ranking_sentences(ranked(fits)))
+    assert "reject all of these models but A" in " ".join(ranking_sentences(ranked(fits)))
     said = " ".join(ranking_sentences(ranked(fits, ("machine.S10",))))
-    assert "refute all" not in said
-    assert "is not shown: machine.S10 is typical" in said
-    for typical, meaning in (((), "not refuted"), (("machine.S10",), "matches best")):
+    assert "reject all" not in said
+    assert "the others are not rejected: machine.S10 is typical" in said
+    for typical, meaning in (((), "not rejected"), (("machine.S10",), "matches best")):
         page = Console(file=StringIO(), width=80)
         models = ranked(fits, typical)
         ranking = SimpleNamespace(models=models, sentences=(), series=NO_SERIES)
