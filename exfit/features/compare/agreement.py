@@ -118,7 +118,7 @@ def compare(
     Each is the folder or the result.json of a run, or a file of any kind that records have. The
     signals that the first shares with others are compared over the time that all cover, on the
     finest of their clocks; between the samples of a coarser one lies a cubic (Akima 1970). A record
-    is never interpolated: what is simulated is read at its instants.
+    is never interpolated: what is simulated is read at its samples.
 
     Args:
         sources: where the responses are, named A, B, C ...; one alone only beside a record.
@@ -126,9 +126,9 @@ def compare(
         columns: possible columns of each signal: a file is read by the one that it has.
         time: possible columns of the time; by default the usual names are looked for.
         shifts: s, added to the time of a curve, by its name.
-        align: whether the clocks are moved so that the steps that are detected are together: at
-            that of the record, or of A.
-        step_at: s, the instant of the step on the clock of the record, or of A; by default it is
+        align: whether the clocks are shifted so that the detected steps coincide with that of the
+            record, or of A.
+        step_at: s, the time of the step on the clock of the record, or of A; by default it is
             detected.
 
     Raises RecordError where a file cannot be used, they have no signal or time in common, or a step
@@ -154,7 +154,7 @@ def compare(
             if clocks.steps.get(curve.name) is None:
                 raise RecordError(
                     f"--align: {curve.name}, {curve.path}: no step is detected in it; "
-                    "--shift B=SECONDS moves the time of one"
+                    "--shift B=SECONDS shifts the time of one"
                 )
         curves = shifted(curves, clocks.apart)
     results, unread = _results(paths)
@@ -163,7 +163,7 @@ def compare(
     at = first_at if step_at is None else step_at
     of_curves = {} if at is None else dict(_features_of(curves, judged, at))
     notes = [
-        f"{curve.path}: {curve.repeated} instants repeat: the last row of each is used"
+        f"{curve.path}: {curve.repeated} repeated times: the last row of each is used"
         for curve in curves
         if curve.repeated
     ]
@@ -289,8 +289,8 @@ def compared_clocks(curves: Sequence[Curve], signal: str, aligned: bool) -> Comp
         else:
             f = _from_reference(reference, curve.shifted(by), signal).f
             notes.append(
-                f"{times}: --align puts the steps together (f = {f:.2e}), "
-                f"--shift {curve.name}={curve.shift + by:.4f} this one"
+                f"{times}: --align makes them coincide (f = {f:.2e}); for this one alone "
+                f"--shift {curve.name}={curve.shift + by:.4f}"
             )
     return ComparedClocks(steps, apart, notes)
 
@@ -300,7 +300,7 @@ def shifted(curves: Sequence[Curve], shifts: Mapping[str, float]) -> list[Curve]
     names = [curve.name for curve in curves]
     for name in shifts:
         if name not in names:
-            raise RecordError(f"--shift {name}: no curve is called so; known: {', '.join(names)}")
+            raise RecordError(f"--shift {name}: no curve has this name; known: {', '.join(names)}")
     return [curve.shifted(shifts.get(curve.name, 0.0)) for curve in curves]
 
 

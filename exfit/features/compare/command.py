@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 @click.option(
     "--align",
     is_flag=True,
-    help="Move the clocks so that the detected steps are together, at that of the reference.",
+    help="Shift the clocks so that the detected steps coincide with that of the reference.",
 )
 @click.option(
     "--shift",
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     metavar="B=S",
     help="Seconds added to the time of a curve; without a name, to that of B. May be repeated.",
 )
-@click.option("--step", "step_at", type=float, metavar="S", help="Instant of the step, s.")
+@click.option("--step", "step_at", type=float, metavar="S", help="Time of the step, s.")
 @output_options
 def compare(
     curves: tuple[Path, ...],
@@ -71,8 +71,8 @@ def compare(
 
     Each CURVE is the folder or the result.json of a fit or a simulation, or a CSV file of any
     program; they are named A, B, C and so on. The signals of A are compared over the time that all
-    cover, on the finest of their clocks: with A, and with the record at its instants. f is half the
-    sum of the squared differences. Clocks that differ are reported, and moved with --align or
+    cover, on the finest of their clocks: with A, and with the record at its samples. f is half the
+    sum of the squared differences. Clocks that differ are reported, and shifted with --align or
     --shift. Parameters of fits are shown side by side.
 
     Writes compare.json, compare.csv and compare.png to runs/compare, or to DIR; with a record
@@ -81,7 +81,7 @@ def compare(
     if len(curves) == 1 and record is None:
         raise click.UsageError("One CURVE alone can be compared only with a --record.")
     if align and shifts:
-        raise click.UsageError("--align moves all clocks: not together with --shift.")
+        raise click.UsageError("--align shifts all clocks: not allowed with --shift.")
     from exfit.features.compare.agreement import compare as compared
     from exfit.features.compare.files import FILES, write_agreement
     from exfit.output import run_folder
@@ -168,7 +168,7 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
         yield from side_by_side(result.results, models=True)
     yield from notes(result.notes)
     time = result.differences[0].time
-    yield paragraph(f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} instants")
+    yield paragraph(f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} samples")
     worst = max(result.differences, key=lambda difference: difference.interpolation)
     if worst.interpolation:
         yield paragraph(

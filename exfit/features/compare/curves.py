@@ -20,7 +20,7 @@ from exfit.util.file_names import WHOLE_FIT
 
 SIMULATED, MEASURED = "_simulated", "_measured"  # behind a signal in the table of a fit
 RECORD = "record"  # the name of the curve that was measured
-FEWEST_IN_COMMON = 2  # instants
+FEWEST_IN_COMMON = 2  # samples
 SAME_INSTANT = 1e-9  # s: whatever the digits of a file
 
 
@@ -91,7 +91,7 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
     label = Clock(clock).label
     check_finite(time, label, table.place)
     check_increasing(time, label, table.place, may_repeat=True)
-    last = np.append(np.diff(time) > 0.0, True)  # of instants that repeat, what holds from then on
+    last = np.append(np.diff(time) > 0.0, True)  # of times that repeat, what holds from then on
     signals = {signal: columns[column][last] for signal, column in places.items()}
     return Curve(name, path, table.sha256, time[last], signals, table.names, int(np.sum(~last)))
 
@@ -155,17 +155,17 @@ class Difference:
 
     @property
     def count(self) -> int:
-        """How many instants have samples of both."""
+        """Number of times with samples of both."""
         return int(np.count_nonzero(np.isfinite(self.error)))
 
     @property
     def f(self) -> float:
-        """Half the sum of its squares over these instants, pu²: it grows with their number."""
+        """Half the sum of its squares over these times, pu²: it grows with their number."""
         return 0.5 * float(np.nansum(self.error**2))
 
     @property
     def rmse(self) -> float:
-        """Its root mean square over these instants, per unit."""
+        """Its root mean square over these times, per unit."""
         return Overlay(*self.values).rmse
 
     @property
@@ -177,7 +177,7 @@ class Difference:
     def rms(self) -> float:
         """Its root mean square over time, per unit."""
         kept, steps = np.isfinite(self.error), np.diff(self.time)
-        # each instant stands for half the way to its neighbours
+        # each time stands for half the way to its neighbours
         weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
         mean = np.average(self.error[kept] ** 2, weights=weights[kept])
         return float(np.sqrt(mean))
@@ -224,7 +224,7 @@ def differences(curves: Sequence[Curve], signals: Sequence[str]) -> list[Differe
     """Subtract the first from the other responses, then the record where there is one.
 
     The first are on the finest of their clocks over the time that all responses cover, the others
-    at the instants of the record in that time. Not all curves need to have all of the signals.
+    at the samples of the record in that time. Not all curves need to have all of the signals.
     Raises RecordError where they share no time.
     """
     responses = [curve for curve in curves if not curve.measured]
@@ -244,7 +244,7 @@ def differences(curves: Sequence[Curve], signals: Sequence[str]) -> list[Differe
             values = np.stack([samples for samples, _ in read])
             if not np.isfinite(values).all(axis=0).any():
                 both = f"{first.path} and {second.path}"
-                raise RecordError(f"{both}: {signal}: no instant has samples of both")
+                raise RecordError(f"{both}: {signal}: no time has samples of both")
             bend = max(bend for _, bend in read)
             found.append(Difference(signal, first.name, second.name, time, values, bend))
     return found
@@ -260,13 +260,13 @@ def _refuse_apart(time: Array, curves: Sequence[Curve]) -> None:
     if len(time) < FEWEST_IN_COMMON:
         spans = (f"{curve.path}: {curve.time[0]:g} ... {curve.time[-1]:g} s" for curve in curves)
         raise RecordError(
-            f"no time in common: {', '.join(spans)}; --align puts the steps together, "
-            "--shift B=SECONDS moves the time of one"
+            f"no time in common: {', '.join(spans)}; --align makes the steps coincide, "
+            "--shift B=SECONDS shifts one of them"
         )
 
 
 def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
-    """Return samples read at other instants, and by how much cubic and straight lines differ.
+    """Return samples read at other times, and the difference of cubic and straight lines.
 
     Nothing is read across a sample that is left out.
     """

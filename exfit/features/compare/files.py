@@ -49,7 +49,7 @@ def agreement_table(agreement: Agreement) -> str:
 
 
 def record_table(agreement: Agreement) -> str | None:
-    """Return the record and the responses at its instants, as CSV; None without a record."""
+    """Return the record and the responses at its samples, as CSV; None without a record."""
     compared = [entry for entry in agreement.differences if entry.first == RECORD]
     if not compared:
         return None

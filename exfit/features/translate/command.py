@@ -54,7 +54,7 @@ LOOP_ROWS = (
 )
 @output_options
 def translate(result: Path, model: str, steps: tuple[float, ...], output: Output) -> None:
-    """Find the parameters of another exciter that responds as the fitted one of RESULT.
+    """Find the parameters of another exciter that responds like the fitted one of RESULT.
 
     RESULT is the result.json of a fit, or the folder that holds it. Both models are compared in
     steps with the breaker open, and on load where the fit has a network. What both have is copied;

@@ -167,9 +167,9 @@ class Translation:
 
     @property
     def verdict(self) -> str:
-        """What to make of it, in a sentence."""
+        """How well the responses agree, in a sentence."""
         if self.exact:
-            return f"exact: {self.target} responds as {self.source} in all steps"
+            return f"exact: {self.target} responds like {self.source} in all steps"
         worst = self.worst
         met = [
             f"{model} is at {', '.join(limits)}"

@@ -200,7 +200,7 @@ def translation_task(result: FitResult, target: Model, sizes: Sequence[float]) -
     else:
         raise ExfitError(f"{result.model} is not in the catalogue")
     if ALONE in (source.name, target.name):
-        raise ExfitError(f"{ALONE} is no exciter: it is without a machine")
+        raise ExfitError(f"{ALONE} is not an exciter: it has no machine")
     values = result.values_of("")
     missing = [row.symbol for row in source.sheet if row.symbol not in values]
     if missing:

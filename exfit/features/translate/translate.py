@@ -332,7 +332,7 @@ def _parameter(task: TranslationTask, row: Parameter, best: Candidate) -> Transl
         if fitted is None:
             states[name] = result.source_of(name)
         elif fitted.at_bound:
-            states[name] = f"fitted, on its {fitted.at_bound}"
+            states[name] = f"fitted, at its {fitted.at_bound}"
         else:
             states[name] = "fitted" if fitted.determined else "fitted, not determined"
     sources = (result.sources.get(name, NOT_STATED) for name in entry.of)
@@ -351,12 +351,12 @@ def _parameter(task: TranslationTask, row: Parameter, best: Candidate) -> Transl
 
 
 def _notes(task: TranslationTask, best: Candidate) -> Iterator[str]:
-    """Yield what must be known beside the numbers: of the fit, the parameters, the steps."""
+    """Yield remarks on the fit, the parameters and the steps."""
     source, target = task.source.name, task.target.name
     yield from _fit_notes(task)
     hidden = ", ".join(name for name, share in best.unnoticed.items() if share > UNDETERMINED)
     if hidden:
-        yield f"the steps hardly show {hidden} of {target}: another value would do as well"
+        yield f"the steps hardly show {hidden} of {target}: other values match as well"
     typical = ", ".join(name for name, entry in best.values.items() if entry.kind == "typical")
     if typical:
         yield f"typical, {source} has no such parameter: {typical} of {target}"

@@ -243,7 +243,7 @@ def test_of_instants_that_repeat_the_last_row_is_taken():
     b = write("b.csv", t=[0, 1, 2], vt=[1, 2, 2])
     agreement = compare([a, b])
     assert of(agreement).rms == 0.0
-    assert any("1 instants repeat" in note for note in agreement.notes)
+    assert any("1 repeated times" in note for note in agreement.notes)
 
 
 def test_nothing_is_read_across_a_gap():

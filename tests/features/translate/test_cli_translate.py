@@ -33,7 +33,7 @@ def workplace(empty_folder):
 def test_it_leaves_a_case_and_records_of_the_other_model(run, fitted):
     code, out, err = run("translate", fitted, "--model", "EXAC1", "--step", "0.01")
     assert (code, err) == (0, "")
-    assert out.lstrip().startswith("exact: EXAC1 responds as AC1A in all steps")
+    assert out.lstrip().startswith("exact: EXAC1 responds like AC1A in all steps")
     assert max(map(len, out.splitlines()[:-1])) <= WIDTH
     folder = Path("runs/ac1a_good-EXAC1")
     assert f"\n\nwritten to {folder}\n  translation.png  the responses of both" in out

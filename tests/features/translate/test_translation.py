@@ -50,7 +50,7 @@ def test_a_model_within_another_is_found_exactly_and_without_a_search(source, ta
     assert translation.exact
     assert not translation.searched
     assert not translation.poor
-    assert translation.verdict.startswith(f"exact: {target} responds as {source}")
+    assert translation.verdict.startswith(f"exact: {target} responds like {source}")
     assert translation.lost == {}
     assert {entry.origin for entry in translation.parameters.values()} <= {
         "copied", "computed", "without effect",
@@ -233,8 +233,8 @@ def test_a_name_of_psse_stands_for_its_model():
     ("fit", "model", "text"),
     [
         (replace(fit_of(FIT, "AC1A"), model="GENROU"), "EXAC1", "without an exciter"),
-        (FIT, "EXAC1", "FIRST_ORDER is no exciter"),
-        (fit_of(FIT, "AC1A"), "FIRST_ORDER", "FIRST_ORDER is no exciter"),
+        (FIT, "EXAC1", "FIRST_ORDER is not an exciter"),
+        (fit_of(FIT, "AC1A"), "FIRST_ORDER", "FIRST_ORDER is not an exciter"),
         (fit_of(FIT, "AC1A"), "EXAC9", "EXAC9 is not in the catalogue"),
         (replace(fit_of(FIT, "AC1A"), fixed={"KA": 1.0}), "EXAC1", "no value of TR, TB"),
     ],
