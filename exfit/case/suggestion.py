@@ -293,7 +293,7 @@ def _step(inspection: Inspection, step: RecordedStep, given: float | None) -> Se
     share = inspection.change_of_voltage(step)
     change = "" if share is None else f"; vt changed by {rounded(share)}"
     keyed_in = QUESTION if given is None else given
-    return {"at": at, "step": Noted(keyed_in, f"pu, as it was keyed in{change}")}
+    return {"at": at, "step": Noted(keyed_in, f"pu, as keyed in{change}")}
 
 
 def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, str | float]:
@@ -313,7 +313,7 @@ def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) ->
     by, _, _ = channel.why.partition(";")
     why = f"{'' if channel.sure else 'a guess: '}{channel.signal} by {by}"
     if scale is not None:
-        return f"{why}; {channel.level:.4g} at rest: another base, which is found"
+        return f"{why}; {channel.level:.4g} at rest: the base differs, and is fitted"
     if channel.system_base:
         return f"{why}; {channel.level:.5g} at rest"
     percent = channel.unit == "%"

@@ -97,7 +97,9 @@ def program_of(case: Case) -> AbstractContextManager[Program | None]:
         return nullcontext()
     opener = parts("PROGRAMS").get(case.external.type)
     if opener is None:
-        raise CaseError([f"{case.path}: plant.type: {case.external.type}: nothing here can run it"])
+        raise CaseError(
+            [f"{case.path}: plant.type: {case.external.type}: its feature is not installed"]
+        )
     return cast(AbstractContextManager[Program | None], opener.load()(case))
 
 

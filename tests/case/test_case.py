@@ -577,7 +577,7 @@ MEANING = {
         "{at: 1.0, step: 0.05}",
         "{at: {start: auto}, step: 0.05, ramp: 0.5}",
         "test.vref[0].ramp",
-        ["auto finds a step"],
+        ["auto is for a step"],
     ),
     "table that stays": (
         "[{at: 1.0, step: 0.05}]",

@@ -184,7 +184,7 @@ def test_a_simulated_speed_after_a_rejection_holds_where_there_is_a_governor(tmp
         ("T1: 0.5", "VMAX: 0.2, VMIN: 0.3", "governor.parameters.VMIN: 0.3 is not below VMAX"),
         ("T1: 0.5", "VMAX: 0.6", "governor.parameters: TGOV1 does not rest at P = 0.7 pu"),
         ("model: TGOV1, ", "", "governor.model: is missing"),
-        ("infinite-bus", "none", "governor: not allowed with plant none: nothing feeds it"),
+        ("infinite-bus", "none", "governor: not allowed with plant none: it would have no input"),
         ("infinite-bus", "open-circuit", "test.pref: not allowed with plant open-circuit"),
         ("governor: {model: TGOV1, parameters: {R: 0.05, T1: 0.5, T2: 2.5, T3: 8.0}}\n", "",
          "test.pref: needs a governor: there is none"),

@@ -270,7 +270,7 @@ MEANING = {
         ("records", 1, "test", "vt0"),
         GONE,
         ("records", 1, "test", "vt0"),
-        "the record does not show it where scale of vt is to be found",
+        "the record does not show it while scale of vt is fitted",
     ),
     "share of nothing": ((*STD[:-1], "mean"), 0, STD, "a share of mean = 0 is 0"),
     "no share": (STD, "0.0 %", STD, "'0.0 %' is not above 0"),

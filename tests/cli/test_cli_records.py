@@ -136,7 +136,7 @@ def test_new_makes_a_case_that_checks_and_fits(run):
     assert (code, err) == (0, "")
     written, step = out.splitlines()
     assert written == "written to cases/case.yaml; next: exfit check cases/case.yaml"
-    assert step.startswith("to be filled in: test.vref[0].step (pu, as it was keyed in; vt changed")
+    assert step.startswith("to be filled in: test.vref[0].step (pu, as keyed in; vt changed")
     content = yaml.safe_load(Path("cases/case.yaml").read_text())
     assert content["record"]["file"] == "../up.csv"
     fill_in("cases/case.yaml")

@@ -108,7 +108,7 @@ def _table_faults(given: ContentNode, duration: float | None) -> Iterator[Fault]
             yield table.at(k).fault(text)
     level = rows[0][1]
     if all(value == level for _, value in rows):
-        yield table.fault(f"stays at {show(level)}: there is no test")
+        yield table.fault(f"stays at {show(level)}: there is no step")
     elif duration is not None and not times[0] <= 0.0 <= duration <= times[-1]:
         covered = f"{show(times[0])} ... {show(times[-1])} s"
         text = f"{covered} does not cover the test, 0 ... {show(duration)} s: add a row"
@@ -300,12 +300,12 @@ def _shown_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
     """Yield what a record cannot show: a ramp, a level of an unknown scale; a wrong sine."""
     for step in test.at("vref").entries:
         if "ramp" in step and "auto" in (step.at(key, "start").text for key in AUTOMATIC):
-            text = "auto finds a step: of a ramp give start, min and max of at and step"
+            text = "auto is for a step: for a ramp give start, min and max of at and step"
             yield step.at("ramp").fault(text)
     unknown = [key for key in ("scale", "offset") if channels.at("vt", key).is_section]
     shown = "vt0" not in test or test.at("vt0", "start").text == "auto"
     if test.content and unknown and shown:
-        text = f"is missing: the record does not show it where {unknown[0]} of vt is to be found"
+        text = f"is missing: the record does not show it while {unknown[0]} of vt is fitted"
         yield test.at("vt0").fault(text)
     for _, channel in channels.sections:
         yield from _frequency_faults(channel.at("sine", "frequency"))

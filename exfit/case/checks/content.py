@@ -71,7 +71,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     if not KINDS.get(str(node.value), ANY_PLANT).has_equations:
         faults = registry.parts("FAULTS").get(str(node.value))
         if faults is None:
-            text = f"{node.value}: nothing here can run it: that feature is not installed"
+            text = f"{node.value}: its feature is not installed"
             yield node.fault(text)
         else:
             yield from faults.load()(content, parts)

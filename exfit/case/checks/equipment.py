@@ -21,7 +21,7 @@ def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Ite
         section = content.at(name)
         if section.content:
             if kind.has_exciter and not kind.has_machine:
-                yield section.fault(f"not allowed with plant {kind.name}: nothing feeds it")
+                yield section.fault(f"not allowed with plant {kind.name}: it would have no input")
             if off_line and section.at("free").content:
                 yield section.at("free").fault(f"on open circuit a {name} does not act")
     stabiliser, governor = content.at("stabiliser"), content.at("governor")

@@ -202,7 +202,7 @@ def _scale_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault
     lowest, highest = search_bounds(low, high, None if unbounded else row)
     scale = section.content.get("scale", "log")
     if scale == "start" and start == 0.0:
-        yield section.at("start").fault("0 is no size by which to search: use another scale")
+        yield section.at("start").fault("0 sets no scale for the search: use another scale")
     elif scale != "log":
         if start == 0.0 and not isfinite(highest - lowest) and lowest in (0.0, -inf):
             yield section.at("start").fault("0 sets no scale for the search: give min and max")
@@ -276,7 +276,7 @@ def _stated_faults(
         elif symbol in given:
             if is_tie(given[symbol]):
                 what = "error" if errors else "source"
-                yield entry.fault(f"follows others by {given[symbol]}: no {what} of its own")
+                yield entry.fault(f"follows others by {given[symbol]}: give no {what}")
         elif symbol in known:
             text = "of a value that the case does not give"
             sourced = f"source {text}: it is {TYPICAL}"

@@ -222,7 +222,7 @@ def _computed_faults(channel: ContentNode, record: ContentNode) -> Iterator[Faul
         yield place.fault(f"{name}: record.phasors is missing, of which it is computed")
     elif signal not in OF_PHASORS:
         names = ", ".join(PHASOR_COLUMNS + signal for signal in OF_PHASORS)
-        yield place.fault(f"{name} is not computed of phasors, only {names}")
+        yield place.fault(f"{name} is not computed from phasors, only {names}")
     elif signal in OF_CURRENT_PHASOR and "current" not in record.at("phasors"):
         yield place.fault(f"{name} needs record.phasors.current, which is missing")
 

@@ -113,30 +113,31 @@ class AsFoundSection(Section):
     """The model in the planner's base before the test; the report compares it with the fitted."""
 
     source: Text | None = Field(
-        default=None, description="Where it is from, such as unit3.dyr, bus 101, machine 1."
+        default=None, description="Its source, such as unit3.dyr, bus 101, machine 1."
     )
     bus: Bus | None = Field(
-        default=None, description="Bus of the unit there; an export finds its records by it."
+        default=None,
+        description="Bus of the unit in that file, by which the export finds its records.",
     )
     id: MachineId | None = Field(
-        default=None, description='Machine id of the unit there, such as "1".'
+        default=None, description='Machine id of the unit in that file, such as "1".'
     )
     file: Text | None = Field(
         default=None,
-        description="The planner's file that it is from; path, relative to the case file.",
+        description="Planner's file it was taken from: path, relative to the case file.",
     )
     model: Text | None = Field(
         default=None, description="Name of its exciter in the catalogue; default: that of the case."
     )
     parameters: Frozen[Number] = Field(
         default_factory=nothing,
-        description="Its values: KA of the exciter, machine.H, stabiliser.KS. What is missing is "
-        "as in the case; of another exciter it has its typical value.",
+        description="Its values: KA of the exciter, machine.H, stabiliser.KS. Default: as in the "
+        "case; for another exciter its typical value.",
     )
     unused: Frozen[Number] = Field(
         default_factory=nothing,
-        description="Values of its records that the planner's program reads and does without, such "
-        "as TA of ST3C in PSS/E: 0 in the case; an export writes them back.",
+        description="Values in its records that the planner's program ignores, such as TA of ST3C "
+        "in PSS/E: 0 in the case; the export writes them back.",
     )
 
 
@@ -145,41 +146,43 @@ class CriteriaSection(Section):
 
     rmse: Positive = Field(
         default=DEFAULTS.rmse,
-        description="Of the rms of the difference, in % of the change that was recorded.",
+        description="Limit for the rms of the difference, % of the recorded change.",
     )
     final_value: Positive = Field(
-        default=DEFAULTS.final_value, description="Of the final value, in % of that change."
+        default=DEFAULTS.final_value, description="Limit for the final value, % of that change."
     )
     overshoot: Positive = Field(
-        default=DEFAULTS.overshoot, description="Of the overshoot, in % of that change."
+        default=DEFAULTS.overshoot, description="Limit for the overshoot, % of that change."
     )
     rise_time: Positive = Field(
-        default=DEFAULTS.rise_time, description="Of the rise time, in % of the recorded one."
+        default=DEFAULTS.rise_time, description="Limit for the rise time, % of the recorded one."
     )
     peak_time: Positive = Field(
-        default=DEFAULTS.peak_time, description="Of the peak time, in % of the recorded one."
+        default=DEFAULTS.peak_time, description="Limit for the peak time, % of the recorded one."
     )
     settling_time: Positive = Field(
         default=DEFAULTS.settling_time,
-        description="Of the settling time, in % of the recorded one.",
+        description="Limit for the settling time, % of the recorded one.",
     )
     time: Positive = Field(
-        default=DEFAULTS.time, description="s; a time that differs by no more meets its criterion."
+        default=DEFAULTS.time,
+        description="A time within this of the recorded one meets its criterion, s.",
     )
 
 
 class ReportRequest(Section):
-    """What the report judges by."""
+    """Acceptance criteria of the report."""
 
     criteria: CriteriaSection = Field(
-        default_factory=CriteriaSection, description="When a response matches its record."
+        default_factory=CriteriaSection,
+        description="Criteria for the match of a response with its record.",
     )
 
 
 ABOUT = Field(
     default_factory=nothing,
-    description="Facts about unit and test that the report shows, under any names, such as Plant, "
-    "Unit, Rated, Test date, Tested by.",
+    description="Facts about unit and test for the report, under any names, such as Plant, Unit, "
+    "Rated, Test date, Tested by.",
 )
 
 
@@ -216,11 +219,11 @@ class CaseDocument(Section):
     limiters: tuple[Limiter, ...] = Field(
         default=(),
         description="Limiters of over- and underexcitation, at most one of each kind; on open "
-        "circuit only what limits the field current acts.",
+        "circuit only limiters of the field current act.",
     )
     test: BumpTest | None = Field(
         default=None,
-        description="The steps that were made; with records, each of them has its own.",
+        description="The test; with records, each of them has its own.",
     )
     record: RecordFile | None = Field(
         default=None, description="The measured signals; not required by simulate."
@@ -228,7 +231,7 @@ class CaseDocument(Section):
     records: tuple[Recording, ...] = Field(
         default=(),
         min_length=1,
-        description="In place of test and record: several tests with their records, in one fit.",
+        description="Several tests with their records, fitted together; replaces test and record.",
     )
     parameters: Parameters = Field(
         default_factory=Parameters, description="Fixed and free parameters of the exciter."
@@ -246,15 +249,14 @@ class CaseDocument(Section):
     )
     accept: Limit | None = Field(
         default=None,
-        description="Limit of the error on records that were not fitted, which then judges alone; "
-        "beyond it the exit code is 3. Default: such a record must be matched better than by a "
-        "constant, with an rmse of at most 3 times that of the fit, or 3 times the noise of the "
-        "record where that is larger.",
+        description="Limit of the error on records that were not fitted; beyond it the exit code "
+        "is 3. Default: better than a constant, with an rmse of at most 3 times that of the fit, "
+        "or 3 times the noise of the record if that is larger.",
     )
     as_found: AsFoundSection | None = Field(
         default=None,
         description="The model in the planner's base before the test; default: the start values.",
     )
     report: ReportRequest = Field(
-        default_factory=ReportRequest, description="What the report judges by."
+        default_factory=ReportRequest, description="Acceptance criteria of the report."
     )

@@ -62,7 +62,7 @@ class Tolerance(Section):
     """Limits at which the search has converged."""
 
     gradient: NotNegative = Field(
-        default=1e-8, description="Limit on the norm of the gradient, as a share of its first one."
+        default=1e-8, description="Limit on the norm of the gradient, relative to its first one."
     )
     gradient_absolute: NotNegative | None = Field(
         default=None,
@@ -83,8 +83,8 @@ class DgnSection(Section):
 
     step: Literal["capped", "full"] = Field(
         default="capped",
-        description="First trial: the best step within a cap on each parameter's change, which "
-        "follows the steps that proved good (a trust region); or the full Gauss-Newton step.",
+        description="First trial: the best step within a trust region that limits the change of "
+        "each parameter, or the full Gauss-Newton step.",
     )
     cut: Literal["parabola", "half"] = Field(
         default="parabola",
@@ -127,7 +127,7 @@ class Estimate(Section):
 
     strategy: Strategy = Field(
         default=DEFAULT_STRATEGY,
-        description=f"Method of the descent from the start of the case. {EXPLAINED}.",
+        description=f"Method of the run from the start of the case. {EXPLAINED}.",
     )
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."
@@ -181,11 +181,11 @@ class Estimate(Section):
     )
     weights: Literal["given", "balanced"] = Field(
         default="given",
-        description="Weights of the channels: those given with them; or balanced, one over the "
-        "scatter of each channel's residuals, found by weighting, fitting and weighting anew.",
+        description="Weights of the channels: those given with them; or balanced, the inverse of "
+        "the scatter of each channel's residuals, by repeated weighting and fitting.",
     )
     search: SearchKind = Field(
-        default=DEFAULT_SEARCH, description=f"How far the search goes. {SEARCHES_EXPLAINED}."
+        default=DEFAULT_SEARCH, description=f"Extent of the search. {SEARCHES_EXPLAINED}."
     )
     starts: Annotated[Count, Field(le=MOST_STARTS)] = Field(
         default=FURTHER_STARTS,
@@ -193,9 +193,8 @@ class Estimate(Section):
     )
     causes: NotNegative | None = Field(
         default=None,
-        description="Processor time, s, that the search for the causes of a misfit may take, of "
-        "which trials need most. Default: 30, or three times what the fit took until then if that "
-        "is more.",
+        description="Limit of processor time, s, for the search for causes of a misfit. Default: "
+        "30, or three times the time of the fit if that is more.",
     )
 
     @property

@@ -164,17 +164,17 @@ class PlantElsewhere(WithData):
     twin: Literal["open-circuit", "infinite-bus"] | None = Field(
         default=None,
         description="The plant of exfit that gives the exact derivatives; default: none, they are "
-        "quotients of the runs.",
+        "finite differences of runs.",
     )
-    parallel: Count = Field(default=1, description="How many processes of it run side by side.")
-    time_limit: Positive = Field(default=60.0, description="For each run, s.")
+    parallel: Count = Field(default=1, description="Number of its processes that run in parallel.")
+    time_limit: Positive = Field(default=60.0, description="Time limit of each run, s.")
     names: Frozen[Text] = Field(
         default_factory=nothing,
-        description="Names that parameters have there, where they are others, such as KA: K_A.",
+        description="Names of its parameters, where they differ, such as KA: K_A.",
     )
     machine: Text | None = Field(default=None, description="Machine model of the twin.")
     network: Frozen[Number] = Field(
-        default_factory=nothing, description="As that of the twin infinite-bus."
+        default_factory=nothing, description="Network of the twin infinite-bus."
     )
     swing: Swing = Field(default="power", description=SWING)
 
@@ -222,12 +222,11 @@ class FmuPlant(PlantElsewhere):
     )
     inputs: Frozen[Text] = Field(
         default_factory=nothing,
-        description="Names of its inputs, where they are others, such as vref: avr.dVref.",
+        description="Names of its inputs, where they differ, such as vref: avr.dVref.",
     )
     outputs: Frozen[Text] = Field(
         default_factory=nothing,
-        description="Names of its variables that are compared, where they are others, such as "
-        "vt: gen.V.",
+        description="Names of the compared variables, where they differ, such as vt: gen.V.",
     )
 
     @property

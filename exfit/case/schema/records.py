@@ -95,7 +95,7 @@ class StatusSection(Section):
     column: Text = Field(description="Name of the column.")
     accept: tuple[Text | int, ...] = Field(
         default=(),
-        description="Entries that are good; default: words STAT of C37.118 without data error, in "
+        description="Entries of valid rows; default: words STAT of C37.118 without data error, in "
         "synchronism and sorted by time; or good, ok, valid.",
     )
 
@@ -127,7 +127,7 @@ class Compared(Section):
     weight: Positive = Field(default=1.0, description="Weight of the residuals of the signal.")
     noise: Positive | None = Field(
         default=None,
-        description="Standard deviation of its noise, pu, in place of a weight; give it for all "
+        description="Standard deviation of its noise, pu, instead of a weight; give it for all "
         "compared channels or for none.",
     )
     filter: Filter | None = Field(
@@ -135,8 +135,8 @@ class Compared(Section):
     )
     outliers: Positive | None = Field(
         default=None,
-        description="Leaves out samples that are farther from the running median than this many "
-        "standard deviations of the noise.",
+        description="Discards samples farther from the running median than this many standard "
+        "deviations of the noise.",
     )
     averaged: NotNegative | None = Field(
         default=None,
@@ -242,7 +242,7 @@ class RecordFile(Section):
     switchings: Literal["find", "mask", "compare"] = Field(
         default="find",
         description="Whether 0.2 s before and after each switching in the grid, a jump of vt or of "
-        "its angle, are left out (mask) or compared; find leaves them out and fits the instants of "
+        "its angle, are left out (mask) or compared; find leaves them out and fits the times of "
         "larger ones, each between two samples; grid-playback only.",
     )
     filter: Filter | None = Field(
@@ -255,8 +255,8 @@ class RecordFile(Section):
     )
     repeats: Literal["refuse", "first", "last"] = Field(
         default="refuse",
-        description="Which of several rows with one time stamp is used; rows that are alike are "
-        "one, whatever it is.",
+        description="Which of several rows with the same time stamp is used; identical rows count "
+        "as one.",
     )
     resample: Positive | None = Field(
         default=None,
@@ -270,8 +270,8 @@ class RecordFile(Section):
     )
     delay: Findable = Field(
         default=0.0,
-        description="Delay of the recorder, s; or {start, min, max} to fit it. In a grid event "
-        "it is that of what is compared behind what drives the unit.",
+        description="Delay of the recorder, s; or {start, min, max} to fit it. In a grid event: of "
+        "the compared channels, relative to the driving ones.",
     )
 
 
@@ -288,6 +288,6 @@ class Recording(Section):
     )
     test: BumpTest = Field(
         default_factory=BumpTest,
-        description="The steps that were made; only a record of a grid event needs none.",
+        description="The test; only a record of a grid event needs none.",
     )
     record: RecordFile = Field(description="The measured signals.")

@@ -51,7 +51,7 @@ class FindableStep(Section):
     )
     ramp: Positive | None = Field(
         default=None,
-        description="Time that the change takes, in a line, s; default: it is a step.",
+        description="Duration of a linear ramp, s; default: it is a step.",
     )
 
 
@@ -98,7 +98,7 @@ class ReferenceFile(Section):
     )
     filter: Filter | None = Field(
         default=None,
-        description="{lowpass: Hz} or {median: samples}, against its noise; its jumps stay.",
+        description="{lowpass: Hz} or {median: samples}, against its noise; its jumps are kept.",
     )
 
 
@@ -141,7 +141,7 @@ class AngleStep(Section):
     unit: AngleUnit = Field(description="Unit of the change.")
     ramp: Positive | None = Field(
         default=None,
-        description="Time that the change takes, in a line, s; default: it is a step.",
+        description="Duration of a linear ramp, s; default: it is a step.",
     )
 
     @property
@@ -191,8 +191,8 @@ class BreakerSection(Section):
     speed: Literal["recorded", "simulated"] | None = Field(
         default=None,
         description="Speed that vt follows from then on. recorded: the channel speed of the "
-        "record; simulated: that of constant mechanical power, which holds for some 0.2 s, and "
-        "the channel is compared. Default: recorded where the record has the channel.",
+        "record; simulated: that at constant mechanical power, valid for some 0.2 s; the channel "
+        "is compared. Default: recorded where the record has the channel.",
     )
 
 
@@ -227,8 +227,8 @@ class BumpTest(Section):
     )
     vs: Reference = Field(
         default=(),
-        description="The signal at the stabiliser's input of the exciter, given like vref; "
-        "in a playback the record's channel vs drives it without.",
+        description="The signal at the stabiliser's input of the exciter, given like vref; in a "
+        "playback the channel vs of the record drives it.",
     )
     pref: Reference = Field(
         default=(),

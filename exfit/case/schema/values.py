@@ -109,7 +109,7 @@ StdErrors = Frozen[Positive]
 STD_ERRORS = Field(
     default_factory=nothing,
     description="Standard error of each given value that is not exact, in its own unit, as from a "
-    "test report; the intervals of a fit allow for it.",
+    "test report; the intervals of a fit include it.",
 )
 
 

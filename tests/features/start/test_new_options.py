@@ -148,7 +148,7 @@ def test_what_is_open_is_asked_on_a_terminal(record, run, monkeypatch):
     monkeypatch.setattr("click.prompt", lambda text, **_: asked.append(text) or next(answers))
     ran = run("new", "--model", "AC1A", "--record", record, "-o", "case.yaml")
     assert ran.code == 0
-    assert asked[0].startswith("records[0].test.vref[0].step (pu, as it was keyed in; vt changed")
+    assert asked[0].startswith("records[0].test.vref[0].step (pu, as keyed in; vt changed")
     content = yaml.safe_load((record.parent / "case.yaml").read_text(encoding="utf-8"))
     assert [*sizes_of(content).values()] == [0.05, "?", -0.05, 0.02]
     assert content["records"][1]["record"]["channels"]["vt"]["base"] == 15.75
