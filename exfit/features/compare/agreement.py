@@ -117,11 +117,11 @@ def compare(
 
     Each is the folder or the result.json of a run, or a file of any kind that records have. The
     signals that the first shares with others are compared over the time that all cover, on the
-    finest of their clocks; between the samples of a coarser one lies a cubic (Akima 1970). A record
-    is never interpolated: what is simulated is read at its samples.
+    finest of their clocks; a coarser one is interpolated by cubics (Akima 1970), a record never:
+    the simulation is read at its samples.
 
     Args:
-        sources: where the responses are, named A, B, C ...; one alone only beside a record.
+        sources: where the responses are, named A, B, C ...; one alone needs a record.
         record: where the measured curve is.
         columns: possible columns of each signal: a file is read by the one that it has.
         time: possible columns of the time; by default the usual names are looked for.

@@ -241,5 +241,5 @@ class Bench:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The parameters that are to be known best."""
+        """The parameters to determine best."""
         return tuple(self.problem.free[k].name for k in self.chosen)

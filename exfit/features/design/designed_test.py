@@ -1,4 +1,4 @@
-"""The steps of the reference that make chosen parameters best known, within limits of the plant.
+"""The steps of the reference that determine chosen parameters best within limits of the plant.
 
 The search is a coordinate exchange over times and levels, from several starts; what it makes
 small is an alphabetic criterion of the Cramer-Rao bound at the values of the case.
@@ -58,7 +58,7 @@ Cost = Callable[[Moves], float]
 
 @dataclass(frozen=True, eq=False)
 class OtherValues:
-    """What becomes of a test where each free parameter in turn is ``spread`` of itself off.
+    """The outcome of a test where each free parameter in turn is ``spread`` of itself off.
 
     ``extremes`` are the least and the largest value of signals, ``ratios`` the largest standard
     errors in shares of those of the best single step; None where either test determines nothing.
@@ -71,7 +71,7 @@ class OtherValues:
 
 @dataclass(frozen=True, eq=False)
 class DesignedTest:
-    """The test that makes the parameters ``of`` a case best known, and the ways to it.
+    """The test that determines the parameters ``of`` a case best, and the stages to it.
 
     ``single`` is the best single step with the same channels and duration. ``noise`` is that of
     each channel, per unit, ``rate`` in samples a second, ``vt0`` the voltage at the start.
@@ -134,16 +134,16 @@ def design_test(
     criterion: str = "A",
     noise: Mapping[str, float] | None = None,
 ) -> DesignedTest:
-    """Return the steps of the reference that make parameters of a case best known.
+    """Return the steps of the reference that determine parameters of a case best.
 
     Args:
         case: a case, or the path of its file; it needs no record.
-        of: the parameters to be known best, all free ones by default; the others stay free.
+        of: the parameters to determine best, all free ones by default; the others stay free.
         limits: how far vt and vref may deviate from their start (default 0.05), the largest efd
             and the least, efd_min; per unit.
         duration: of the test, s; by default that of the case.
         channels: what can be recorded, of which up to three are chosen; by default all signals.
-        criterion: what is made least: "A" the mean square of the relative standard errors, "D" the
+        criterion: what is minimised: "A" the mean square of the relative standard errors, "D" the
             volume of their confidence ellipsoid.
         noise: as in `identify`.
 

@@ -77,13 +77,13 @@ class Design:
 def identify(case: Case | str | PathLike[str], noise: Mapping[str, float] | None = None) -> Design:
     """Predict the standard errors of a case's free parameters in tests, at their start values.
 
-    The case's own test comes first, on the clock of its record if it has one; beside it steps of
-    2, 5 and 10 %, a test twice as long, and further signals.
+    The test of the case comes first, on the clock of its record if it has one; then steps of 2, 5
+    and 10 %, a test twice as long, and further signals.
 
     Args:
         case: a case, or the path of its file; it needs no record.
-        noise: standard deviation of the noise by signal, per unit; what is missing: the case's
-            own, else that of its record, else a typical one.
+        noise: standard deviation of the noise by signal, per unit; what is missing: that of the
+            case, else of its record, else a typical one.
 
     Raises ExfitError for input that cannot be used.
 

@@ -52,7 +52,7 @@ MOST_PASSES = 5
 FAR = 0.1  # of a scaled parameter: the response to noise is not the same
 SMALL_BIAS = 0.1  # standard errors: a smaller change of it matters to no interval
 UNSEEN = 1e-9  # of the largest singular value: rounding
-REFUTED = 4.0  # times the least cost: such a minimum stays refuted whatever the weights
+REFUTED = 4.0  # times the least cost: such a minimum stays rejected with any weights
 NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
 TURN = 2.0 * np.pi  # rad
 NOT_WEIGHTED = (
@@ -73,13 +73,13 @@ class RestNoise(NamedTuple):
 
 
 def noise_of_inputs(simulator: Simulator) -> dict[str, float]:
-    """Return the standard deviation of the noise of the recorded inputs, by their own scatter."""
+    """Return the standard deviation of the noise of the recorded inputs, by their scatter."""
     recorded = simulator.inputs.recorded
     return {name: noise(own.samples, ORDER) for name, own in recorded.items()}
 
 
 def noise_of_channel(channel: Channel) -> float:
-    """Return the standard deviation of a channel's own noise, per unit: given, or estimated."""
+    """Return the standard deviation of the noise of a channel, per unit: given, or estimated."""
     if channel.noise is not None:
         return channel.noise
     return max(noise(channel.measured[channel.kept], ORDER), LEAST_NOISE)

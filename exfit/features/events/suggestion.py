@@ -99,7 +99,7 @@ def _connection(voltage: InspectedPhasor, kv: Base | None) -> Section:
 
 
 def _driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
-    """Suggest the channels that drive the unit: of phasors, or columns of their own."""
+    """Suggest the channels that drive the unit: of phasors, or separate columns."""
     if inspection.pmu is not None:
         return _driving_phasors(inspection, inspection.pmu)
     voltage, angle, frequency = map(inspection.channel_of, ("vt", "angle", "frequency"))
@@ -126,7 +126,7 @@ def _driving_phasors(inspection: Inspection, pmu: PmuContent) -> Section:
 
 
 def _compared(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
-    """Suggest the channels that are compared: meters of their own first, else those of phasors."""
+    """Suggest the channels that are compared: separate meters first, else those of phasors."""
     section: Section = {}
     if inspection.plays_in:
         return section

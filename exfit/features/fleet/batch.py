@@ -87,35 +87,34 @@ def batch(
 ) -> Fleet:
     """Fit many cases in several processes; what the folder has already is not fitted again.
 
-    A case is fitted as ``exfit.fit`` does it, in a worker process with one thread, and a programme
-    is run as by ``exfit.run``. Its result lies
-    in the folder under a hash of all that goes into it: the case, its records, the code that it
-    names, these settings and the version of exfit. A case that fails, crashes or does not end is a
-    row with its reason, and the others go on.
+    A case is fitted as by ``exfit.fit``, in a worker process with one thread, and a programme is
+    run as by ``exfit.run``. Its result is stored in the folder under a hash of all its inputs: the
+    case, its records, the code that it names, these settings and the version of exfit. A case that
+    fails, crashes or does not end is a row with its reason, and the others continue.
 
     Args:
         cases: case files, programmes, and folders with such files in them or below.
-        folder: keeps the results; that of an earlier batch is gone on with.
-        workers: processes at work; None: as many as there are processors; 0: none, the cases are
-            fitted in this process, where no time limit ends them.
+        folder: keeps the results; that of an earlier batch is continued.
+        workers: worker processes; None: one for each processor; 0: the cases are fitted in this
+            process, without a time limit.
         scheduler: the address of that of a Dask cluster, whose workers fit the cases in place of
             processes of this computer; the contents of all files travel to them.
-        part: (number, of): only every such share of the cases, so that several computers that see
-            the folder have all of them, each once.
+        part: (number, of): only this share of the cases, so that several computers that share the
+            folder fit all of them, each once.
         retry_failed: fits again what failed, crashed, or took too long.
         trust: runs the code of cases whose model is a file of Python or whose plant is a command.
         time_limit: of a case, s; inf: none.
         strategy: of the local optimisation of each case; None: that of the case.
         search: "global" or "local"; None: that of the case.
         observer: is called as the batch proceeds.
-        further: make files of each result, to lie beside those of every fit; as they travel to
-            workers they are functions of a module.
+        further: make more files of each result; they are sent to workers, so must be functions of
+            a module.
         compute: has the cases fitted in another way than in processes of this computer.
         write_tables: called with the fleet at the end, and again if the folder has changed since.
         made: further cases, by their files, each with the function that makes it when its turn
             comes: it returns why it cannot, or "".
 
-    A KeyboardInterrupt ends all workers at once: what is done is kept, and the fleet is
+    A KeyboardInterrupt ends all workers at once: what is finished is kept, and the fleet is
     ``interrupted``. Raises ExfitError where there are no cases, the folder cannot be written, or
     the cluster cannot be used or is lost: what is done is kept then, too.
 

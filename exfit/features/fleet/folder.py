@@ -458,7 +458,7 @@ def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
 
 
 def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
-    """Stamp all files of a folder that change when a case is added or comes to an end."""
+    """Stamp all files of a folder that change when a case is added or ends."""
     stamps = set[tuple[str, int, int]]()
     for pattern in (f"{INDEX}/*.json", *(f"*/{each}" for each in OUTCOMES)):
         for file in folder.glob(pattern):

@@ -1,9 +1,9 @@
 """Cases in the workers of a cluster, with the contents of all files that they name.
 
-Each is fitted in a process beside the worker, which shares no disk with this computer. A process of
-its own can be ended where a case hangs, takes no more than itself along where a case crashes, and
-computes with one thread, however many the worker has: the worker's other cases and its connection
-to the scheduler go on.
+Each is fitted in a process beside the worker, which shares no disk with this computer. A separate
+process can be ended where a case hangs, is the only one to end where a case crashes, and computes
+with one thread, however many the worker has: the worker's other cases and its connection to the
+scheduler go on.
 """
 
 import hashlib
@@ -158,7 +158,7 @@ class BundledTask(CaseTask):
         return cls(**vars(task), bundle=bundle_of(task.files))
 
     def run(self) -> CaseOutcome:
-        """Fit the case; it reads no file but its own. To be run in a process of its own."""
+        """Fit the case; it reads only its files. To be run in a separate process."""
         # what the process finds from its current folder, before it leaves that
         sys.path[:] = [str(Path(path).absolute()) for path in sys.path]
         if cache := os.environ.get(CACHE):

@@ -1,6 +1,6 @@
-"""The folder of a programme: one folder for each test, what all came to, and one report.
+"""The folder of a programme: one folder for each test, their outcomes, and one report.
 
-The result of a test lies there under a hash of all that goes into it, and is not run again.
+The result of a test lies there under a hash of all its inputs, and is not run again.
 """
 
 from collections.abc import Callable, Iterable, Mapping

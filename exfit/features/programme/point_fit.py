@@ -181,7 +181,7 @@ def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:
 
 
 def descended(problem: PointProblem, theta: Array) -> estimate.Result:
-    """Return the minimum to which a descent leads from scaled parameters (N,)."""
+    """Return the minimum to which a local optimisation converges from scaled parameters (N,)."""
     return estimate.least_squares(
         problem.residuals,
         theta,

@@ -1,4 +1,4 @@
-"""What the tests of a programme came to, as blocks."""
+"""The outcomes of the tests of a programme, as blocks."""
 
 from collections.abc import Iterator, Sequence
 from math import inf, isfinite

@@ -1,4 +1,4 @@
-"""Programmes run: each test in its turn, with what those before it measured; or checked before."""
+"""Programmes run: each test with the results of those before it; or checked before."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -56,25 +56,25 @@ def run(
     """Run the tests of a programme in the order in which one feeds the next.
 
     Saturation tests come first, then points on load, then tests that determine data of the
-    machine; what they measured enters the tests after them. Last all bump tests are fitted
-    together. A case is the programme of one test.
+    machine; their results are passed on to the later tests. Last, all bump tests are fitted
+    together. A case is a programme of one test.
 
     Args:
         programme: a programme, or the path of its file.
-        folder: keeps the result of each test as soon as it is there. A test whose result is there
-            already is not run again, unless its section, its files, the values that enter it or
-            exfit have changed since. None: nothing is kept.
+        folder: keeps the result of each test as soon as it exists. A finished test is run again
+            only if its section, its files, the values passed on to it or exfit have changed. None:
+            nothing is kept.
         again: runs all tests again, also those whose result is kept.
         progress: called with the test that runs and its iteration, or how far its search from
             further starts is; None as it begins.
         finished: called with every test that has ended.
         keep: writes the result of a test into the folder.
-        strategy: of the descent of each fit; None: the programme's own.
-        search: "global" or "local"; None: the programme's own.
+        strategy: of each local optimisation; None: that of the programme.
+        search: "global" or "local"; None: that of the programme.
 
-    A KeyboardInterrupt ends the run: the result has the tests that were done, and the best point of
-    the fit that was running, which is not kept as done. A test that fails keeps no other from
-    running. Raises CaseError with all faults of the file, and of its records.
+    A KeyboardInterrupt ends the run: the result has the finished tests, and the best point of the
+    fit that was running, which is not kept as finished. If a test fails the others are run. Raises
+    CaseError with all faults of the file, and of its records.
 
     Example:
         >>> result = exfit.run("programme.yaml", "runs/unit-3")

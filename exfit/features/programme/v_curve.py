@@ -172,8 +172,8 @@ class FieldsOnLoad:
 def search_of(problem: PointProblem) -> PointProblem:
     """Return the same problem with SALIENCY free in place of Xq.
 
-    By Xq itself the field current is stationary where Xq = Xd: a descent that comes there finds
-    no way back, and beyond it the same field currents return.
+    By Xq itself the field current is stationary where Xq = Xd: a local optimisation that comes
+    there does not leave it, and beyond it the same field currents return.
     """
     quadrature = next((each for each in problem.free if each.name == "Xq"), None)
     if quadrature is None:
@@ -389,7 +389,7 @@ def _trial(fields: FieldsOnLoad, problem: PointProblem, names: Sequence[str]) ->
 
 
 def _minimum(problem: PointProblem) -> Values | None:
-    """Find the values at the minimum that a descent from those of a problem reaches, if any."""
+    """Find the values to which a local optimisation from those of a problem converges, if any."""
     if not problem.free:
         return problem.given
     search = search_of(problem)

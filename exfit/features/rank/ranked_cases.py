@@ -63,10 +63,10 @@ def rank(
     finished: Callable[[FitRun], None] = lambda _: None,
     search: str = "global",
 ) -> Ranking:
-    """Fit the same records under several exciters, and rank these by how well they do.
+    """Fit the same records under several exciters, and rank these by their match.
 
-    The exciter of the case has its values there, the others the typical data and bounds of their
-    data sheets; machine, network, stabiliser, tests and records are those of the case for all.
+    The exciter of the case has the values of the case, the others the typical data and bounds of
+    their data sheets. Machine, network, stabiliser, tests and records are those of the case.
 
     Args:
         case: a case, or the path of its file.
@@ -77,7 +77,7 @@ def rank(
         finished: called with every fit that has ended.
         search: "global", or "local" for one run from the typical data alone.
 
-    A KeyboardInterrupt ends it with the models that are done. Raises CaseError for a case that
+    A KeyboardInterrupt ends it with the models that are finished. Raises CaseError for a case that
     cannot be fitted, ModelError for a model that does not exist.
 
     Example:

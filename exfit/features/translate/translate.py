@@ -79,7 +79,7 @@ def translate(
     steps: Sequence[float] = (),
     progress: Watch = lambda _: None,
 ) -> Translation:
-    """Return a fitted exciter as another model, and what is lost by that.
+    """Return a fitted exciter as another model, and what is lost.
 
     Args:
         result: a fit, or the path of its result.json or folder.
@@ -88,7 +88,7 @@ def translate(
             default 1, 5, 10 % on open circuit, and 1, 5 % on load where the fit has a network.
         progress: called with how far the search is.
 
-    A user's own model of the fit is run only from the file that was fitted. Raises ExfitError
+    A model from a user's file is run only from the file that was fitted. Raises ExfitError
     where one of the models cannot be simulated, KeyboardInterrupt at an interruption.
 
     Example:
