@@ -33,7 +33,7 @@ BUSES = click.IntRange(1, MOST_BUSES)
     "--records",
     type=click.Path(path_type=Path, exists=True),
     metavar="DIR|TABLE",
-    help="With --all: records named by bus and id, or a table of them.",
+    help="With --all: folder of records named by bus and id, or a table.",
 )
 @steps_option
 @bases_option
@@ -66,9 +66,9 @@ def import_(
 
     UNIT is a dynamics file of PSS/E (.dyr) or of PSLF (.dyd).
 
-    The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
-    holds several units, --bus and --id choose one, and --all makes a case of each. With --records
-    a case has the tests of its records, as `exfit new` makes it.
+    The case is a step of 5 % on open circuit, ready for `exfit simulate`. If UNIT has several
+    units, --bus and --id select one, and --all makes a case of each. With --records a case has the
+    tests of its records, as `exfit new` makes it.
     """
     from exfit.case.suggestion import relative
     from exfit.features.planner.fields import located
@@ -109,7 +109,7 @@ def import_(
 
 
 def _report_import(imported: "ImportedUnits", folder: Path) -> None:
-    """Say what was written and what was not; raises ExfitError where something was refused."""
+    """Report what was written and what was not; raises ExfitError where something was refused."""
     from exfit.features.planner.import_all import NO_MODEL, RECORDED, REFUSED, UNITS
 
     plan = imported.plan
@@ -122,12 +122,12 @@ def _report_import(imported: "ImportedUnits", folder: Path) -> None:
     counts = f"cases: {len(cases)}, with records: {len(lines[RECORDED])}"
     echo(f"written to {folder}; {counts}; all units: {UNITS}")
     for path in first_texts([str(path) for path in plan.others]):
-        echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
+        echo(f"no unit for {path}: its name does not begin with a bus", err=True)
     for line in first_texts(lines[NO_MODEL]):
         echo(f"no model: {line}", err=True)
     if plan.units.classical:
         count = f"{plan.units.classical} GENCLS without an exciter"
-        echo(f"not units to verify: {count}, constant voltages behind a reactance", err=True)
+        echo(f"not imported: {count}: constant voltages behind a reactance", err=True)
     refused = [*lines[REFUSED], *plan.faults]
     if refused:
         raise FileError(refused)
@@ -146,7 +146,10 @@ def _machine_id(_context: object, _option: object, value: str | None) -> str | N
 @click.command(short_help="Write the result of a fit as records of a planner's file.")
 @click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
-    "--all", "every", is_flag=True, help="RESULT is the folder of a batch: all verified units."
+    "--all",
+    "every",
+    is_flag=True,
+    help="Write all verified units of the batch in the folder RESULT.",
 )
 @click.option(
     "--dyr",
@@ -159,7 +162,7 @@ def _machine_id(_context: object, _option: object, value: str | None) -> str | N
     "--format",
     "form",
     type=click.Choice(["dyr", "dyd"]),
-    help="Kind of file: dyr of PSS/E, dyd of PSLF (default: as FILE is named, else dyr).",
+    help="Format: dyr of PSS/E, dyd of PSLF (default: by the suffix of FILE, else dyr).",
 )
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit (default: as found, else 1).")
 @click.option(
@@ -176,7 +179,7 @@ def _machine_id(_context: object, _option: object, value: str | None) -> str | N
     "--plb",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Of a fit of grid events: write what drove it as a play-in file of PSS/E instead.",
+    help="Of a fit of grid events: write the played-in signals as a file of PSS/E instead.",
 )
 @file_option
 @force_option
@@ -194,8 +197,8 @@ def export(
 ) -> None:
     """Write machine, exciter, stabiliser and governor of RESULT as records of PSS/E or PSLF.
 
-    RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, and
-    what is uncertain, is reported.
+    RESULT is the result.json of a fit, or the folder that holds it. Values that a record cannot
+    hold, and orders that are not confirmed, are reported.
 
     With --all RESULT is the folder of a batch, and the planner's file is written with the values of
     the units whose fits hold; every other byte of it stays as it is.
@@ -212,7 +215,7 @@ def export(
         if any(other is not None for other in of_record):
             raise click.UsageError("--bus, --id and --model: not allowed with --all.")
         if form is not None:
-            raise click.UsageError("--format: not allowed with --all, which keeps the file's own.")
+            raise click.UsageError("--format: not allowed with --all, which keeps the format.")
         if output is None:
             raise click.UsageError("Missing option '-o': the file to write.")
         _export_every_unit(result, dyr, output, force)
@@ -268,10 +271,10 @@ def _export_every_unit(fleet: Path, dyr: Path | None, output: Path, force: bool)
         raise ExfitError("\n".join([*reasons, f"{fleet}: no case has a finished fit"]))
     original = dyr or _original(fits)
     if output.exists() and original.exists() and output.samefile(original):
-        raise ExfitError(f"{output}: is the planner's own file: name another one with -o")
+        raise ExfitError(f"{output}: is the planner's file itself: name another one with -o")
     suffix = format_of(original).suffix
     if format_of(output).suffix != suffix:
-        raise ExfitError(f"{output}: {original} is a {suffix} file: name it so with -o")
+        raise ExfitError(f"{output}: must end with {suffix}, as {original} does")
     fitted = fitted_file(read_file(original), str(original), fits)
     left = [*fitted.left, *others]
     if not fitted.changes:
@@ -324,10 +327,10 @@ def _original(fits: "list[FittedUnit]") -> Path:
 def _report_export(
     output: Path, table: Path, changes: "tuple[ChangedValue, ...]", left: "list[LeftUnit]"
 ) -> None:
-    """Say what was changed and what was not; raises ExfitError where a verified unit was left."""
+    """Report what was changed and what not; raises ExfitError where a verified unit was left."""
     units = {(change.bus, change.id.upper()) for change in changes}
     echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
-    echo(f"what was changed: {table}")
+    echo(f"changes: {table}")
     undetermined: dict[str, list[str]] = {}
     for change in changes:
         if change.source == FITTED and None in (change.low, change.high):
@@ -335,7 +338,7 @@ def _report_export(
     texts = [f"{case}: not determined: {', '.join(own)}" for case, own in undetermined.items()]
     warn(first_texts(texts))
     for line in first_texts([f"{own.name}: {own.reason}" for own in left if not own.verified]):
-        echo(f"left as it was: {line}", err=True)
+        echo(f"not changed: {line}", err=True)
     refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
     if refused:
         raise FileError(refused)

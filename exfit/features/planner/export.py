@@ -51,7 +51,7 @@ Content = Mapping[str, Any]  # of a case
 
 @dataclass(frozen=True)
 class Exported:
-    """A dynamics file, and what its user must know."""
+    """A dynamics file, and warnings for its user."""
 
     text: str
     warnings: tuple[str, ...]
@@ -61,7 +61,7 @@ class Exported:
 class Written:
     """A record with its values, and their names by the source of their values.
 
-    ``unused`` are values of the planner's file that its program does without.
+    ``unused`` are values of the planner's file that its program ignores.
     """
 
     definition: Definition
@@ -82,8 +82,8 @@ def export(
 
     Args:
         result: a fit, its result.json, or the folder that holds it.
-        bus: of the unit; by default where it was found, else 1.
-        machine_id: of the unit; by default as it was found, else "1".
+        bus: of the unit; by default as found, else 1.
+        machine_id: of the unit; by default as found, else "1".
         model: the record of the exciter in place of the model's first one, such as ESAC8B.
         form: "dyr" of PSS/E or "dyd" of PSLF.
         translation: another model in place of the exciter.
@@ -99,7 +99,7 @@ def export(
     if not isinstance(result, FitResult):
         result = load_result(result)
     if form not in FORMATS:
-        raise ExfitError(f"{form}: no format of a planner's file; {near(form, FORMATS)}")
+        raise ExfitError(f"{form}: unknown format of a planner's file; {near(form, FORMATS)}")
     if bus is None or machine_id is None:
         found_bus, found_id = place_of(result)
         bus, machine_id = bus or found_bus, machine_id or found_id
@@ -152,7 +152,7 @@ def _comments(entry: Written) -> Iterator[str]:
 
 
 def place_of(result: FitResult) -> tuple[int, str]:
-    """The bus and the machine id of a unit where it was found, 1 where that is not said.
+    """The bus and the machine id of a unit as found, 1 where they are not given.
 
     Raises ExfitError for what no record can hold.
     """
@@ -161,7 +161,7 @@ def place_of(result: FitResult) -> tuple[int, str]:
     bus, machine_id = (1 if place[0] is None else place[0]), place[1] or "1"
     if not (0 < bus < MOST_BUSES and is_machine_id(machine_id)):
         raise ExfitError(
-            f"as_found: bus {bus}, id {machine_id!r} are not those of a record; "
+            f"as_found: bus {bus}, id {machine_id!r} cannot be written to a record; "
             "give them with --bus and --id"
         )
     return bus, machine_id
@@ -182,18 +182,18 @@ def _translated(result: FitResult, translation: Translation) -> FitResult:
 
 
 def _of_fit(result: FitResult, program: str) -> Iterator[str]:
-    """List remarks on the fit that the reader must know."""
+    """List remarks on the fit for the reader."""
     if not result.holds:
         yield f"the fit does not hold: {outcome_of(result)}: {explanation_of(result)}"
     weighty = [*by_weight(result.typical_values)]
     if weighty:
-        yield f"what was fitted depends on typical values: {first_of(weighty)}"
+        yield f"fitted values depend on typical values: {first_of(weighty)}"
     if result.saturation != "quadratic":
         yield as_quadratic(result, program)
 
 
 def as_quadratic(result: FitResult, program: str) -> str:
-    """Say that a program takes the saturation of a fit in another form."""
+    """Warn that a program takes the saturation of a fit in another form."""
     return (
         f"fitted with saturation: {result.saturation}; {program} takes E1 SE1 E2 SE2 as quadratic"
     )
@@ -295,7 +295,7 @@ def _limiters(
             result, content, Definition("limiter", LIMITERS[name], records[0]), f"{kind}."
         )
         if kind.upper() not in flags:
-            text = f"{name}: the exciter's record says nothing of its place: set its flag"
+            text = f"{name}: the exciter's record does not give its place: set its flag"
             warnings.append(text)
 
 
@@ -339,12 +339,12 @@ def _not_whole(record: DynamicsRecord, values: Mapping[str, float]) -> Iterator[
 
 
 def not_of_catalogue(result: FitResult, program: str) -> str:
-    """Say that the model of a fit is a user's own."""
+    """Explain that the model of a fit is a user's."""
     return f"{result.model} is not a model of the catalogue: it has no {program} record"
 
 
 def values_in_digits(result: FitResult, prefix: str) -> dict[str, float]:
-    """The values of a model; fitted ones, and those tied to them, in the digits that they bear."""
+    """The values of a model; fitted ones, and those tied to them, in the digits of their errors."""
     values = dict(result.values_of(prefix))
     for symbol, value in values.items():
         name = prefix + symbol
@@ -368,7 +368,7 @@ def _warnings(entry: Written) -> Iterator[str]:
         if acts:
             yield f"{record.name} cannot hold {symbol} = {show(value)}: it is lost"
     for symbol, value in unused_of(record, entry.values).items():
-        yield f"{record.name}: {entry.definition.program} does without {symbol} = {show(value)}"
+        yield f"{record.name}: {entry.definition.program} ignores {symbol} = {show(value)}"
     if record.doubt:
         yield f"{record.name}: {record.doubt}"
     if TYPICAL in entry.by_source:
@@ -377,7 +377,7 @@ def _warnings(entry: Written) -> Iterator[str]:
 
 
 def comment_lines(text: str, files: FileFormat = PSSE_FILES) -> list[str]:
-    """Return a comment of a planner's file in lines; what is not ASCII is not sure to be read."""
+    """Return a comment of a planner's file in lines, in ASCII, which every program reads."""
     plain = "".join(letter if " " <= letter <= "~" else "?" for letter in text)
     return textwrap.wrap(
         plain,

@@ -18,7 +18,7 @@ END_OF_FILE = "\x1a"  # as DOS wrote it
 
 
 class DynamicsFault(NamedTuple):
-    """What is wrong, or must be known, on a line of the file."""
+    """A fault or a warning on a line of the file."""
 
     line: int
     text: str

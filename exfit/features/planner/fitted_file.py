@@ -150,7 +150,7 @@ def _unit_of(place: tuple[int | None, str], units: DynamicsUnits, file: str) -> 
     """Return the unit of a fit in the file; raises ExfitError where there is none."""
     bus, machine_id = place
     if bus is None or not machine_id:
-        raise ExfitError("the case does not say bus and id of its unit (as_found)")
+        raise ExfitError("the case does not give bus and id of its unit (as_found)")
     for unit in units.units:
         if (unit.bus, unit.id.upper()) == place:
             return unit
@@ -177,7 +177,7 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[Reading, 
     prefixes = tuple(f"{kind}." for kind in result.limiter_models)
     fitted = [name for name in result.parameters if name.startswith(prefixes)]
     if fitted:
-        raise ExfitError(f"records of limiters are not changed: fitted: {', '.join(fitted)}")
+        raise ExfitError(f"records of limiters cannot be changed: fitted: {', '.join(fitted)}")
     for model, part, prefix in models:
         if model is None:
             continue
@@ -202,7 +202,7 @@ def _refuse_other_record(result: FitResult, part: Reading, prefix: str, place: s
             others.append(f"{symbol} is {show(now)}, as found {was}")
     if others:
         more = ", ..." if len(others) > MOST_NAMED else ""
-        raise ExfitError(f"{place}: changed since: {', '.join(others[:MOST_NAMED])}{more}")
+        raise ExfitError(f"{place}: changed since import: {', '.join(others[:MOST_NAMED])}{more}")
     usual = getattr(part.definition.model, "inputs", ())
     inputs = stabiliser_inputs(result.case_text, result.case) or usual
     if part.inputs and inputs != part.inputs:
@@ -267,7 +267,7 @@ def _refuse_lost(
         if symbol not in part.definition.names and prefix + symbol in result.parameters:
             raise ExfitError(f"{lost}, which was fitted")
         if values[symbol] != own.get(symbol, values[symbol]):
-            raise ExfitError(f"{lost}: it stands for {show(own[symbol])}")
+            raise ExfitError(f"{lost}: its value there is {show(own[symbol])}")
 
 
 def _changes(

@@ -253,14 +253,14 @@ class CaseMaker:
             draft = case_of_plan(self.case, self._unit(), self.file.parent, {}).draft
             if self.file.exists() and self.file.read_bytes() != draft.text.encode():
                 return (
-                    f"{self.file} exists and is not what the table makes: remove it, or give it "
-                    "as a case in place of the row"
+                    f"{self.file} exists with other content than the table makes: remove it, or "
+                    "pass it as a case in place of the row"
                 )
             write(self.file, draft.text)
         except ExfitError as fault:
             return "; ".join(str(fault).splitlines())
         missing = [f"{dotted(value.place)} (line {value.line})" for value in draft.open_values()]
-        lacking = f"{self.case.place}: the table lacks what {self.file} has as ?: "
+        lacking = f"{self.case.place}: missing in the table ('?' in {self.file}): "
         return lacking + ", ".join(missing) if missing else ""
 
     def _unit(self) -> UnitData:

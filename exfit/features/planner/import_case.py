@@ -1,4 +1,4 @@
-"""The case file that a unit of a planner's dynamics file makes: to be read, run, and edited."""
+"""The case file of a unit of a planner's dynamics file."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def read_file(path: Path) -> bytes:
 
 
 def imported_case(unit: Unit, file: str) -> CaseDraft:
-    """Make the case of a unit on open circuit, with a comment for all that it rests on.
+    """Make the case of a unit on open circuit, with a comment for the origin of its values.
 
     ``file`` is the path of the dynamics file as the case names it.
     """
@@ -55,7 +55,7 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
         origin = f"{SPEED_FLAG} of {record.name}"
         if record.times_speed:
             origin = f"as InterPSS and ANDES have {record.name}"
-        sections["efd_times_speed"] = Noted(True, f"{origin}; acts where the speed is not rated")
+        sections["efd_times_speed"] = Noted(True, f"{origin}; acts at other than rated speed")
     plant = {"type": OPEN_CIRCUIT.name, "machine": _named(machine), **_parameters(machine)}
     sections["plant"] = plant
     for part in unit.added:
@@ -63,9 +63,9 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
         section = {"model": _named(part), **inputs, **_parameters(part)}
         sections[part.definition.kind] = section
     values = _parameters(exciter)
-    fixed = Noted(values.pop("parameters"), "what a fit shall find goes under free")
+    fixed = Noted(values.pop("parameters"), "move what is to be fitted to free")
     sections |= {
-        "test": Noted(TEST, "a 5 % step; a record takes the place of the duration"),
+        "test": Noted(TEST, "a 5 % step; a record replaces the duration"),
         "parameters": {"fixed": fixed, **values},
         "as_found": as_found(unit, file),
     }
@@ -117,7 +117,7 @@ def unit_data(unit: Unit, file: str) -> UnitData:
 def as_found(unit: Unit, file: str) -> Section:
     """Make the section of what the file holds of the unit, for the report to compare with.
 
-    ``unused`` are values there that the planner's program does without.
+    ``unused`` are values there that the planner's program ignores.
     """
     values, unused = dict[str, float](), dict[str, float]()
     for part in (unit.exciter, unit.machine, *unit.added):
@@ -130,7 +130,7 @@ def as_found(unit: Unit, file: str) -> Section:
     name = in_comment(unit.id)
     source = f"{Path(file).name}, bus {unit.bus}, machine {name}"
     return {
-        "source": Noted(source, above="in the planner's base; a report compares it"),
+        "source": Noted(source, above="the model in the planner's base, for the report"),
         "bus": unit.bus,
         "id": name,
         "file": file,

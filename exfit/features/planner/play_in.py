@@ -72,7 +72,7 @@ def export_play_in(source: Path, output: Path, force: bool) -> None:
     from exfit.workflows import load_case
 
     if output.suffix.lower() != ".plb":
-        raise ExfitError(f"{output}: a play-in file is called NAME.plb")
+        raise ExfitError(f"{output}: the name of a play-in file ends with .plb")
     records = played_in(load_case(load_result(result_file(source)).case))
     files = {
         name: output if len(records) == 1 else output.with_stem(f"{output.stem}-{name}")
@@ -86,4 +86,4 @@ def export_play_in(source: Path, output: Path, force: bool) -> None:
         write(file, play_in_text(rows))
         record = play_in_record(BUS, MACHINE_ID, file.stem, own.f0)
         echo(f"written to {file}; voltage in pu, frequency in Hz")
-        echo(f"record of PSS/E, as public files have it, at a bus of your own: {record}")
+        echo(f"record of PSS/E, in the order of public files; replace bus and id: {record}")

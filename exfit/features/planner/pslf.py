@@ -131,13 +131,13 @@ def _head_fault(record: _LogicalLine, name: str, definition: Definition | None) 
     fields, before = record.fields, record.before
     if not WORD.fullmatch(name):
         begin = " ".join(field.text for field in fields[:3])
-        return f"{show_value(begin)} begins no record; does the line before lack its '/'?"
+        return f"{show_value(begin)} does not begin a record; does the line before lack its '/'?"
     buses = [field for field in fields[1:2] if not field.quoted]
     has_bus = any(field.text.lstrip("-").isdigit() for field in buses)
     if before is None and (definition is not None or has_bus):
         return f"{name}: the record has no ':' behind its id"
     if definition is not None and before != HEAD_FIELDS:
-        return f"{name}: {before} fields before ':', not model, bus, name, kV and id"
+        return f"{name}: {before} fields before ':', expected model, bus, name, kV and id"
     return ""
 
 
@@ -192,12 +192,12 @@ def _named(
     faults: list[DynamicsFault] = []
     for label, value in zip_longest(fields[::2], fields[1::2]):
         if not label.quoted or value is None or value.quoted:
-            text = f"{record.name}: {show_value(label.text)}: not a name in quotes and its value"
+            text = f"{record.name}: {show_value(label.text)}: no name in quotes and its value"
             return (), [DynamicsFault(label.line, text)]
         bare = "".join(label.text.lower().split())  # of "Ang p" angp
         symbol, fault = symbols.get(bare, ""), ""
         if not symbol:
-            fault = f"no value is named {show_value(label.text)}; {near(bare, symbols)}"
+            fault = f"unknown value {show_value(label.text)}; {near(bare, symbols)}"
         elif symbol in given:
             fault = f"{label.text}: given twice"
         if fault:

@@ -169,7 +169,7 @@ class Reading:
     It begins on ``line``; ``fields`` are those behind the id, one for each name of the definition;
     ``inputs`` are the signals of a stabiliser whose record has codes of them; ``times_speed`` says
     that efd is multiplied by the speed; ``unused`` are the file's values of what is 0 in
-    ``values``, since its program does without them, or not there: the rating of a turbine.
+    ``values``, since its program ignores them, or not there: the rating of a turbine.
     """
 
     definition: Definition
@@ -314,15 +314,17 @@ def _without_effect(
     for name, value in unused.items():
         other = dict(definition.record.unused)[name]
         why = f", since {other} is 0" if other else ""
-        yield name, f"{show(value)} does not act in {definition.program}{why}; 0 is taken"
+        yield name, f"{definition.program} ignores {show(value)}{why}; 0 is taken"
     if rating != 0.0:
-        text = f"{show(rating)} MW, but the machine's base is not in the file: {SHARE} is 1 in the "
-        yield RATING, f"{text}case, where it must be {show(rating)} over that base"
+        text = (
+            f"{show(rating)} MW, but the machine's base is not in the file: enter {SHARE} in the "
+        )
+        yield RATING, f"{text}case, {show(rating)} over that base (1 is taken)"
 
 
 def _says_nothing(row: Parameter) -> str:
     gain = "" if row.search is None else row.search.needs
-    return f"0 says nothing, since {gain} is 0; the typical value {show(row.typical)} is taken"
+    return f"0 has no effect, since {gain} is 0; the typical value {show(row.typical)} is taken"
 
 
 def _lacking(definition: Definition) -> Texts:

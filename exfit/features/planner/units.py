@@ -41,7 +41,7 @@ OTHERS: Mapping[str, str] = {
     for name in names.split()
 }
 
-CLASSICAL = {"GENCLS": "a constant voltage behind a reactance: no unit to verify"}
+CLASSICAL = {"GENCLS": "a constant voltage behind a reactance, with nothing to verify"}
 
 
 def format_of(file: str | Path) -> FileFormat:
@@ -96,7 +96,7 @@ class DynamicsUnits:
 
 
 def read_units(text: str, file: str | Path) -> DynamicsUnits:
-    """Return every unit of a dynamics file, whose name says the program that it is of.
+    """Return every unit of a dynamics file, whose suffix gives the program.
 
     What is wrong with one does not hinder the others. A unit is what has a bus and a machine id:
     loads and other devices whose records begin so count as units without a machine.
@@ -138,7 +138,7 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
     if faults:
         raise DynamicsError(located(faults, file))
     if not heads:
-        raise DynamicsError([f"{file}: holds no record of a unit: {files.begins}"])
+        raise DynamicsError([f"{file}: has no record of a unit: {files.begins}"])
     chosen = _chosen(_by_unit(heads), file, bus, machine_id)
     unit, faults = _unit_of(chosen)
     if unit is None:
@@ -170,7 +170,7 @@ def _chosen(
     if len(meant) == 1:
         return next(iter(meant.values()))
     if meant:
-        text = f"{file}: {len(meant)} units; choose by --bus and --id"
+        text = f"{file}: {len(meant)} units; select one by --bus and --id"
         raise DynamicsError([text, *_listed(meant)])
     given = {"bus": bus, "id": machine_id}
     wanted = (f"{label} {value!r}" for label, value in given.items() if value is not None)

@@ -68,7 +68,7 @@ def test_what_cannot_be_made_is_a_row_with_its_reason_and_the_others_go_on():
     rows = rows_of()
     refused = {name: row.reason for name, row in rows.items() if row.status == "refused"}
     assert refused.keys() == {"bus-9", "bus-1-2", "bus-8-1"}
-    assert "table.csv:4: the table lacks what fleet/cases/bus-9.yaml has as ?: " in refused["bus-9"]
+    assert "table.csv:4: missing in the table ('?' in fleet/cases/bus-9.yaml): " in refused["bus-9"]
     assert "test.vref[0].step (line " in refused["bus-9"]
     assert "records/none.csv: cannot be read" in refused["bus-1-2"]
     assert refused["bus-8-1"] == "table.csv:6: units.dyr: bus 8: no such unit can be imported"
@@ -81,7 +81,7 @@ def test_a_case_that_someone_has_edited_is_kept_and_its_row_says_so():
     edited.write_text(edited.read_text() + "# mine\n")
     row = rows_of()["bus-1-1"]
     assert row.status == "refused"
-    assert "exists and is not what the table makes" in row.reason
+    assert "exists with other content than the table makes" in row.reason
     assert edited.read_text().endswith("# mine\n")
 
 

@@ -67,7 +67,7 @@ def test_a_file_of_another_name_and_other_options_are_refused(run, event):
     _, case = event
     assert run("fit", case, "-o", "run", "--no-plots", "-q")[0] == 0
     code, _, err = run("export", "run", "--plb", "event.csv")
-    assert (code, "event.csv: a play-in file is called NAME.plb" in err) == (1, True)
+    assert (code, "event.csv: the name of a play-in file ends with .plb" in err) == (1, True)
     code, _, err = run("export", "run", "--plb", "event.plb", "-o", "x.dyr")
     assert (code, "--plb: only --force is allowed with it" in err) == (2, True)
     Path("event.plb").write_text("")

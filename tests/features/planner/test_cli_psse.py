@@ -88,7 +88,7 @@ def test_a_unit_among_several_is_chosen(run, workplace):
     before = listing(workplace)
     code, out, err = run("import", "unit.dyr", "-o", "case.yaml")
     assert (code, out) == (1, "")
-    assert "3 units; choose by --bus and --id" in err
+    assert "3 units; select one by --bus and --id" in err
     for unit in ("bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2:", "bus 9, id 1:"):
         assert unit in err
     assert listing(workplace) == before
@@ -103,7 +103,7 @@ def test_a_unit_among_several_is_chosen(run, workplace):
     ("old", "new", "words"),
     [
         ("ESAC1A", "ESAC1Z", ["unit.dyr:2: ESAC1Z: exfit has no exciter of that name", "ESAC1A"]),
-        ("GENROU", "GENCLS", ["unit.dyr:1: GENCLS is a constant voltage", "no unit to verify"]),
+        ("GENROU", "GENCLS", ["unit.dyr:1: GENCLS is a constant voltage", "nothing to verify"]),
         (" 766 ", " ", ["unit.dyr:2: ESAC1A: 18 values", "19", "TR TB TC KA TA"]),
         (" 766 ", " -1 ", ["unit.dyr:2: ESAC1A: KA: -1 lies outside 0.01 ... 100000 pu"]),
         (" 766 ", " 7O6 ", ["unit.dyr:2: ESAC1A: KA: '7O6' is not a number"]),
@@ -127,7 +127,7 @@ def test_a_damaged_file_ends_in_a_message_or_a_sound_case(run, seed):
     assert "Traceback" not in err
     if code:
         assert (code, out) == (1, "")
-        assert re.match(r"Error: unit\.dyr(:\d+: |: 2 units; |: holds no record)", err)
+        assert re.match(r"Error: unit\.dyr(:\d+: |: 2 units; |: has no record)", err)
     else:
         assert yaml.safe_load(out)["model"] == "AC1A"
 
@@ -137,7 +137,7 @@ def test_a_damaged_file_ends_in_a_message_or_a_sound_case(run, seed):
     [
         (["none.dyr"], "none.dyr: cannot be read: No such file"),
         (["."], ".: cannot be read: Is a directory"),
-        (["empty.dyr"], "empty.dyr: holds no record of a unit"),
+        (["empty.dyr"], "empty.dyr: has no record of a unit"),
     ],
 )
 def test_a_file_that_is_none_is_reported(run, arguments, words):
@@ -358,7 +358,7 @@ def test_a_place_that_no_record_can_hold_is_asked_for_and_then_taken(run, fitted
     named(fitted, as_found={**found, "bus": 10**7, "id": "G1", "file": "u.dyr"})
     code, _, err = run("export", fitted)
     assert code == 1
-    assert "as_found: bus 10000000, id 'G1' are not those of a record; give them with" in err
+    assert "as_found: bus 10000000, id 'G1' cannot be written to a record; give them with" in err
     code, out, _ = run("export", fitted, "--bus", "7", "--id", "G1")
     assert code == 0
     assert re.search(r"(?m)^7  'ESAC1A'  G1 ", out)
@@ -395,8 +395,8 @@ def test_typical_values_that_matter_are_named(run, fitted):
     moves = {"value": 1.0, "shifts": {"KA": 30.0, "TE": 0.1}, "matters_to": {"KA": 2.0}}
     named(fitted, typical_values={"KE": moves, "SE1": {**moves, "matters_to": {}}})
     _, out, err = run("export", fitted)
-    assert "what was fitted depends on typical values: KE\n" in err
-    assert "// what was fitted depends on typical values: KE." in out.splitlines()
+    assert "fitted values depend on typical values: KE\n" in err
+    assert "// fitted values depend on typical values: KE." in out.splitlines()
     named(fitted, typical_values={"KE": {**moves, "shifts": {"K": 1.0}}})
     assert "typical_values: what they move are not the parameters" in run("export", fitted)[2]
 
@@ -424,7 +424,7 @@ def test_fitted_values_of_a_limiter_are_named_with_those_that_are_typical(run, f
     assert "OEL3C: its order is that of PowerWorld's list" in err
     assert "// OEL3C: fitted: ITFPU." in out.splitlines()
     # ESAC1A has no flag of it
-    assert "OEL3C: the exciter's record says nothing of its place: set its flag" in err
+    assert "OEL3C: the exciter's record does not give its place: set its flag" in err
 
 
 @pytest.mark.parametrize(
@@ -450,7 +450,7 @@ def test_the_place_of_a_limiter_is_the_flag_of_its_exciter(run, fitted, model, p
 
 def test_a_place_whose_flag_no_source_gives_is_warned_of(run, fitted):
     with_limiter(fitted, "ST6C", "OEL2C", "takeover")
-    assert "OEL2C: the exciter's record says nothing of its place" in run("export", fitted)[2]
+    assert "OEL2C: the exciter's record does not give its place" in run("export", fitted)[2]
 
 
 @pytest.mark.parametrize("name", [None, "ONE_AXIS"])

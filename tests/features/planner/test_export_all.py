@@ -111,7 +111,7 @@ def test_a_unit_whose_fit_does_not_hold_is_named_and_left(run, fleet, fitted):
     keep(replace(fit_of(fitted), interrupted=True), key="b" * 32, bus=101)
     poor = run("export", "--all", fleet, "-o", "fitted.dyr")
     assert poor.code == 0
-    assert "left as it was: bus-101-1: not verified: interrupted" in poor.err
+    assert "not changed: bus-101-1: not verified: interrupted" in poor.err
     assert {row["bus"] for row in changes_of()} == {"102"}
     keep(replace(fit_of(fitted), interrupted=True))
     none = run("export", "--all", fleet, "-o", "none.dyr")
@@ -125,8 +125,9 @@ def test_a_verified_unit_that_cannot_be_written_ends_with_1(run, fleet):
     Path("since.dyr").write_bytes(text.replace(b"102 GENROU 1 6.0", b"102 GENROU 1 7.0"))
     ran = run("export", "--all", fleet, "-o", "fitted.dyr", "--dyr", "since.dyr")
     assert ran.code == 1
-    assert "bus-102-1: since.dyr:7: GENROU: changed since: Tpd0 is 7, as found 6" in " ".join(
-        ran.err.split()
+    assert (
+        "bus-102-1: since.dyr:7: GENROU: changed since import: Tpd0 is 7, as found 6"
+        in " ".join(ran.err.split())
     )
 
 
@@ -134,7 +135,7 @@ def test_the_planner_s_own_file_and_files_that_exist_are_kept(run, fleet):
     before = Path("units.dyr").read_bytes()
     ran = run("export", "--all", fleet, "-o", "units.dyr", "--force")
     assert (ran.code, Path("units.dyr").read_bytes()) == (1, before)
-    assert "is the planner's own file" in ran.err
+    assert "is the planner's file itself" in ran.err
     Path("fitted.csv").write_text("mine")
     ran = run("export", "--all", fleet, "-o", "fitted.dyr")
     assert "fitted.csv: exists already; --force overwrites it" in ran.err

@@ -276,7 +276,7 @@ def test_fitted_values_of_a_limiter_are_refused_and_those_of_its_unit_with_them(
     assert written.data == data
     (left,) = written.left
     assert left.verified
-    assert left.reason == "records of limiters are not changed: fitted: oel.ITFPU"
+    assert left.reason == "records of limiters cannot be changed: fitted: oel.ITFPU"
 
 
 @pytest.mark.parametrize("case", REFUSED)
@@ -317,7 +317,7 @@ def test_a_record_that_changed_since_is_refused_with_its_values(fit):
     )
     written = fitted_file(since.encode(), "f", [FittedUnit("case", result)])
     assert written.data == since.encode()
-    assert written.left[0].reason == "f:10: ESAC1A: changed since: KA is 700, as found 766"
+    assert written.left[0].reason == "f:10: ESAC1A: changed since import: KA is 700, as found 766"
 
 
 def test_a_unit_that_is_not_in_the_file_or_has_several_fits_is_named(fit):
@@ -336,7 +336,7 @@ def test_a_unit_that_is_not_in_the_file_or_has_several_fits_is_named(fit):
         "several fits of the unit: a, b",
         "several fits of the unit: a, b",
         "f: no record of bus 8, machine 1",
-        "the case does not say bus and id of its unit (as_found)",
+        "the case does not give bus and id of its unit (as_found)",
     ]
 
 
@@ -349,7 +349,7 @@ def test_what_its_program_does_without_is_0_in_a_case_and_stays_in_the_file(name
     values[own.kind][symbol] = 0.4
     text = "\n".join(record_text(of, values[kind], 7, "1") for kind, of in partners.items()) + "\n"
     unit, full = unit_of(text.encode(), 7), PREFIXES[own.kind] + symbol
-    (warning,) = [w.text for w in unit.warnings if f"{name}: {symbol}: 0.4 does not act" in w.text]
+    (warning,) = [w.text for w in unit.warnings if f"{name}: {symbol}: PSS/E ignores 0.4" in w.text]
     assert warning.endswith("; 0 is taken")
     case = imported_case(unit, "units.dyr").text
     found = yaml.safe_load(case)["as_found"]
@@ -359,11 +359,11 @@ def test_what_its_program_does_without_is_0_in_a_case_and_stays_in_the_file(name
     changed = {**values_of(unit), "KA": 321.0}
     written = export(verified(fit, unit, changed, **as_case), 7, "1")
     assert f"{record_text(own, values[own.kind] | {'KA': 321.0}, 7, '1')}\n" in written.text
-    assert not any("does without" in text for text in written.warnings)
+    assert not any("ignores" in text for text in written.warnings)
     kept = exported(text.encode(), verified(fit, unit, changed))
     assert [after for _, after in changed_words(text, kept.data.decode())] == [321.0]
     acting = export(verified(fit, unit, {**changed, full: 0.4}), 7, "1")
-    assert f"{name}: PSS/E does without {symbol} = 0.4" in acting.warnings
+    assert f"{name}: PSS/E ignores {symbol} = 0.4" in acting.warnings
 
 
 def test_the_rating_of_a_turbine_is_named_at_import_and_stays_in_the_file(fit):
@@ -381,7 +381,7 @@ def test_the_rating_of_a_turbine_is_named_at_import_and_stays_in_the_file(fit):
     text = text_of_rating(390.24)
     unit = unit_of(text.encode(), 7)
     (warning,) = warned(unit)
-    assert warning.endswith("where it must be 390.24 over that base")
+    assert warning.endswith("case, 390.24 over that base (1 is taken)")
     case = imported_case(unit, "units.dyr").text
     assert parse_case(case, Path("unit.yaml")).as_found.unused == {"governor.Trate": 390.24}
     values = {**values_of(unit), "KA": 321.0, "governor.Trate_Mbase": 3.9024}

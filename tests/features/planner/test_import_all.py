@@ -43,7 +43,7 @@ def test_every_unit_becomes_the_case_that_it_becomes_alone(run):
     ran = run("import", "--all", "units.dyr", "-o", "cases")
     assert ran.code == 0
     assert ran.out == "written to cases; cases: 3, with records: 0; all units: units.csv\n"
-    assert "not units to verify: 1 GENCLS without an exciter" in ran.err
+    assert "not imported: 1 GENCLS without an exciter" in ran.err
     assert sorted(path.name for path in Path("cases").iterdir()) == [*CASES, "units.csv"]
     for name in CASES:
         _, bus, machine_id = name.removesuffix(".yaml").split("-")
@@ -88,7 +88,7 @@ def test_records_are_joined_by_bus_and_id_and_others_are_named(run):
     assert ran.code == 1
     assert "cases: 3, with records: 2" in ran.out
     assert "records/1.csv: bus 1: 2 machines, 1, 2; which one is not said" in ran.err
-    assert "not joined to a unit: records/other.csv" in ran.err
+    assert "no unit for records/other.csv" in ran.err
     both = load_case(Path("cases", CASES[2]))
     assert [each.test.vref[0].step for each in (*both.recordings, *both.validations)] == [
         -0.05,

@@ -124,14 +124,14 @@ def test_efd_is_multiplied_by_the_speed_where_the_record_says_so():
 # ---- damage
 
 FAULTS = {
-    "a line that is not continued": (" /\n# of", "\n# of", "a.dyd:8: '0.12 0.4 0.0' begins no"),
+    "a line that is not continued": (" /\n# of", "\n# of", "a.dyd:8: '0.12 0.4 0.0' does not"),
     "no colon": ('"1 " : #9 "tr"', '"1 " #9 "tr"', "a.dyd:9: exac4: the record has no ':'"),
     "too few values": ("0.12 0.4 0.0 0.0 0.0", "0.12", "a.dyd:5: genrou: 13 values after the id"),
     "no number": ("0.12 0.4", "0.l2 0.4", "a.dyd:8: genrou: S10: '0.l2' is not a number"),
     "outside": ('"ka" 150', '"ka" -1', "a.dyd:9: exac4: KA: -1 lies outside 0.01 ... 100000 pu"),
-    "an unknown name": ('"Ta"', '"tz"', "a.dyd:10: exac4: no value is named 'tz'; known: tr"),
+    "an unknown name": ('"Ta"', '"tz"', "a.dyd:10: exac4: unknown value 'tz'; known: tr"),
     "a name given twice": ('"kc"', '"tr"', "a.dyd:10: exac4: tr: given twice"),
-    "a name without a value": ('"kc" 0.0', '"kc"', "a.dyd:10: exac4: 'kc': not a name in quotes"),
+    "a name without a value": ('"kc" 0.0', '"kc"', "a.dyd:10: exac4: 'kc': no name in quotes"),
     "a value that is missing": ('"kc" 0.0', "", "a.dyd:9: exac4: missing: kc"),
     "an open quote": ('"GEN1"', '"GEN1', "a.dyd:9: a quote is opened"),
     "a base": ("mva=120.0", "mva=12O", "a.dyd:5: genrou: mva: '12O' is not a number"),

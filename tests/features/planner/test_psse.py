@@ -175,7 +175,7 @@ def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
         text = str(error)
         assert text.startswith(str(path))
         # a bus or id was damaged: the file holds two units
-        several = "2 units; choose by --bus and --id" in text
+        several = "2 units; select one by --bus and --id" in text
         assert several or re.search(r"unit\.dyr:\d+: ", text) or "no record" in text
         assert text.replace("\n", "").isprintable()
     else:
@@ -237,7 +237,7 @@ FAULTS = {
     "a classical machine": (
         "GENROU",
         "GENCLS",
-        "unit.dyr:1: GENCLS is a constant voltage behind a reactance: no unit to verify",
+        "unit.dyr:1: GENCLS is a constant voltage behind a reactance, with nothing to verify",
     ),
     "a second exciter": (
         "1 ESAC1A",
@@ -296,9 +296,9 @@ def test_no_saturation_may_be_written_as_four_zeros():
 @pytest.mark.parametrize(
     ("given", "lines"),
     [
-        ((), ["3 units; choose by --bus and --id", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2"]),
-        ((1,), ["2 units; choose", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2: GENROU, ESAC1A"]),
-        ((None, "1"), ["2 units; choose", "bus 1, id 1", "bus 9, id 1"]),
+        ((), ["3 units; select one by --bus", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2"]),
+        ((1,), ["2 units; select", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2: GENROU, ESAC1A"]),
+        ((None, "1"), ["2 units; select", "bus 1, id 1", "bus 9, id 1"]),
         ((8,), ["no record of bus 8", "bus 1, id 1", "bus 1, id 2", "bus 9, id 1"]),
         ((9, "2"), ["no record of bus 9, id '2'", "bus 1, id 1"]),
     ],
