@@ -22,12 +22,7 @@ case $code in
     0 | 3) ;;
     *) exit "$code" ;;
 esac
-exfit report "$results"
-if python3 -c 'import weasyprint' 2>/dev/null; then
-    exfit report "$results" --pdf
-else
-    echo "no PDF: pip install 'exfit[pdf]'" >&2
-fi
+exfit report "$results" --pdf || exfit report "$results"
 python3 -c '
 import json, sys
 fit = json.load(sys.stdin)

@@ -7,6 +7,7 @@ A picture that has only changed by what another machine would change stays as it
 """
 
 import io
+import math
 import re
 import shutil
 import sys
@@ -18,17 +19,20 @@ from decimal import Decimal
 from html import unescape
 from importlib.metadata import version
 from pathlib import Path
+from typing import ClassVar
 from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
 import numpy as np
 from field_record import FILE, field_record
+from film import film, lines_of
 from matplotlib.figure import Figure
 from matplotlib.ft2font import __freetype_version__
 from PIL import Image, PngImagePlugin
 from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
+from rich.text import Text
 
 from exfit.cli import main
 from exfit.output import figures as plots
@@ -42,7 +46,9 @@ BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
 DPI = 84  # of the figures: 756 points wide, that of a page
 COLOURS = 96  # of a figure; its lines have a few, each with shades to white
-HEIGHT = 40  # lines of the terminal
+COLUMNS = 80  # of the terminal
+PROMPT, EARLY, ITERATION, STAGE, RESULT = 0.7, 0.7, 0.25, 0.6, 4.0  # s: of a frame of a film
+FEW = 5  # iterations that are shown as early ones: the response changes visibly
 FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that is seen
 # fonts of a server: a picture of its own has none
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
@@ -69,11 +75,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class Run:
-    """A command and its pictures; ``columns`` are those of the terminal."""
+    """A command and its pictures; its terminal as it goes on, where that is of so many ``rows``."""
 
     command: str
     pictures: tuple[Picture, ...] = ()
-    columns: int = 80
+    rows: int | None = None
 
     @property
     def terminal(self) -> Picture | None:
@@ -104,7 +110,7 @@ RUNS = (  # in the order of the page
         f"exfit fit {FIT}",
         (
             Picture(
-                "fit.svg", "the iterations with the response, the fitted values and the findings"
+                "fit.svg", "a fit as it goes on: the iterations, the response, the fitted values"
             ),
             Picture("overlay.png", "measured, start values and fitted", "overlay.png"),
             Picture("iterations.png", "the response after each iteration", "iterations.png"),
@@ -114,7 +120,7 @@ RUNS = (  # in the order of the page
                 "sensitivity.png", "effect of each parameter on the voltage", "sensitivity.png"
             ),
         ),
-        columns=126,
+        rows=32,
     ),
     Run(
         f"exfit profile {FIT} KA KC KD",
@@ -171,17 +177,29 @@ DRAWN = (
 )  # fmt: skip
 
 
-class Still(live.LiveIterations):
-    """Shows the iterations of a fit once, when it is done."""
+class Filmed(live.LiveIterations):
+    """Keeps what a terminal shows after each iteration, and at the end of what follows them."""
+
+    frames: ClassVar[list[tuple[list[Text], float]]] = []
 
     @contextmanager
-    def running(self) -> Iterator["Still"]:
-        yield self
+    def running(self) -> Iterator["Filmed"]:
+        self.frames[:] = [(lines_of(self.console), PROMPT)]
         self.console.print(self.title, markup=False)
+        yield self
         self.console.print(self.picture())
 
     def __call__(self, line):
         self.lines.append(line)
+        self._keep_frame(EARLY if len(self.lines) <= FEW else ITERATION)
+
+    def starts(self, progress):
+        self._starts = progress
+        if progress.done == progress.total:
+            self._keep_frame(STAGE)
+
+    def _keep_frame(self, seconds):
+        self.frames.append(([*lines_of(self.console)[:2], *self.picture().split("\n")], seconds))
 
 
 def drawn() -> dict[str, bytes]:
@@ -208,21 +226,25 @@ def ran(run: Run) -> bytes:
         no_color=False,
         highlight=False,
         legacy_windows=False,
-        width=run.columns,
-        height=HEIGHT,
+        width=COLUMNS,
+        height=run.rows,
     )
     console.print(f"$ {run.command}", style="bold", soft_wrap=True)
     words = run.command.split()[1:]
     with ExitStack() as changes:
         changes.enter_context(patch.object(plots.style, "DPI", DPI))
         changes.enter_context(patch.object(terminal, "console", lambda: console))
-        changes.enter_context(patch.object(live, "LiveIterations", Still))
+        changes.enter_context(patch.object(live, "LiveIterations", Filmed))
+        changes.enter_context(patch.object(live, "QUIET", math.inf))
         for name in DRAWN:
             if f"{name}.png" not in run.figures:
                 changes.enter_context(patch.object(plots, name, lambda *_: Figure()))
         main([*words, *([] if run.terminal else ["-q"])], "exfit", standalone_mode=False)
     if run.terminal is None:
         return b""
+    if run.rows is not None:
+        frames = [*Filmed.frames, (lines_of(console), RESULT)]
+        return film(frames, COLUMNS, run.rows).encode()
     console.print()  # below the last line letters would be cut off
     name = Path(run.terminal.name).stem
     svg = console.export_svg(

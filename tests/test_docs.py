@@ -22,13 +22,14 @@ import exfit
 from exfit import workflows
 from exfit.case.json_schema import json_schema
 from exfit.case.load import load_case
-from exfit.cli import main
+from exfit.cli import OF_CORE, main
 from exfit.cli.options import NOT_CONVERGED
 from exfit.errors import CaseError
 from exfit.fitting.recordings import phasors_of, record_of
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import figures, run_folder
+from exfit.registry import commands as of_features
 from exfit.util.vocabulary import STRATEGIES
 
 DOCS = ROOT / "docs"
@@ -79,10 +80,10 @@ def block(page: str, language: str, number: int = 0) -> str:
     return blocks[number]
 
 
-def first_column(page: str, after: str) -> list[str]:
-    """Return the first cells of the first table behind some words, without its head."""
+def column_of(page: str, after: str, number: int = 1) -> list[str]:
+    """Return a column of the first table behind some words, without its head."""
     rows = re.search(r"(?:^\|.*\n)+", page.partition(after)[2], re.MULTILINE)[0].splitlines()
-    return [row.split("|")[1].strip() for row in rows[2:]]
+    return [row.split("|")[number].strip() for row in rows[2:]]
 
 
 def one_line(text: str) -> str:
@@ -189,13 +190,41 @@ def test_every_command_that_a_page_names_is_one_of_exfit():
         assert set(re.findall(r"(?:`|^\$ |&& )exfit ([a-z]+)", page)) <= set(COMMANDS), name
 
 
-def test_the_table_of_commands_names_every_command_and_no_other():
-    cells = first_column(README, "## Commands")
-    assert sorted(re.match(r"`exfit (\w+)", cell)[1] for cell in cells) == sorted(COMMANDS)
+def test_the_table_of_commands_names_every_command_in_its_group_as_the_help_does():
+    groups, cells = (column_of(README, "## Commands", number) for number in (1, 2))
+    named = [re.match(r"`exfit (\w+)", cell)[1] for cell in cells]
+    known, group, listed = {**OF_CORE, **of_features()}, "", []
+    for word, name in zip(groups, named, strict=True):
+        group = word or group
+        listed.append((group, name))
+    assert listed == [(known[name].group, name) for name in main.list_commands(None)]
+
+
+def test_the_readme_is_read_in_minutes():
+    assert len(README.splitlines()) <= 120
+
+
+QUESTIONS = {
+    "What is it for, and for whom?": r"finds the parameters .* excitation system .* bump test",
+    "Who uses it?": r"test engineers .* verify models",
+    "What goes in?": r"input is that record and a case file",
+    "What comes out?": r"output is a table of fitted values .* verdict",
+    "How sure is it?": r"95 % interval contains the true value in 95 % of such tests",
+    "Which strategies are there?": r"Gauss-Newton .* damped Gauss-Newton .* Levenberg-Marquardt",
+    "How is it scripted?": r"script branches on the exit code .* 0, .* 3, .* 1, ",
+}
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_one_sentence_of_the_readme_answers(question):
+    prose = re.sub(r"^(?:#|\||!).*$", "", BLOCK.sub("", README), flags=re.MULTILINE)
+    sentences = [sentence for part in prose.split("\n\n")
+                 for sentence in re.split(r"(?<=[.!?])\s+", one_line(part))]  # fmt: skip
+    assert len([each for each in sentences if re.search(QUESTIONS[question], each)]) == 1
 
 
 def test_the_options_in_common_are_those_of_a_fit():
-    cells = first_column(PAGES["docs/commands.md"], "## Options")
+    cells = column_of(PAGES["docs/commands.md"], "## Options")
     assert {cell.strip("`").split()[0] for cell in cells} <= options_of(COMMANDS["fit"])
 
 
@@ -283,10 +312,9 @@ def test_the_model_of_the_page_starts_at_rest_and_follows_a_step(cases):
     assert vt[-1] == pytest.approx(1.02, abs=2e-3)
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/models/index.md"])
-def test_every_model_is_named(name):
+def test_every_model_is_named():
     catalogue = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
-    assert catalogue <= set(re.findall(r"\w+", PAGES[name]))
+    assert catalogue <= set(re.findall(r"\w+", PAGES["docs/models/index.md"]))
 
 
 def test_the_table_of_sources_says_of_each_model_of_2016_what_its_file_does():
@@ -319,7 +347,7 @@ def test_the_table_of_sources_says_of_each_model_of_2016_what_its_file_does():
 def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
     result = workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
     run_folder.write_fit(result, tmp_path / "run").draw()
-    cells = first_column(PAGES["docs/reports.md"], "A fit writes these files")
+    cells = column_of(PAGES["docs/reports.md"], "A fit writes these files")
     (validation,) = result.validation
     names = re.findall(r"`([^`]+)`", " ".join(cells))
     assert {path.name for path in (tmp_path / "run").iterdir()} == {

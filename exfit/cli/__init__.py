@@ -127,4 +127,10 @@ class Commands(click.Group):
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="exfit")
 def main() -> None:
-    """Identify the parameters of a generator's excitation system from a recorded bump test."""
+    """Find the parameters of a generator's excitation system from a recorded bump test.
+
+    \b
+    From a record to a report:      exfit verify RECORD -o report.html
+    Step by step:                   exfit new, exfit fit CASE, exfit report RESULT
+    The options of a command:       exfit COMMAND --help
+    """

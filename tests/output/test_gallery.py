@@ -1,12 +1,14 @@
 """The gallery of the documentation is what the commands draw and print now."""
 
 import re
+from html import unescape
 
 import gallery
 import matplotlib
 import numpy as np
 import pytest
 from field_record import AT, FILE, QUANTUM, UNIT, VT0, field_record
+from film import film
 from gallery import (
     BEGIN,
     END,
@@ -21,6 +23,7 @@ from gallery import (
     smaller,
     with_section,
 )
+from rich.text import Text
 
 from exfit import workflows
 from exfit.case.load import load_case
@@ -83,6 +86,56 @@ def test_the_field_record_identifies_its_unit():
     for name, value in {**UNIT, "vref.at": AT, "vt0": VT0}.items():
         low, high = known[name].interval
         assert low <= value <= high, name
+
+
+# ---- a terminal as it goes on
+
+
+FRAMES = [  # lines, and seconds
+    (["$ exfit fit"], 1.0),
+    (["$ exfit fit", "0 1.7e-03"], 2.0),
+    (["$ exfit fit", "0 1.7e-03", "1 <4.4e-04>"], 1.0),
+    (["0 1.7e-03", "1 <4.4e-04>", "verdict: good"], 4.0),
+]
+
+
+def shown_at(svg, seconds):
+    """Return the texts that CSS shows after so many seconds; None: without animation."""
+    total = float(re.search(r"animation:([\d.]+)s step-end infinite", svg)[1])
+    hidden = {*re.findall(r"^\.([\w-]+)\{visibility:hidden\}$", svg, re.MULTILINE)}
+    texts = []
+    for name, group in re.findall(r'(?:<g class="([\w-]+)">)?((?:<text.*?</text>)+)', svg):
+        visible = name not in hidden
+        if seconds is not None and name:
+            (steps,) = re.findall(rf"@keyframes {name}\{{(.*)\}}$", svg, re.MULTILINE)
+            for percent, state in re.findall(r"([\d.]+)%\{visibility:(\w+)\}", steps):
+                if float(percent) / 100.0 * total <= seconds + 1e-3:
+                    visible = state == "visible"
+        if visible:
+            texts += re.findall(r'y="([\d.]+)".*?>(.*?)</text>', group)
+    texts.sort(key=lambda text: float(text[0]))
+    return [unescape(text).replace("\N{NO-BREAK SPACE}", " ") for _, text in texts]
+
+
+def test_a_film_shows_each_frame_for_its_time_and_the_last_one_without_motion():
+    svg = film([([Text(line) for line in lines], long) for lines, long in FRAMES], 30, 3)
+    begin = 0.0
+    for lines, long in FRAMES:
+        for at in (begin, begin + 0.9 * long):
+            assert shown_at(svg, at) == lines
+        begin += long
+    assert shown_at(svg, None) == FRAMES[-1][0]
+    assert svg.count("prefers-reduced-motion") == 1
+    assert svg.count("$\N{NO-BREAK SPACE}exfit") == 1  # written once for three frames
+
+
+def test_the_picture_of_the_readme_ends_with_the_verdict():
+    svg = (FOLDER / "fit.svg").read_text(encoding="utf-8")
+    assert "](docs/img/fit.svg)" in (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = " ".join(shown_at(svg, None))
+    assert "verdict:" in lines
+    assert "exfit fit" not in lines
+    assert "exfit fit" in " ".join(shown_at(svg, 0.0))
 
 
 # ---- what counts as changed
