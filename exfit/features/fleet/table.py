@@ -137,12 +137,12 @@ def report_file(result: "FitResult | ProgrammeResult", folder: Path) -> Iterator
     """Yield the report of a fit, or a programme, that will lie in a folder."""
     from exfit.features.programme.programme_page import programme_page
     from exfit.features.programme.result import ProgrammeResult
-    from exfit.features.report.page import fit_page, page_html
+    from exfit.features.report.page import page_html, result_page
 
     if isinstance(result, ProgrammeResult):
         page = programme_page(result, folder)
     else:
-        page = fit_page(result, folder)
+        page = result_page(result, folder)
     yield REPORT, page_html(page)
 
 

@@ -23,7 +23,7 @@ from exfit.features.report.form import (
 )
 from exfit.features.report.matches import fitted_matches
 from exfit.features.report.model import findings, parameters
-from exfit.features.report.page import FORM, Headline, Page, ReportSection, fit_page
+from exfit.features.report.page import FORM, Headline, Page, ReportSection, result_page
 from exfit.output.blocks import (
     Block,
     Cell,
@@ -44,21 +44,25 @@ MILLI = 1e3
 
 def programme_page(result: ProgrammeResult, folder: Path) -> Page:
     """Build the page of a programme."""
-    sections = [ReportSection("programme", "Test programme", tuple(_overview(result)))]
+    tests = [ReportSection("programme", "Test programme", tuple(_overview(result)))]
     for number, test in enumerate(result.tests, 1):
         if test.result is not result.fit:
-            sections += _of_test(test, f"test-{number}")
+            tests += _of_test(test, f"test-{number}")
     if result.fit is not None:
-        page = fit_page(result.fit, folder)
-        form, *others = page.sections
-        return replace(page, sections=(form, *sections, *others))
-    form = ReportSection("form", FORM, tuple(form_table(form_without_bumps(result))))
-    unit = ReportSection("test", "Unit and test", tuple(unit_without_bumps(result)))
-    signed = ReportSection("signatures", "Revision and signatures", tuple(signatures(result)))
+        page = result_page(result.fit, folder)
+        first, signed, *others = page.sections
+        return replace(page, sections=(first, signed, *tests, *others))
+    sections = (
+        tests[0],
+        ReportSection("signatures", "Revision and signatures", tuple(signatures(result))),
+        *tests[1:],
+        ReportSection("test", "Unit and test", tuple(unit_without_bumps(result))),
+        ReportSection("form", FORM, tuple(form_table(form_without_bumps(result)))),
+    )
     words = "; ".join(f"{test.name}: {test.verdict}" for test in result.tests)
     word = "All tests are matched" if result.holds else "Not all tests are matched"
     headline = Headline(f"{word}.", f"{words}.", result.holds, ())
-    return Page(f"Programme {result.name}", headline, (form, *sections, unit, signed))
+    return Page(f"Programme {result.name}", headline, sections)
 
 
 def _overview(result: ProgrammeResult) -> Iterator[Block]:

@@ -42,6 +42,7 @@ MACHINE_DATA = {  # by the letter that the symbols begin with
 TESTS = (facts.DATE, facts.TESTED, facts.INSTRUMENTS, facts.RECORDER)
 AMBIENT = {facts.STATE: "cold or hot machine", facts.TAP: "of the transformer", facts.SPEED: ""}
 REPORT = (facts.WRITTEN, facts.CHECKED, facts.APPROVED, facts.REVISION, facts.REPORTED)
+NOT_IN_MODEL = f"{NOT_STATED}; none in the model"
 NO_TEST = "no bump test in this programme"
 CONSTANT_POWER = "none in the model: the mechanical power is constant"
 INTERRUPTED = "The result does not hold this: the fit was interrupted."
@@ -97,23 +98,27 @@ class FormAnswers(NamedTuple):
 
 
 def form_table(rows: Sequence[FormRow]) -> Iterator[Block]:
-    """Yield the form as a table."""
+    """Yield the form: a table of what is stated, and a list of what is not."""
     heads = (*columns("cf.", "asked"), TableColumn("answer", folds=True))
     yield Table(
         (*heads, TableColumn("section", number=True)),
         tuple(
-            (
-                Cell(each.cf),
-                Cell(each.asked),
-                Cell(each.answer, "" if each.is_stated else "faint"),
-                Cell("", see=each.section),
-            )
+            (Cell(each.cf), Cell(each.asked), Cell(each.answer), Cell("", see=each.section))
             for each in rows
+            if each.is_stated
         ),
         "What a verification report states (cf.: clauses of NERC MOD-026-1)",
         leading=2,
         style="form",
     )
+    missing: dict[str, list[str]] = {}
+    for each in rows:
+        if not each.is_stated:
+            asked = f"{each.asked} ({each.cf})" if each.cf else each.asked
+            missing.setdefault(each.answer, []).append(asked)
+    for answered, asked_for in missing.items():
+        label = f"{answered[:1].upper()}{answered[1:]}:"
+        yield Note(f"{', '.join(asked_for)}.", "warning", label, "strong")
     yield Note(WHERE_STATED)
 
 
@@ -198,7 +203,6 @@ def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
 def _rows(about: facts.Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
     stabiliser = answers.model("stabiliser", "")
     stabiliser = "; ".join(filter(None, (stabiliser, stated(about, facts.STABILISER))))
-    unknown = f"{NOT_STATED} whether the unit has one; none in the model"
     usable = (
         (name, text if passed is None else f"{'passed' if passed else 'FAILED'}: {text}")
         for name, passed, text in answers.usable
@@ -218,7 +222,7 @@ def _rows(about: facts.Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
         _fact(about, "R2.1.4", facts.REGULATOR),
         FormRow("R2.1.4", "Model in the planner's base", answers.before, "as-found"),
         FormRow("R2.1.5", "Compensation (droop, line drop)", answers.compensation),
-        FormRow("R2.1.6", "Stabiliser", stabiliser or unknown, "parameters"),
+        FormRow("R2.1.6", "Stabiliser", stabiliser or NOT_IN_MODEL, "parameters"),
         *_governor(answers),
         *(FormRow("R6", name, text, "flat") for name, text in usable),
         *(_fact(about, "", fact, "test") for fact in TESTS),
@@ -287,7 +291,7 @@ def _compensation(result: Reported) -> str:
     in_model = ", ".join(f"{name} {show(value)} pu" for name, value in values.items() if value)
     if in_model:
         return f"{given}; in the model {in_model}" if given else in_model
-    return given or f"{NOT_STATED}; none in the model"
+    return given or NOT_IN_MODEL
 
 
 def unit_and_test(result: Reported) -> Iterator[Block]:
@@ -378,12 +382,17 @@ def reproduction(result: Reported, folder: Path) -> Iterator[Block]:
 
 
 def signatures(result: Reported | ProgrammeResult) -> Iterator[Block]:
-    """Yield the block of revision and signatures: empty cells are to be written."""
+    """Yield the block of revision and signatures: empty cells are to be filled in by hand."""
     about = result.about
-    named = (facts.REVISION, facts.REPORTED, facts.CHANGES)
-    yield Facts(tuple((fact.key, answer(about, fact)) for fact in named))
+    named = {
+        fact.key: given
+        for fact in (facts.REVISION, facts.REPORTED, facts.CHANGES)
+        if (given := stated(about, fact)) is not None
+    }
+    if named:
+        yield Facts(tuple(named.items()))
     tested, written = (stated(about, fact) or "" for fact in (facts.DATE, facts.REPORTED))
     dates = {facts.TESTED: tested, facts.WRITTEN: written, facts.CHECKED: "", facts.APPROVED: ""}
-    rows = (row(role.key, answer(about, role), date, "") for role, date in dates.items())
+    rows = (row(role.key, stated(about, role) or "", date, "") for role, date in dates.items())
     heads = columns("role", "name", "date", "signature")
     yield Table(heads, tuple(rows), "Signatures", style="signatures")

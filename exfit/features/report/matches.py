@@ -60,6 +60,15 @@ def validation_matches(result: Reported) -> Iterator[Block]:
     yield from _matches(result, len(result.comparisons), result.validation, "")
 
 
+def first_overlay(result: Reported) -> tuple[int, str] | None:
+    """Name the record, by its place among all, and the signal that the first page shows."""
+    every = (*result.comparisons, *result.validation)
+    place = 0 if isinstance(result, FitResult) else len(result.comparisons)
+    if place < len(every) and every[place].judged_by in every[place].overlays:
+        return place, every[place].judged_by
+    return None
+
+
 def _matches(
     result: Reported, first: int, comparisons: Sequence[Comparison], key: str
 ) -> Iterator[Block]:
@@ -74,7 +83,10 @@ def _matches(
             yield played(f"{key}played-{k}", match, bins)
             yield from _departures(match)
         for signal in match.overlays:
-            yield overlay(f"{key}overlay-{k}-{signal}", match, signal, bins)
+            if not key and (k, signal) == first_overlay(result):
+                yield Note(f"{label_of(signal).capitalize()}", see="result")
+            else:
+                yield overlay(f"{key}overlay-{k}-{signal}", match, signal, bins)
         if match.played is None:
             yield from _features(match)
 

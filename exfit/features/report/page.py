@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -17,21 +17,25 @@ from exfit.features.report.matches import (
     against,
     as_found,
     differs_from_found,
+    first_overlay,
     fitted_matches,
     live_data,
+    overlay,
     validation_matches,
 )
 from exfit.features.report.model import criteria, dynamics, findings, model, parameters
 from exfit.features.report.search import identifiability, search
 from exfit.features.report.words import number
-from exfit.output.blocks import Block, Chart
+from exfit.output.blocks import Block, Chart, Note
+from exfit.output.fits import fitted_table
 from exfit.output.html import html as blocks_html
 from exfit.output.html import sentence
+from exfit.output.validations import in_a_line
 from exfit.results.comparisons import Comparison
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
-from exfit.results.validation_result import Reported, ValidationResult
+from exfit.results.validation_result import Reported
 from exfit.results.verdict import GOOD, MATCHES
 
 if TYPE_CHECKING:
@@ -44,6 +48,7 @@ CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of cap
 CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
 SECTION_LINK = re.compile(r'<a href="#([\w-]+)"></a>')  # to be numbered
 GENERATOR = '<meta name="generator" content="exfit '
+LOWER = 0.75  # of the height of a figure: what the first page has room for
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
 
@@ -85,97 +90,93 @@ def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str
 
     With an ``other`` fit, an earlier revision or another unit, a section compares both.
     """
-    return page_html(fit_page(result, folder, other))
+    return page_html(result_page(result, folder, other))
 
 
-def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) -> Page:
-    """Build the page of a fit, beside an ``other`` fit where there is one."""
-    unseen = "Validation on records that were not fitted"
-    beside = [] if other is None else [("against", "Beside another fit", against(result, other))]
+def result_page(result: Reported, folder: Path, other: FitResult | None = None) -> Page:
+    """Build the page of a fit or a validation, first of all the result and its signatures.
+
+    A fit may stand beside an ``other`` one.
+    """
     sections: list[tuple[str, str, Iterable[Block]]] = [
-        *_first_sections(result),
-        ("as-found", "As found and verified", as_found(result)),
-        ("findings", "Notes and unresolved findings", findings(result)),
+        ("result", "Result", summary(result)),
+        ("signatures", "Revision and signatures", signatures(result)),
+        ("test", "Unit and test", unit_and_test(result)),
+        ("criteria", "Criteria", criteria(result)),
         ("fit", "Fitted records", fitted_matches(result)),
-        ("validation", unseen, validation_matches(result)),
-        ("flat", "Usability", usability_table(result)),
-        ("search", "Search", search(result)),
-        ("identifiability", "Identifiability", identifiability(result)),
-        ("small", "Small-signal view", small_signal(result)),
-        ("limits", "Limits that were hit", limits(result)),
-        ("dyr", "PSS/E dynamics records", dynamics(result)),
-        ("reproduction", "Reproduction", reproduction(result, folder)),
-        *beside,
-        ("signatures", "Revision and signatures", signatures(result)),
     ]
-    return _page(result, headline(result), sections)
-
-
-def validation_page(result: ValidationResult, folder: Path) -> Page:
-    """Build the page of a validation: nothing of a search."""
-    found = as_found(result) if differs_from_found(result) else ()
-    unseen = validation_matches(result) if result.validation else ()
-    sections: list[tuple[str, str, Iterable[Block]]] = [
-        *_first_sections(result),
-        ("as-found", "As found and compared", found),
+    if isinstance(result, FitResult) or result.validation:
+        sections.append(("validation", "Validation", validation_matches(result)))
+    if isinstance(result, FitResult) or differs_from_found(result):
+        sections.append(("as-found", "As found", as_found(result)))
+    if isinstance(result, FitResult) and other is not None:
+        sections.append(("against", "Comparison with another fit", against(result, other)))
+    sections += [
+        ("parameters", "Parameters", parameters(result)),
         ("findings", "Notes", findings(result)),
-        ("fit", "Records that the values were fitted to", fitted_matches(result)),
-        ("validation", "Recorded and simulated", unseen),
+        ("model", "Model", model(result)),
         ("flat", "Usability", usability_table(result)),
         ("small", "Small-signal view", small_signal(result)),
-        ("limits", "Limits that were hit", limits(result)),
-        ("reproduction", "Reproduction", reproduction(result, folder)),
-        ("signatures", "Revision and signatures", signatures(result)),
+        ("limits", "Limits that were reached", limits(result)),
     ]
-    return _page(result, headline_of_validation(result), sections)
-
-
-def _first_sections(result: Reported) -> Iterator[tuple[str, str, Iterable[Block]]]:
-    yield "form", FORM, form_table(form(result))
-    yield "criteria", "Criteria", criteria(result)
-    yield "test", "Unit and test", unit_and_test(result)
-    yield "model", "Model", model(result)
-    yield "parameters", "Parameters", parameters(result)
-
-
-def _page(
-    result: Reported, headline: Headline, sections: Iterable[tuple[str, str, Iterable[Block]]]
-) -> Page:
-    """Make a page of the sections that have something to show."""
+    if isinstance(result, FitResult):
+        sections += [
+            ("search", "Search", search(result)),
+            ("identifiability", "Identifiability", identifiability(result)),
+            ("dyr", "PSS/E dynamics records", dynamics(result)),
+        ]
+    sections += [
+        ("reproduction", "Reproduction", reproduction(result, folder)),
+        ("form", FORM, form_table(form(result))),
+    ]
     every = [ReportSection(key, heading, tuple(blocks)) for key, heading, blocks in sections]
     shown = tuple(section for section in every if section.blocks)
-    return Page(f"{result.model}: {result.name}", headline, shown)
+    return Page(f"{result.model}: {result.name}", headline(result), shown)
 
 
-def headline(result: FitResult) -> Headline:
-    """Word the outcome of a fit."""
-    outcome, judged = outcome_of(result), judged_by_criteria(result)
-    sentence = "; ".join([*filter(None, [explanation_of(result)]), *_validated(result)])
-    rmse = _rmse((*result.comparisons, *result.validation))
+def summary(result: Reported) -> Iterator[Block]:
+    """Yield what the first page shows: a response, the parameters, the validations in brief."""
+    place = first_overlay(result)
+    if place is not None:
+        match = (*result.comparisons, *result.validation)[place[0]]
+        chart = overlay(f"overlay-{place[0]}-{place[1]}", match, place[1])
+        panels = (replace(panel, height=LOWER * panel.height) for panel in chart.panels)
+        yield replace(chart, panels=tuple(panels))
+    if isinstance(result, FitResult):
+        title = "Fitted parameters with their 95 % intervals"
+        yield replace(fitted_table(result, of_records=False), title=title, style="brief")
+    yield from map(in_a_line, result.validation)
+    if not result.validation:
+        yield Note("No record was kept for a validation.", mark="faint")
+
+
+def headline(result: Reported) -> Headline:
+    """Word the outcome of a fit, or of a comparison of given values with records.
+
+    The latter is neither good nor bad where nothing limits an error: the criteria then judge alone.
+    """
+    judged, causes = judged_by_criteria(result), tuple[str, ...]()
+    if isinstance(result, FitResult):
+        word, causes = outcome_of(result), tuple(cause.sentence for cause in result.verdict.causes)
+        good = {GOOD: True, MATCHES: None}.get(word, False)
+        explained = [*filter(None, [explanation_of(result)])]
+    else:
+        reasons = [match.reason for match in result.validation if match.reason]
+        limited = all(match.limit is not None for match in result.validation)
+        word, good = ("accepted", True) if limited else ("compared", None)
+        if reasons:
+            word, good = "not accepted", False
+        explained = [f"simulated with {result.origin}", *reasons]
+    errors = _rmse((*result.comparisons, *result.validation))
+    sentence = "; ".join([*explained, *_validated(result), errors])
     return Headline(
-        word=f"{outcome[:1].upper()}{outcome[1:]}",
-        sentence=f"{sentence[:1].upper()}{sentence[1:]}; {rmse}.",
-        good={GOOD: True, MATCHES: None}.get(outcome, False),
-        causes=tuple(cause.sentence for cause in result.verdict.causes),
+        word=f"{word[:1].upper()}{word[1:]}",
+        sentence=f"{sentence[:1].upper()}{sentence[1:]}.",
+        good=good,
+        causes=causes,
         criteria=judged.sentence,
         passed=judged.passed,
     )
-
-
-def headline_of_validation(result: ValidationResult) -> Headline:
-    """Word the outcome of a comparison of given values with records.
-
-    It is neither good nor bad where nothing limits an error: the criteria then judge alone.
-    """
-    judged = judged_by_criteria(result)
-    reasons = [match.reason for match in result.validation if match.reason]
-    limited = all(match.limit is not None for match in result.validation)
-    word, good = ("Accepted", True) if limited else ("Compared", None)
-    if reasons:
-        word, good = "Not accepted", False
-    sentence = "; ".join([f"Simulated with {result.origin}", *reasons, *_validated(result)])
-    sentence = f"{sentence}; {_rmse(result.matches)}."
-    return Headline(word, sentence, good, (), judged.sentence, judged.passed)
 
 
 def _rmse(matches: Iterable[Comparison]) -> str:
@@ -209,21 +210,20 @@ def page_html(page: Page, interactive: bool = True) -> str:
 
     Its figures, tables and sections are numbered in the order in which they stand.
     """
-    live: list[Chart] = []
-    hinted, before = [], False  # the first of adjoining sections with live charts says what they do
-    for section in page.sections:
-        charts = [each for each in section.blocks if isinstance(each, Chart) and each.live]
-        if charts and not before:
-            hinted.append(section.key)
-        live, before = [*live, *charts], bool(charts)
+    live = [
+        (section.key, chart)
+        for section in page.sections
+        for chart in section.blocks
+        if isinstance(chart, Chart) and chart.live
+    ]
     shared = environment()
     chart: Any = shared.get_template("chart.jinja").module
     text: str = shared.get_template("report.html.jinja").render(
         title=page.title,
         headline=page.headline,
         sections=[(each, blocks_html(each.blocks, chart.chart)) for each in page.sections],
-        data=list(live_data(live)),
-        hinted=hinted,
+        data=list(live_data([chart for _, chart in live])),
+        hinted=live[0][0] if live else "",  # the section that says how figures are read
         css=CHART_STYLE.read_text(encoding="utf-8") + _text("report.css"),
         script=_text("report.js") if interactive else "",
     )

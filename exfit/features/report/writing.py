@@ -9,10 +9,9 @@ from exfit.features.report.page import (
     CHART_STYLE,
     TEMPLATES,
     Page,
-    fit_page,
     is_page,
     page_html,
-    validation_page,
+    result_page,
 )
 from exfit.results.io import load_result, load_validation, result_file
 from exfit.results.model import FitResult
@@ -21,6 +20,7 @@ from exfit.util.files import write
 
 PAGE = "report.html"
 MARK = b"% report of exfit\n"  # a comment behind the end of a file
+COLOUR, VARIABLE = re.compile(r"--([\w-]+): (#\w+)"), re.compile(r"var\(--([\w-]+)\)")
 DRAWING = re.compile(r"<svg class=\"(?:static|sample)[^>]*>")
 
 
@@ -71,7 +71,7 @@ def write_report(
 def _page(result: FitResult | str | PathLike[str], other: FitResult | None) -> tuple[Page, Path]:
     """Build the page of a result; return it with the folder of the result."""
     if isinstance(result, FitResult):
-        return fit_page(result, Path(), other), Path()
+        return result_page(result, Path(), other), Path()
     given = Path(result)
     summary = given / WHOLE_PROGRAMME if given.is_dir() else given
     if summary.name == WHOLE_PROGRAMME and summary.is_file():
@@ -87,8 +87,8 @@ def _page(result: FitResult | str | PathLike[str], other: FitResult | None) -> t
     if source.name == VALIDATION:
         if other is not None:
             raise ExfitError(f"{source}: --against compares fits, and this is a validation")
-        return validation_page(load_validation(source), source.parent), source.parent
-    return fit_page(load_result(source), source.parent, other), source.parent
+        return result_page(load_validation(source), source.parent), source.parent
+    return result_page(load_result(source), source.parent, other), source.parent
 
 
 def page_pdf(page: Page) -> bytes:
@@ -107,8 +107,10 @@ def page_pdf(page: Page) -> bytes:
             f"WeasyPrint lacks a library of the system, Pango ({error}); see its page on "
             "installation, or print the HTML page in a browser"
         ) from None
-    # WeasyPrint does not hand drawings the style of the page: each holds its own
-    style = f"<style>{CHART_STYLE.read_text(encoding='utf-8')}</style>"
+    # WeasyPrint does not hand drawings the style of the page: each holds its own, in light colours
+    colours = dict(COLOUR.findall((TEMPLATES / "report.css").read_text(encoding="utf-8"))[::-1])
+    charts = VARIABLE.sub(lambda used: colours[used[1]], CHART_STYLE.read_text(encoding="utf-8"))
+    style = f"<style>{charts}</style>"
     text = page_html(page, interactive=False)
     html = HTML(string=DRAWING.sub(lambda drawing: drawing[0] + style, text))
     pdf: bytes = html.write_pdf(stylesheets=[CSS(TEMPLATES / "paged.css")])

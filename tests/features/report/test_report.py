@@ -27,8 +27,8 @@ from exfit.errors import ExfitError
 from exfit.features.planner.export import export
 from exfit.features.report import writing
 from exfit.features.report.charts import Axis, drawing, ticks
-from exfit.features.report.matches import fitted_matches, live_data
-from exfit.features.report.page import headline, html, is_page
+from exfit.features.report.matches import live_data
+from exfit.features.report.page import headline, html, is_page, summary
 from exfit.features.report.writing import write_report
 from exfit.models import from_file
 from exfit.output import run_folder
@@ -274,7 +274,7 @@ def test_how_the_figures_of_records_are_read_is_said_once_where_they_begin(pages
     tags = pages(name).tags
     (hint,) = [k for k, (_, attrs) in enumerate(tags) if attrs.get("class") == "hint"]
     sections = [attrs["aria-labelledby"] for tag, attrs in tags[:hint] if tag == "section"]
-    assert sections[-1] == "fit"
+    assert sections[-1] == "result"
 
 
 def test_what_identifies_unit_and_test_is_reported(pages):
@@ -584,7 +584,7 @@ def test_a_clock_that_began_long_ago_is_drawn_as_finely(tmp_path):
     record = {"file": "../ago.csv", "time": "t", "channels": {"vt": "v"}}
     test = {"vt0": 0.0, "vref": [{"at": ago + 0.5, "step": 1.0}]}
     run = first_order(tmp_path / "case", record=record, test=test, validate=None)
-    (chart,) = [each for each in fitted_matches(load_result(run)) if isinstance(each, Chart)]
+    (chart,) = [each for each in summary(load_result(run)) if isinstance(each, Chart)]
     shown = chart.live.time
     np.testing.assert_allclose(np.diff(shown), np.diff(TIME), atol=1e-6)  # a double is that fine
     (sent,) = live_data([chart])
@@ -672,10 +672,18 @@ def test_a_heading_is_on_the_page_of_what_follows_it(fits, printed, pages):
     for lines in sheets:
         assert lines[-1] not in headings
     saved = saved_of(fits("first order"))
-    for record in (*saved["records"], *saved["validation"]):
+    for record in saved["validation"]:
         title = f"{record['name']}: terminal voltage vt"
         lines = next(lines for lines in sheets if any(title in line for line in lines))
         assert record["name"] in lines
+
+
+@pytest.mark.long
+def test_the_first_page_is_the_result_with_its_signatures_and_nothing_else(printed, pages):
+    first, second = (sheet.extract_text() for sheet in printed.pages[:2])
+    for words in ("First order", "Fitted parameters with", "validation down", "Approved by"):
+        assert words.casefold() in first.casefold()
+    assert "Contents" in second.splitlines()[0]
 
 
 @pytest.mark.long

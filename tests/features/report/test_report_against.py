@@ -53,7 +53,7 @@ def test_both_fits_are_named_with_their_facts_and_parameters(fits):
     difference = newer.parameters["KA"].value - older.parameters["KA"].value
     assert rows["KA"][2] == f"{difference:.3g}"
     assert rows["TE"][1].endswith("(not fitted)")
-    assert page.text.count("Beside another fit") == 2
+    assert page.text.count("Comparison with another fit") == 2
 
 
 def test_responses_to_one_record_are_drawn_over_it(fits):
@@ -75,7 +75,7 @@ def test_responses_to_two_records_are_drawn_above_each_other(fits, tmp_path):
 
 
 def test_a_report_without_another_fit_has_no_such_section(fits):
-    assert "Beside another fit" not in Page(html(fits[0], "run")).text
+    assert "Comparison with another fit" not in Page(html(fits[0], "run")).text
 
 
 def test_the_command_takes_the_other_result(folders, tmp_path):
@@ -83,4 +83,4 @@ def test_the_command_takes_the_other_result(folders, tmp_path):
     arguments = ["report", str(folders[1]), "--against", str(folders[0]), "-o", str(place)]
     done = CliRunner().invoke(cli.main, arguments)
     assert done.exit_code == 0, done.output
-    assert "Beside another fit" in place.read_text(encoding="utf-8")
+    assert "Comparison with another fit" in place.read_text(encoding="utf-8")

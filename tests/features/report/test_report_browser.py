@@ -72,10 +72,12 @@ def opened(browser, report):
     """Open a report; what the page says to the console, and what it asks for, is kept."""
     rooms = []
 
-    def page(name, width=1280, scripts=True):
+    def page(name, width=1280, scripts=True, colours="light"):
         rooms.append(
             browser.new_context(
-                viewport={"width": width, "height": 900}, java_script_enabled=scripts
+                viewport={"width": width, "height": 900},
+                java_script_enabled=scripts,
+                color_scheme=colours,
             )
         )
         found = listened_to(rooms[-1])
@@ -94,6 +96,11 @@ def opened(browser, report):
 def spread(png):
     """Return the standard deviation of the pixels of a picture, white as 1."""
     return float(np.std(imread(BytesIO(png))[:, :, :3]))
+
+
+def brightness(png):
+    """Return the mean of the pixels of a picture, white as 1."""
+    return float(np.mean(imread(BytesIO(png))[:, :, :3]))
 
 
 def ranges(page):
@@ -283,8 +290,20 @@ def test_no_text_of_a_result_acts_in_a_browser(browser, report, tmp_path):
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("width", [WIDTHS[0], WIDTHS[-1]])
-def test_axe_finds_no_barrier(opened, name, width):
-    assert barriers(opened(name, width)) == ""
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_axe_finds_no_barrier(opened, name, width, colours):
+    assert barriers(opened(name, width, colours=colours)) == ""
+
+
+DARK, BRIGHT = 0.3, 0.9  # mean of the pixels, white as 1
+
+
+def test_a_page_is_dark_where_the_reader_asks_for_it_and_printed_on_white(opened):
+    page = opened("ac1a_typical", colours="dark")
+    assert brightness(page.screenshot()) < DARK
+    assert brightness(page.locator(".alive .static").first.screenshot()) < DARK
+    page.emulate_media(media="print", color_scheme="dark")
+    assert brightness(page.screenshot()) > BRIGHT
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -10,9 +10,9 @@ import exfit
 from exfit import workflows
 from exfit.features.programme.programme_page import programme_page
 from exfit.features.report.behaviour import usability
-from exfit.features.report.form import form, form_without_bumps, rated, signatures
+from exfit.features.report.form import form, form_table, form_without_bumps, rated, signatures
 from exfit.features.report.matches import as_found
-from exfit.features.report.page import fit_page, html
+from exfit.features.report.page import html, result_page
 from exfit.output.blocks import Chart, Note, Table
 from exfit.results import facts
 
@@ -61,17 +61,20 @@ def test_every_row_of_the_form_is_filled_or_not_stated(name, tmp_path):
     rows = form(result)
     assert len(rows) == 32 + (2 if name == "grid_event" else 0)  # disturbances and their size
     assert all(row.answer.strip() and "nan" not in row.answer for row in rows)
-    sections = {section.key for section in fit_page(result, tmp_path).sections}
+    sections = {section.key for section in result_page(result, tmp_path).sections}
     assert all(row.section in sections for row in rows if row.section)
     assert {"R2.1.1", "R2.1.2", "R2.1.3", "R2.1.4", "R2.1.5", "R2.1.6", "R6"} <= {
         row.cf for row in rows
     }
     page = Page(html(result, tmp_path))
     table = page.tables["What a verification report states (cf.: clauses of NERC MOD-026-1)"]
-    assert [row[1] for row in table[1:]] == [row.asked for row in rows]
+    shown = [row for row in rows if row.is_stated]
+    assert [row[1] for row in table[1:]] == [row.asked for row in shown]
     assert [" ".join(row[2].split()) for row in table[1:]] == [
-        " ".join(row.answer.split()) for row in rows
+        " ".join(row.answer.split()) for row in shown
     ]
+    listed = page.text.partition("Not stated:")[2]
+    assert all(row.asked in listed for row in rows if row.answer == "not stated")
 
 
 def test_facts_of_a_case_answer_by_name_in_any_spelling(unit):
@@ -116,12 +119,21 @@ def test_every_fact_that_a_report_asks_for_is_in_the_documentation():
     assert [fact.key for fact in facts.ASKED if f"`{fact.key}`" not in page] == []
 
 
-def test_a_role_without_a_name_may_be_signed_and_says_that_it_is_not_stated(unit):
+def test_a_role_without_a_name_has_an_empty_cell_to_be_signed(unit):
     facts, block = signatures(unit)
-    assert facts.pairs[:2] == (("Revision", "3"), ("Report date", "not stated"))
+    assert facts.pairs == (("Revision", "3"),)
     rows = [[cell.text for cell in row] for row in block.rows]
-    assert [row[1] for row in rows] == ["N. N.", "M. M.", "not stated", "not stated"]
+    assert [row[1] for row in rows] == ["N. N.", "M. M.", "", ""]
     assert rows[0] == ["Tested by", "N. N.", "2026-05-03", ""]
+
+
+def test_what_is_not_stated_is_one_list_at_the_end(unit):
+    table, *notes = form_table(form(unit))
+    assert not any(cell.text == "not stated" for row in table.rows for cell in row)
+    plain, of_model = (note for note in notes if note.label.startswith("Not stated"))
+    assert plain.label == "Not stated:"
+    assert {"Rated", "Instruments", "Report date"} <= set(plain.text.rstrip(".").split(", "))
+    assert of_model.text == "Compensation (droop, line drop) (R2.1.5)."
 
 
 def test_a_stable_unit_passes_the_checks_of_usability(unit):
@@ -164,10 +176,10 @@ def test_the_form_of_a_programme_without_bump_tests_says_so_and_has_what_it_meas
     result = exfit.run(written(content, tmp_path))
     page = programme_page(result, tmp_path)
     keys = [section.key for section in page.sections]
-    assert keys == ["form", "programme", "test-1", "test", "signatures"]
+    assert keys == ["programme", "signatures", "test-1", "test", "form"]
     rows = {row.asked: row for row in form_without_bumps(result)}
-    shown = [row[2].text for row in page.sections[0].blocks[0].rows]
-    assert shown == [row.answer for row in rows.values()]
+    shown = [row[2].text for row in page.sections[-1].blocks[0].rows]
+    assert shown == [row.answer for row in rows.values() if row.is_stated]
     assert rows["Model response beside a recorded response"].answer == (
         "not stated: no bump test in this programme"
     )
