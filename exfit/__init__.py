@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from exfit.features.programme.saturation import saturation_curve
     from exfit.features.rank.ranked_cases import rank
     from exfit.features.report.writing import write_report as report
+    from exfit.features.start.starting import new
     from exfit.features.translate.translate import translate
     from exfit.output.stored import show
     from exfit.records.record import Record
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from exfit.workflows import (
         check,
         fit,
+        inspect,
         load_case,
         profile,
         read_record,
@@ -73,8 +75,10 @@ __all__ = [
     "fit_all",
     "identify",
     "import_units",
+    "inspect",
     "load_case",
     "load_result",
+    "new",
     "profile",
     "rank",
     "read_fleet",
@@ -95,6 +99,7 @@ _MODULES = {
     "check": "exfit.workflows",
     "fit": "exfit.workflows",
     "fit_all": "exfit.runs.fits",
+    "inspect": "exfit.workflows",
     "load_case": "exfit.workflows",
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",

@@ -24,7 +24,7 @@ OTHER_FEATURES = {
     "programme": {"report"},
     "rank": set(),
     "report": {"drawings", "planner", "programme"},
-    "start": {"planner"},
+    "start": {"planner", "report"},  # verify ends with a report
     "translate": {"planner"},
 }
 # a result draws itself: inside the call, so that nothing is imported before
@@ -32,7 +32,7 @@ EXCEPTIONS = {("exfit.results.model", "exfit.output.notebook")}
 
 ONLY_IN = {  # where a library may be imported, inside functions too
     "yaml": {"case"},
-    "pydantic": {"case", "programme"},
+    "pydantic": {"case", "programme", "start"},
     "matplotlib": {"output", "compare", "design", "programme", "rank", "translate"},
     "rich": {"output", "cli", "compare", "design", "fleet", "programme", "rank", "translate"},
     "jinja2": {"report", "drawings"},

@@ -71,6 +71,12 @@ class CaseDraft:
             for place, hint in _open(self.sections, (), "", set())
         )
 
+    @property
+    def kind_of_plant(self) -> str:
+        """The type of the plant, "" without one."""
+        kind = self.sections.get("plant", {}).get("type", "")
+        return str(kind.value if isinstance(kind, Noted) else kind)
+
     def filled(self, given: Mapping[OpenValue, str | float]) -> "CaseDraft":
         """Fill in open values."""
         values = {value.place: answer for value, answer in given.items()}

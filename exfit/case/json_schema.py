@@ -83,21 +83,23 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
 }
 
 
-def form_faults(details: Iterable[Data]) -> list[Fault]:
-    """Put pydantic's details of errors in words: place, value and limit."""
+def form_faults(details: Iterable[Data], schema: Data) -> list[Fault]:
+    """Put pydantic's details of errors in words: place, value and limit.
+
+    ``schema`` is the JSON Schema of the whole file.
+    """
     return [
-        _fault(detail)
+        _fault(detail, schema)
         for detail in details
         # a list that is too short only for its faulty entries has these reported
         if detail["type"] != "too_short" or len(detail["input"]) < detail["ctx"]["min_length"]
     ]
 
 
-def _fault(detail: Data) -> Fault:
+def _fault(detail: Data, schema: Data) -> Fault:
     kind, limits = detail["type"], detail.get("ctx", {})
     place = _place_in_file(detail["loc"])
     value = show_value(detail["input"])
-    schema = json_schema()
     if kind == "extra_forbidden":  # the last is a key of the file, whatever it looks like
         section, key = _place_in_file(detail["loc"][:-1]), str(detail["loc"][-1])
         known = [

@@ -1,7 +1,7 @@
 """What a case file says, read and checked as a whole: every fault at once, each with its line."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
@@ -102,19 +102,26 @@ def _elsewhere(faults: Iterable[Fault], others: Iterable[Fault]) -> list[Fault]:
 
 
 def validated(
-    content: Content, faults: list[Fault], form: type[Form], place: Place = ()
+    content: Content,
+    faults: list[Fault],
+    form: type[Form],
+    place: Place = (),
+    schema: Callable[[], Mapping[str, Any]] | None = None,
 ) -> Form | None:
-    """Read sections if all have the right form; add a fault for each place that has not."""
+    """Read sections if all have the right form; add a fault for each place that has not.
+
+    ``schema`` makes the JSON Schema of the file, by default that of a case.
+    """
     try:
         return form.model_validate(content)
     except ValidationError as error:
-        from exfit.case.json_schema import form_faults
+        from exfit.case.json_schema import form_faults, json_schema
 
         details = [
             {**detail, "loc": (*place, *detail["loc"])}
             for detail in error.errors(include_url=False)
         ]
-        faults += _elsewhere(form_faults(details), faults)
+        faults += _elsewhere(form_faults(details, (schema or json_schema)()), faults)
         return None
 
 

@@ -24,7 +24,7 @@ from exfit.cli.options import (
 )
 from exfit.cli.streams import output_is_lost
 from exfit.errors import CaseError, ExfitError, FileError
-from exfit.runs.runner import FitSettings
+from exfit.runs.runner import AS_CASES_SAY, FitSettings
 from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
@@ -118,13 +118,21 @@ def fit(
         folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
         fit_again_and_again(case, given, folder, settings, output, verbose)
         return
+    result, _ = fit_case(given.load(case), output, settings, verbose)
+    if not result.holds:
+        raise SystemExit(NOT_CONVERGED)
+
+
+def fit_case(
+    case: "Case", output: Output, settings: FitSettings = AS_CASES_SAY, verbose: bool = False
+) -> "tuple[FitResult, Path]":
+    """Fit a case as `fit_one` does, after warnings of what is doubtful; return the folder, too."""
+    from exfit.output import run_folder
     from exfit.verdict.diagnostics import case_warnings, event_warnings
 
-    loaded = given.load(case)
-    output.warn((*case_warnings(loaded), *event_warnings(loaded)), "warning")
-    folder = output.folder_of(loaded, "fit", run_folder.OF_FIT, after_records=True)
-    if not fit_one(loaded, folder, settings, output, verbose).holds:
-        raise SystemExit(NOT_CONVERGED)
+    output.warn((*case_warnings(case), *event_warnings(case)), "warning")
+    folder = output.folder_of(case, "fit", run_folder.OF_FIT, after_records=True)
+    return fit_one(case, folder, settings, output, verbose), folder
 
 
 def fit_one(

@@ -14,6 +14,7 @@ from exfit.case.load import CaseOrPath
 
 if TYPE_CHECKING:
     from exfit import estimate
+    from exfit.records.inspection import Inspection
     from exfit.records.record import Record
     from exfit.results.comparisons import Comparison
     from exfit.results.model import FitResult, Iteration
@@ -116,6 +117,37 @@ def read_record(
     samples = {"time": time, "channels": channels, "window": window, "gaps": gaps}
     given = {key: value for key, value in (file | samples).items() if value is not None}
     return read_section(record_section(given), Path(), per_unit=True)
+
+
+def inspect(
+    file: str | PathLike[str],
+    time: str | Sequence[str] = (),
+    time_unit: str | None = None,
+    sheet: str | None = None,
+    memory: float | None = None,
+) -> "Inspection":
+    """Return what a recorder's file holds, as ``exfit inspect`` shows it.
+
+    Args:
+        file: the file, of any supported format.
+        time: column with the time, or those of date and time of day; none: as the file shows.
+        time_unit: s, ms, us or min; None: as the file says, else s.
+        sheet: of a workbook.
+        memory: what reading may take, GB; default: 1, or four times the file's size up to 4.
+
+    The result has the instants ``time`` (M,) in s, ``samples`` by column, each (M,) in its own
+    unit, the ``channels`` with unit, level at rest, noise and the signal that each seems to be, the
+    ``steps`` and the ``findings``. Raises RecordError where the file cannot be read.
+
+    Example:
+        >>> record = exfit.inspect("bump.csv")
+        >>> [(channel.name, channel.signal, channel.level) for channel in record.channels]
+        >>> [step.at for step in record.steps]
+    """
+    from exfit.case.suggestion import RecordSettings
+
+    clock = (time,) if isinstance(time, str) else tuple(time)
+    return RecordSettings(clock, time_unit, sheet, memory=memory).inspect(Path(file))
 
 
 def loaded(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> Case:

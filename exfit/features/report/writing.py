@@ -1,8 +1,10 @@
 """The report of a fit: one page that can be handed in, as HTML or PDF."""
 
 import re
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from exfit.errors import ExfitError
 from exfit.features.report.page import (
@@ -51,21 +53,37 @@ def write_report(
     if against is not None and not isinstance(against, FitResult):
         against = load_result(against)
     page, folder = _page(result, against)
-    place = folder / PAGE if output is None else Path(output)
-    places = {place: is_page}
+    places = _places(folder / PAGE if output is None else Path(output), pdf, force)
+    for path, is_report in places.items():
+        write(path, page_html(page) if is_report is is_page else page_pdf(page))
+    return tuple(places)
+
+
+def refuse_report(place: Path, force: bool) -> None:
+    """Raise ExfitError where the report of a fit that is still to run could not be written."""
+    if place.suffix.lower() not in (".html", ".htm", ".pdf"):
+        raise ExfitError(f"{place}: a report is a page, .html, or a .pdf")
+    if _is_pdf in _places(place, False, force).values():
+        _weasyprint()
+
+
+def _places(place: Path, pdf: bool, force: bool) -> dict[Path, Callable[[Path], bool]]:
+    """Return the files of a report, and what recognises a former one.
+
+    Raises ExfitError where it would replace what is none.
+    """
+    places: dict[Path, Callable[[Path], bool]] = {place: is_page}
     if pdf or place.suffix.lower() == ".pdf":
-        pages = (place, place.with_suffix(".pdf"))
+        page = place
         if place.suffix.lower() not in (".html", ".htm"):
-            pages = (place.with_suffix(".html"), place)
-        places = dict(zip(pages, (is_page, _is_pdf), strict=True))
+            page = place.with_suffix(".html")
+        places = {page: is_page, page.with_suffix(".pdf") if page == place else place: _is_pdf}
     for path, is_report in places.items():
         if path.is_dir():
             raise ExfitError(f"{path}: cannot be written: it is a folder")
         if path.exists() and not force and not is_report(path):
             raise ExfitError(f"{path}: exists already, and is no report; --force writes over it")
-    for path, is_report in places.items():
-        write(path, page_html(page) if is_report is is_page else page_pdf(page))
-    return tuple(places)
+    return places
 
 
 def _page(result: FitResult | str | PathLike[str], other: FitResult | None) -> tuple[Page, Path]:
@@ -91,13 +109,10 @@ def _page(result: FitResult | str | PathLike[str], other: FitResult | None) -> t
     return result_page(load_result(source), source.parent, other), source.parent
 
 
-def page_pdf(page: Page) -> bytes:
-    """Return a page as PDF.
-
-    Raises ExfitError where WeasyPrint is missing, or the libraries that it draws with.
-    """
+def _weasyprint() -> Any:
+    """Import WeasyPrint; raises ExfitError where it is missing, or what it draws with."""
     try:
-        from weasyprint import CSS, HTML
+        import weasyprint
     except ImportError:
         raise ExfitError(
             "a PDF needs WeasyPrint: pip install 'exfit[pdf]'; or print the HTML page in a browser"
@@ -107,13 +122,22 @@ def page_pdf(page: Page) -> bytes:
             f"WeasyPrint lacks a library of the system, Pango ({error}); see its page on "
             "installation, or print the HTML page in a browser"
         ) from None
+    return weasyprint
+
+
+def page_pdf(page: Page) -> bytes:
+    """Return a page as PDF.
+
+    Raises ExfitError where WeasyPrint is missing, or the libraries that it draws with.
+    """
+    printer = _weasyprint()
     # WeasyPrint does not hand drawings the style of the page: each holds its own, in light colours
     colours = dict(COLOUR.findall((TEMPLATES / "report.css").read_text(encoding="utf-8"))[::-1])
     charts = VARIABLE.sub(lambda used: colours[used[1]], CHART_STYLE.read_text(encoding="utf-8"))
     style = f"<style>{charts}</style>"
     text = page_html(page, interactive=False)
-    html = HTML(string=DRAWING.sub(lambda drawing: drawing[0] + style, text))
-    pdf: bytes = html.write_pdf(stylesheets=[CSS(TEMPLATES / "paged.css")])
+    html = printer.HTML(string=DRAWING.sub(lambda drawing: drawing[0] + style, text))
+    pdf: bytes = html.write_pdf(stylesheets=[printer.CSS(TEMPLATES / "paged.css")])
     return pdf + MARK
 
 

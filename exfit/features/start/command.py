@@ -1,15 +1,23 @@
-"""The command new: from a recorder's file to a case."""
+"""The commands new and verify: from a recorder's file to a case, and to a report."""
 
 import sys
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
+from exfit.cli.options import (
+    Interruption,
+    Output,
+    file_option,
+    force_option,
+    refuse_existing,
+    warn,
+    write_text,
+)
 from exfit.cli.records import (
     bases_option,
     memory_option,
@@ -19,27 +27,53 @@ from exfit.cli.records import (
     unit_option,
 )
 from exfit.cli.streams import echo
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.features.planner.commands import BUSES
-from exfit.util.text import dotted, printable
+from exfit.util.text import dotted
 
 if TYPE_CHECKING:
-    from exfit.case.case_draft import CaseDraft, OpenValue
-    from exfit.case.suggestion import Base, RecordSettings
-    from exfit.features.start.starting_case import UnitData
-    from exfit.features.start.starting_tests import StartingTest
-
+    from exfit.features.start.answers import Given
+    from exfit.features.start.making import Inspections, NewCase
 
 RATING = click.FloatRange(min=0.0, min_open=True)
-
-
-@click.command(short_help="Make a case from a record and a model or a planner's file.")
-@click.option(
+ENDING = ".answers.yaml"
+model_option = click.option(
     "--model",
     metavar="NAME",
     help="Exciter, or the file of a model; default: that of --dyr.",
     shell_complete=completion.exciters,
 )
+kv_option = click.option(
+    "--kv", type=RATING, metavar="KV", help="Rated voltage of the unit: for --base vt=..kV."
+)
+mva_option = click.option(
+    "--mva",
+    type=RATING,
+    metavar="MVA",
+    help="Rated power of the unit: for --base p=..MW, q=..Mvar.",
+)
+dyr_option = click.option(
+    "--dyr",
+    "--planner",
+    type=GivenFile(Kind.DYNAMICS),
+    metavar="FILE",
+    help="Planner's file (.dyr or .dyd) with machine, exciter, stabiliser and governor.",
+)
+bus_option = click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit in it.")
+id_option = click.option(
+    "--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1."
+)
+answers_option = click.option(
+    "--answers",
+    "answers_file",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Answers to all questions, in YAML; options count more.",
+)
+
+
+@click.command(short_help="Make a case from a record: asks what it needs.")
+@model_option
 @click.option(
     "--machine",
     metavar="NAME",
@@ -62,24 +96,11 @@ RATING = click.FloatRange(min=0.0, min_open=True)
     help="Table of tests: file, at, step, base, validates.",
 )
 @bases_option
-@click.option(
-    "--kv", type=RATING, metavar="KV", help="Rated voltage of the unit: for --base vt=..kV."
-)
-@click.option(
-    "--mva",
-    type=RATING,
-    metavar="MVA",
-    help="Rated power of the unit: for --base p=..MW, q=..Mvar.",
-)
-@click.option(
-    "--dyr",
-    "--planner",
-    type=GivenFile(Kind.DYNAMICS),
-    metavar="FILE",
-    help="Planner's file (.dyr or .dyd) with machine, exciter, stabiliser and governor.",
-)
-@click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit in it.")
-@click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
+@kv_option
+@mva_option
+@dyr_option
+@bus_option
+@id_option
 @click.option(
     "--machine-from",
     type=GivenFile(Kind.CASE),
@@ -93,6 +114,7 @@ RATING = click.FloatRange(min=0.0, min_open=True)
 @unit_option
 @sheet_option
 @memory_option
+@answers_option
 @file_option
 @force_option
 def new(
@@ -113,36 +135,57 @@ def new(
     unit: str | None,
     sheet: str | None,
     memory: float | None,
+    answers_file: Path | None,
     output: Path | None,
     force: bool,
 ) -> None:
     """Make a commented case from a record: its tests, the data of the unit, what is free.
 
+    On a terminal it asks what no option and no file of answers says: what the question means, where
+    the answer is found, and a proposal. Ctrl-C keeps the answers.
+
     The file of a phasor measurement unit is a grid event, which is played back into the unit.
     Of several tests in a record, each is a record of the case with a window; every other one
-    validates. Values are typical, or those of a planner's file. What the record does not show is
-    asked on a terminal, or left as "?", and the case is refused until it is filled in.
+    validates. Values are typical, or those of a planner's file. Without a terminal, what the record
+    does not show is left as "?", and the case is refused until it is filled in; with --answers
+    what is missing is named.
     """
-    from exfit.case.suggestion import RecordSettings, bases_of, rated_bases
-    from exfit.features.start.starting_case import starting_case
-    from exfit.features.start.starting_tests import doubtful_bases
+    from exfit.features.start.answers import checked, contradictions
+    from exfit.features.start.making import new_case
 
-    if output is not None:
-        refuse_existing(output, force)
-    folder = Path() if output is None else output.parent
-    data = _unit(model, machine, dyr, bus, machine_id, machine_from, folder)
-    reading = RecordSettings(clock, unit, sheet, memory=memory)
-    tests = _tests(file, table, sizes, rated_bases(bases_of(bases), kv, mva), reading)
-    warn(doubtful_bases(tests))
-    draft = starting_case(data, tests, folder, _facts(facts))
-    if is_terminal():
-        draft = _asked(draft)
-    still_open = draft.open_values()  # refuses what no command would read, before it is written
-    write_text(draft.text, output, ())
-    if output is not None:
-        echo(f"written to {output}; next: exfit check {output}")
-        for value in still_open:
-            echo(f"to be filled in: {_question(value)}, line {value.line}")
+    options = {
+        "model": model, "machine_model": machine, "record": file, "step": sizes_of(sizes),
+        "tests": table, "base": bases_by_signal(bases), "kv": kv, "mva": mva, "dyr": dyr,
+        "bus": bus, "id": machine_id, "machine_from": machine_from, "about": facts_by_name(facts),
+        "time": clock, "time_unit": unit, "sheet": sheet, "memory": memory, "output": output,
+    }  # fmt: skip
+    given, read = merged(answers_file, options), dict[Path, Any]()
+    for text in contradictions(checked(given)):
+        raise click.UsageError(text)
+    if "output" in given:
+        refuse_existing(Path(given["output"]), force)
+    asks = is_terminal()
+    if asks:
+        complete(given, read, "new", introduced=answers_file is None)
+    elif answers_file is not None:
+        refuse_missing(given, read, answers_file)
+    elif not {"record", "tests"} & given.keys():
+        raise click.UsageError("Missing option '--record', or '--tests'.")
+    elif not {"model", "dyr"} & given.keys():
+        raise click.UsageError("Missing option '--model', or '--dyr'.")
+    output = Path(given["output"]) if "output" in given else None
+    made = new_case(checked(given), Path() if output is None else output.parent, read)
+    warn(made.doubts)
+    write_text(made.draft.text, output, ())
+    if output is None:
+        return
+    if asks and answers_file is None and "record" in given:
+        finish(given, read, made, output)
+        return
+    echo(f"written to {output}; next: exfit check {output}")
+    for value in made.open:
+        hint = f" ({value.hint})" if value.hint else ""
+        echo(f"to be filled in: {dotted(value.place)}{hint}, line {value.line}")
 
 
 def is_terminal() -> bool:
@@ -150,62 +193,48 @@ def is_terminal() -> bool:
     return sys.stdin is not None and sys.stdin.isatty()
 
 
-def _tests(
-    file: Path | None,
-    table: Path | None,
-    sizes: tuple[str, ...],
-    bases: "dict[str, Base]",
-    reading: "RecordSettings",
-) -> "tuple[StartingTest, ...]":
-    """Return the tests of a record, or those that a table names."""
-    from exfit.features.start.starting_tests import starting_tests
-    from exfit.features.start.tables import read_test_table, tests_of_table
-
-    if table is None:
-        if file is None:
-            raise click.UsageError("Missing option '--record', or '--tests'.")
-        return starting_tests([reading.inspect(file)], sizes, bases)
-    if sizes:
-        raise click.UsageError("--step: not allowed with --tests, which has a column step.")
-    rows = [row if row.file else row._replace(file=file) for row in read_test_table(table)]
-    for row in rows:
-        if row.file is None:
-            raise ExfitError(f"{row.place}: file: missing, and no --record is given")
-    files = dict.fromkeys(row.file for row in rows if row.file is not None)
-    return tests_of_table(rows, {path: reading.inspect(path) for path in files}, bases)
+def names_case(given: "Given") -> bool:
+    """Tell if the case has a name that can be asked: it is not redirected to a file."""
+    return "output" not in given and sys.stdout.isatty()
 
 
-def _unit(
-    model: str | None,
-    machine: str | None,
-    dyr: Path | None,
-    bus: int | None,
-    machine_id: str | None,
-    machine_from: Path | None,
-    folder: Path,
-) -> "UnitData":
-    """Return the data of the unit: typical, a planner's, with the machine of another case."""
-    from exfit.case.suggestion import relative
-    from exfit.features.planner.fields import located
-    from exfit.features.planner.import_case import import_unit, unit_data
-    from exfit.features.start.starting_case import machine_of_case, unit_with
-
-    if model is None and dyr is None:
-        raise click.UsageError("Missing option '--model', or '--dyr'.")
-    if machine is not None and (dyr or machine_from):
-        raise click.UsageError("--machine: not allowed with --dyr or --machine-from.")
-    planner = None
-    if dyr is not None:
-        unit = import_unit(dyr, bus, machine_id)
-        warn(located(unit.warnings, str(dyr)))
-        planner = unit_data(unit, relative(dyr, folder))
-    elif bus is not None or machine_id is not None:
-        raise click.UsageError("--bus and --id: only with --dyr.")
-    data = unit_with(model, machine, planner, folder)
-    return replace(data, machine=machine_of_case(machine_from)) if machine_from else data
+# ---- what new and verify share
 
 
-def _facts(texts: tuple[str, ...]) -> dict[str, str]:
+def merged(answers_file: Path | None, options: Mapping[str, Any]) -> "Given":
+    """Return the answers of a file with those of options, which count more."""
+    from exfit.features.start.answers import read_answers
+
+    given = {} if answers_file is None else read_answers(answers_file)
+    for key, value in options.items():
+        if value not in (None, (), {}):
+            given[key] = str(value) if isinstance(value, Path) else value
+    return given
+
+
+def sizes_of(texts: tuple[str, ...]) -> dict[str, float]:
+    """Return the sizes of steps by the words of their tests; raises ExfitError."""
+    from exfit.features.start.answers import ALL_TESTS
+
+    sizes = {}
+    for text in texts:
+        words, _, number = text.rpartition("=")
+        try:
+            sizes[words or ALL_TESTS] = float(number)
+        except ValueError:
+            raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
+    return sizes
+
+
+def bases_by_signal(texts: tuple[str, ...]) -> dict[str, str]:
+    """Return bases as texts by signal; raises ExfitError for a text of another form."""
+    from exfit.case.suggestion import bases_of
+
+    bases_of(texts)
+    return {text.partition("=")[0]: text.partition("=")[2] for text in texts}
+
+
+def facts_by_name(texts: tuple[str, ...]) -> dict[str, str]:
     """Return facts by name; raises ExfitError for a text of another form."""
     facts = {}
     for text in texts:
@@ -216,21 +245,61 @@ def _facts(texts: tuple[str, ...]) -> dict[str, str]:
     return facts
 
 
-def _asked(draft: "CaseDraft") -> "CaseDraft":
-    """Fill in what the user gives for the open values of a case; Enter leaves one open."""
-    given: dict[OpenValue, str | float] = {}
-    for value in draft.open_values():
-        text = click.prompt(printable(_question(value)), default="", show_default=False, err=True)
-        answer = text.strip()
-        if not answer:
-            continue
-        try:
-            given[value] = answer if value.place[-1] in ("column", "unit") else float(answer)
-        except ValueError:
-            place = dotted(value.place)
-            raise ExfitError(f"{place}: {answer!r} is not a number") from None
-    return draft.filled(given)
+def complete(given: "Given", read: "Inspections", command: str, introduced: bool) -> None:
+    """Ask what is not given; raises Interruption at Ctrl-C, when the answers are in a file."""
+    from exfit.features.start.conversation import converse
+
+    try:
+        converse(given, read, introduced, command == "new" and names_case(given))
+    except (click.Abort, KeyboardInterrupt):
+        if not given:
+            raise Interruption("nothing was answered") from None
+        stem = Path(str(given.get("record") or "exfit")).stem
+        path = keep(given, Path(stem + ENDING))
+        resume = f"exfit {command} --answers {path}"
+        raise Interruption(f"the answers are kept; to go on:\n{resume}") from None
 
 
-def _question(value: "OpenValue") -> str:
-    return f"{dotted(value.place)} ({value.hint})" if value.hint else dotted(value.place)
+def keep(given: "Given", path: Path) -> Path:
+    """Write answers to a file, or beside it where another file has its name; return which."""
+    from exfit.features.start.answers import HEADING, answers_text
+
+    number, free = 2, path
+    while free.exists() and not free.read_bytes().startswith(f"# {HEADING}".encode()):
+        free, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
+    write_text(answers_text(given, free), free, ())
+    return free
+
+
+def refuse_missing(given: "Given", read: "Inspections", source: Path | None) -> None:
+    """Raise ExfitError with all answers that are missing, where nobody can be asked."""
+    from exfit.features.start.answers import checked, still_open
+    from exfit.features.start.making import missing_in
+
+    place = "" if source is None else f"{source}: "
+    missing = missing_in(checked(given), Path(), read)
+    missing |= dict.fromkeys(still_open(given), '"?" is to be filled in')
+    if missing:
+        lines = [f"{place}{key}: missing: {text}" for key, text in missing.items()]
+        raise FileError([*lines, "give them as options, or under these keys in --answers FILE"])
+
+
+def finish(given: "Given", read: "Inspections", made: "NewCase", output: Path) -> None:
+    """Say what was written and what comes next; draw the record, as inspect does."""
+    from exfit.features.start.making import typical_left
+    from exfit.features.start.questions import say
+    from exfit.output import run_folder
+
+    answers = keep(given, output.with_suffix(ENDING))
+    echo("")
+    echo(f"written to {output}; the answers to {answers}")
+    left = typical_left(made)
+    if left:
+        say(f"typical, not of this unit: {left}", err=False)
+    if "record" in given:
+        inspection = made.tests[0].inspection
+        show = Output(None, figures=True, quiet=True, as_json=False)
+        folder = show.folder(f"{inspection.path.name}-inspect", run_folder.OF_INSPECTION)
+        show.draw(run_folder.write_inspection(inspection, folder))
+        echo(f"look at {folder / 'inspect.png'}: is each step in its place?")
+    echo(f"next: exfit fit {output}")

@@ -97,10 +97,11 @@ def _entries(folder: Path) -> list[Path]:
 
 def _records_of(entry: Path) -> list[Path]:
     """Return a record, or those in a folder; a file of data beside its .cfg counts once."""
-    return [*_records_among(_entries(entry) if entry.is_dir() else [entry])]
+    return [*records_among(_entries(entry) if entry.is_dir() else [entry])]
 
 
-def _records_among(files: Iterable[Path]) -> Iterator[Path]:
+def records_among(files: Iterable[Path]) -> Iterator[Path]:
+    """Yield the files that are records; a file of data beside its .cfg counts once."""
     for file in files:
         suffix = file.suffix.lower()
         beside = suffix in BESIDE_CFG and siblings(file, ".cfg")

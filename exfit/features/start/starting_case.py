@@ -16,6 +16,7 @@ from exfit.case.case_draft import (
 )
 from exfit.case.load import load_case
 from exfit.case.other_model import ALONE, bounds_of, free_of
+from exfit.case.schema import SINGLE
 from exfit.case.suggestion import (
     Base,
     channels_section,
@@ -232,6 +233,7 @@ def _bump_tests(
 
     Channels stand once, at the first record of a file that has them; others refer to them.
     """
+    single = len(tests) == 1 or tests[0].name == SINGLE
     known: dict[str, Section] = {}
     entries = list[tuple[StartingTest, Section]]()
     for test in sorted(tests, key=lambda test: test.validates):
@@ -246,13 +248,13 @@ def _bump_tests(
         own = channels_section(inspection, ("vt", *test.bases), test.bases)
         channels = known.setdefault(repr(own), own)  # with their comments
         shared = Noted(channels, "the records below have the same" if channels is own else "")
-        given = channels if len(tests) == 1 else shared
+        given = channels if single else shared
         record = record_of(inspection, names[inspection.path], given, test.window)
         entries.append((test, {"name": test.name, "test": steps, "record": record}))
-    if len(tests) == 1:
-        (_, entry), *_ = entries
-        return {"test": entry["test"], "record": entry["record"]}, {VALIDATION_TO_COME: None}
     fitted, validating = _recordings(entries)
+    if single:
+        (entry,) = fitted["records"]
+        fitted = {"test": entry["test"], "record": entry["record"]}
     return fitted, validating or {VALIDATION_TO_COME: None}
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign
 
+from exfit.case.schema import SINGLE
 from exfit.case.suggestion import Base
 from exfit.errors import ExfitError, FileError
 from exfit.records.contradictions import LARGEST_STEP, sign_disputed_by, size_in_words
@@ -36,35 +37,49 @@ def starting_tests(
     inspections: Sequence[Inspection],
     sizes: Sequence[str] = (),
     bases: Mapping[str, Base] | None = None,
+    validating: Sequence[Inspection] = (),
 ) -> tuple[StartingTest, ...]:
     """Return the tests of records: every other one, from the second on, validates.
 
-    ``sizes`` (pu) are texts as 0.05 for all tests or up=0.05 for those whose names have that word;
-    they are amounts, or have the sign of the step. Of a single record without steps it is one test.
+    All tests of the ``validating`` records validate. ``sizes`` (pu) are texts as 0.05 for all tests
+    or up=0.05 for those whose names have that word; they are amounts,
+    or have the sign of the step. Of a single record without steps it is one test.
 
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
     for a record in which the breaker opens, for one of several that shows no step, and for a
     play-in file.
     """
-    _refuse_play_in(inspections)
-    if any(inspection.is_event for inspection in inspections):
-        return _events(inspections, sizes, bases or {})
-    _refuse_rejections(inspections)
+    every = [*inspections, *validating]
+    _refuse_play_in(every)
+    if any(inspection.is_event for inspection in every):
+        return _events(every, len(inspections), sizes, bases or {})
+    _refuse_rejections(every)
     given = bases or {}
-    if len(inspections) == 1 and not tests_of(inspections[0]):
+    if len(every) == 1 and not tests_of(inspections[0]):
         _refuse_unused(sizes, [])
         return (StartingTest("fit", inspections[0], (), bases=given),)
-    without = [inspection.path for inspection in inspections if not tests_of(inspection)]
+    without = [inspection.path for inspection in every if not tests_of(inspection)]
     if without:
         text = "shows no step; a table of tests can say where it is"
         raise FileError(f"{path}: {text}" for path in without)
-    recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
+    recorded = [(inspection, test) for inspection in every for test in tests_of(inspection)]
+    fitted = sum(len(tests_of(inspection)) for inspection in inspections)
     amounts = zip(recorded, _amounts(recorded, sizes), strict=True)
     made = [
         started(inspection, test, amount, given, k % 2 == 1)
+        if k < fitted
+        else started(inspection, test, amount, _bases_for(inspection, given), validates=True)
         for k, ((inspection, test), amount) in enumerate(amounts)
     ]
-    return renamed(made, [test for _, test in recorded])
+    named = renamed(made, [test for _, test in recorded])
+    return (replace(named[0], name=SINGLE), *named[1:]) if validating and fitted == 1 else named
+
+
+def _bases_for(inspection: Inspection, bases: Mapping[str, Base]) -> dict[str, Base]:
+    """Return the bases that a further record needs: its signals may be per unit already."""
+    channels = {signal: inspection.channel_of(signal) for signal in bases}
+    per_unit = {s for s, channel in channels.items() if channel and channel.seems_per_unit}
+    return {s: base for s, base in bases.items() if s not in per_unit or base.unit == "pu"}
 
 
 def _refuse_play_in(inspections: Sequence[Inspection]) -> None:
@@ -83,9 +98,14 @@ def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
 
 
 def _events(
-    inspections: Sequence[Inspection], sizes: Sequence[str], bases: Mapping[str, Base]
+    inspections: Sequence[Inspection],
+    alternate: int,
+    sizes: Sequence[str],
+    bases: Mapping[str, Base],
 ) -> tuple[StartingTest, ...]:
     """Return the grid events that phasor measurement units recorded, one a record.
+
+    Of the first ``alternate`` every other one validates, of the others each.
 
     Raises ExfitError for sizes of steps, and for a record of another kind beside them.
     """
@@ -99,7 +119,11 @@ def _events(
     single = len(inspections) == 1
     return tuple(
         StartingTest(
-            "fit" if single else f"event{k}", inspection, (), bases=bases, validates=k % 2 == 0
+            "fit" if single else f"event{k}",
+            inspection,
+            (),
+            bases=bases,
+            validates=k % 2 == 0 or k > alternate,
         )
         for k, inspection in enumerate(inspections, 1)
     )

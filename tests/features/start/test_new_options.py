@@ -141,20 +141,6 @@ def test_what_is_open_is_named_once_with_its_line(record, new, run):
         assert '"?"' in lines[number - 1]
 
 
-def test_what_is_open_is_asked_on_a_terminal(record, run, monkeypatch):
-    monkeypatch.setattr("exfit.features.start.command.is_terminal", lambda: True)
-    answers = iter(["0.05", "15.75", "", "-0.05", "0.02"])
-    asked = []
-    monkeypatch.setattr("click.prompt", lambda text, **_: asked.append(text) or next(answers))
-    ran = run("new", "--model", "AC1A", "--record", record, "-o", "case.yaml")
-    assert ran.code == 0
-    assert asked[0].startswith("records[0].test.vref[0].step (pu, as keyed in; vt changed")
-    content = yaml.safe_load((record.parent / "case.yaml").read_text(encoding="utf-8"))
-    assert [*sizes_of(content).values()] == [0.05, "?", -0.05, 0.02]
-    assert content["records"][1]["record"]["channels"]["vt"]["base"] == 15.75
-    assert "to be filled in: records[1].test.vref[0].step" in ran.out
-
-
 def test_a_table_names_tests_of_several_files(record, new):
     stepped_record(record.parent / "other.csv", base=13.8)
     rows = ["file,at,step,base,validates", "record.csv,31,0.05,15.75kV,no",

@@ -1,0 +1,210 @@
+"""What `exfit new` and `exfit verify` ask, as a file of answers: --answers."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+from exfit.case.case_draft import CaseDraft
+from exfit.case.load import faults_with_lines, plain_content, validated
+from exfit.case.schema.values import (
+    Bus,
+    Frozen,
+    MachineId,
+    Number,
+    Positive,
+    Section,
+    Source,
+    Text,
+    nothing,
+)
+from exfit.case.suggestion import relative
+from exfit.case.yaml import QUESTION, Fault, open_places, read_text, read_yaml
+from exfit.errors import ExfitError, FileError
+from exfit.util.text import dotted
+
+HEADING = "Answers to the questions of exfit new and exfit verify"  # begins a file of answers
+ALL_TESTS = "all"  # in place of the name of a test
+FILES = ("record", "tests", "dyr", "machine_from", "validate", "model", "output")
+
+
+def _as_list(value: Any) -> Any:
+    return value if isinstance(value, list | tuple) else [value]
+
+
+def _of_all(value: Any) -> Any:
+    return value if isinstance(value, Mapping) else {ALL_TESTS: value}
+
+
+def _for_all(value: Any) -> Any:
+    """Read a single word as the source of all values."""
+    return {ALL_TESTS: value} if isinstance(value, str) else value
+
+
+def _as_text(value: Any) -> Any:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _with_texts(value: Any) -> Any:
+    """Read the numbers of a mapping as texts: a base without a unit, the number of a unit."""
+    if not isinstance(value, Mapping):
+        return value
+    plain = (int, float)
+    return {k: f"{v:.12g}" if isinstance(v, plain) else v for k, v in value.items()}
+
+
+Values = Frozen[Number]
+Texts = Annotated[Frozen[Text], BeforeValidator(_with_texts)]
+
+
+class Answers(Section):
+    """The answers to what a new case needs, each under the name of its option."""
+
+    record: Text | None = Field(default=None, description="Record of the tests.")
+    time: Annotated[tuple[Text, ...], BeforeValidator(_as_list)] = Field(
+        default=(), description="Column of the time, or those of date and time."
+    )
+    time_unit: Text | None = Field(default=None, description="Unit of the time: s, ms, us, min.")
+    sheet: Text | None = Field(default=None, description="Sheet of a workbook.")
+    memory: Positive | None = Field(default=None, description="Memory for reading, GB.")
+    vt: Text | None = Field(default=None, description="Column of the terminal voltage.")
+    kv: Positive | None = Field(default=None, description="Rated voltage, line to line, kV.")
+    mva: Positive | None = Field(default=None, description="Rated power, MVA.")
+    base: Texts = Field(
+        default_factory=nothing, description="Value of 1 pu by signal, as {ifd: 550A}."
+    )
+    step: Annotated[Values, BeforeValidator(_of_all)] = Field(
+        default_factory=nothing,
+        description="Size of the steps, pu, or of single tests: {up: 0.05, at-312s: 0.02}.",
+    )
+    tests: Text | None = Field(default=None, description="Table of tests.")
+    dyr: Text | None = Field(default=None, description="Planner's file, .dyr or .dyd.")
+    bus: Bus | None = Field(default=None, description="Bus of the unit in it.")
+    id: Annotated[MachineId, BeforeValidator(_as_text)] | None = Field(
+        default=None, description="Machine id of the unit in it."
+    )
+    model: Text | None = Field(default=None, description="Model of the exciter.")
+    machine_model: Text | None = Field(default=None, description="Model of the generator.")
+    machine_from: Text | None = Field(
+        default=None, description="Another case, whose generator is taken."
+    )
+    machine: Values = Field(
+        default_factory=nothing, description="Data of the generator that are not typical."
+    )
+    exciter: Values = Field(
+        default_factory=nothing, description="Data of the exciter that are not typical."
+    )
+    sources: Annotated[Frozen[Source], BeforeValidator(_for_all)] = Field(
+        default_factory=nothing,
+        description="Where these data are from: a word for all of them, or one each.",
+    )
+    open: Frozen[Number | Text] = Field(
+        default_factory=nothing,
+        description="Other values that a case needs, by their place: {plant.network.X: 0.2}.",
+    )
+    validations: Annotated[tuple[Text, ...], BeforeValidator(_as_list)] = Field(
+        default=(), alias="validate", description="Further records, on which the fit is validated."
+    )
+    about: Texts = Field(default_factory=nothing, description="Facts for the report.")
+    output: Text | None = Field(default=None, description="File of the case, or of the report.")
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """The sizes of the steps, as texts 0.05 or up=0.05."""
+        return tuple(
+            f"{value!r}" if name == ALL_TESTS else f"{name}={value!r}"
+            for name, value in self.step.items()
+        )
+
+    def source_of(self, symbol: str) -> str:
+        """Find the source of a value, "" where it is not stated."""
+        return str(self.sources.get(symbol) or self.sources.get(ALL_TESTS) or "")
+
+
+Given = dict[str, Any]  # answers by key, of which some may be "?"
+
+
+def read_answers(path: Path) -> Given:
+    """Return the answers of a file, its paths as they are from the working folder.
+
+    Raises CaseError with all faults of the file, each with its line and place.
+    """
+    top, faults = read_yaml(read_text(path), path)
+    _checked(top.value, faults)
+    if faults:
+        raise faults_with_lines(faults, top, path)
+    given = {key: value for key, value in top.value.items() if value != QUESTION}
+    return _with_paths(given, lambda file: str(path.parent / file))
+
+
+def checked(given: Mapping[str, Any]) -> Answers:
+    """Return the answers given so far; those that are open, "?", count as not given.
+
+    Raises ExfitError with the faults of all of them.
+    """
+    faults = list[Fault]()
+    answers = _checked(plain_content(given, faults), faults)
+    if answers is None or faults:
+        raise FileError(f"{dotted(fault.place)}: {fault.text}" for fault in faults)
+    return answers
+
+
+def _checked(content: Mapping[str, Any], faults: list[Fault]) -> Answers | None:
+    closed = {
+        key: {name: entry for name, entry in value.items() if entry != QUESTION}
+        if isinstance(value, Mapping)
+        else value
+        for key, value in content.items()
+        if value != QUESTION
+    }
+    return validated(closed, faults, Answers, schema=Answers.model_json_schema)
+
+
+def still_open(given: Mapping[str, Any]) -> list[str]:
+    """List the places of the answers that are "?"."""
+    return [dotted(place) for place in open_places(given)]
+
+
+def answers_text(given: Mapping[str, Any], path: Path) -> str:
+    """Write answers as a file at a path, from where its paths are relative."""
+    kept = {
+        key: {name: entry for name, entry in value.items() if entry is not None}
+        if isinstance(value, Mapping)
+        else value
+        for key, value in given.items()
+        if key != "output"
+    }
+    if isinstance(kept.get("step"), dict) and kept["step"].keys() == {ALL_TESTS}:
+        kept["step"] = kept["step"][ALL_TESTS]
+    sections = _with_paths(kept, lambda file: relative(Path(file), path.parent))
+    heading = f'{HEADING}, for `exfit new --answers {path.name}`; "?" is asked.'
+    return CaseDraft(sections, (heading,)).text
+
+
+def _with_paths(given: Mapping[str, Any], path_of: Any) -> Given:
+    """Return answers with other paths; a model is one where it is a file."""
+
+    def changed(key: str, value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return [changed(key, entry) for entry in value]
+        is_path = key != "model" or str(value).endswith(".py")
+        return path_of(value) if is_path and value != QUESTION else value
+
+    return {key: changed(key, value) if key in FILES else value for key, value in given.items()}
+
+
+def contradictions(answers: Answers) -> Iterator[str]:
+    """Find answers that exclude each other, by their options."""
+    if answers.tests and answers.step:
+        yield "--step: not allowed with --tests, which has a column step."
+    if answers.machine_model and (answers.dyr or answers.machine_from):
+        yield "--machine: not allowed with --dyr or --machine-from."
+    if not answers.dyr and (answers.bus is not None or answers.id is not None):
+        yield "--bus and --id: only with --dyr."
+
+
+def refuse_contradictions(answers: Answers) -> None:
+    """Raise ExfitError where answers exclude each other."""
+    for text in contradictions(answers):
+        raise ExfitError(text)

@@ -1,0 +1,124 @@
+"""One question of a conversation, asked until its answer can be read."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import click
+
+from exfit.case.yaml import QUESTION
+from exfit.cli.streams import echo
+from exfit.errors import ExfitError
+from exfit.features.start.answers import Answers, Given, checked
+from exfit.features.start.making import Inspections, NewCase, inspected, new_case
+from exfit.records.inspection import Inspection
+from exfit.util.text import near, printable
+
+Answer = TypeVar("Answer")
+
+WIDTH = 79  # columns
+MOST_LISTED = 12  # files of a folder, units of a planner's file
+NO = ("none", "no", "-", "")
+
+
+class Conversation(NamedTuple):
+    """What was answered so far, by key, and the records that were read."""
+
+    given: Given
+    read: Inspections
+
+    def case(self, **others: Any) -> NewCase:
+        """Make the case that it is with further answers; raises ExfitError."""
+        return new_case(self.answers(**others), Path(), self.read)
+
+    def answers(self, **others: Any) -> Answers:
+        """Return the answers so far with others."""
+        return checked({**self.given, **others})
+
+    @property
+    def inspection(self) -> Inspection:
+        """The record."""
+        return inspected(self.answers(), Path(self.given["record"]), self.read)
+
+
+def say(text: str, faint: bool = False, hang: int = 0, err: bool = True) -> None:
+    """Write a paragraph of the conversation; its further lines ``hang`` by some letters."""
+    lines = click.wrap_text(printable(text), WIDTH, subsequent_indent=" " * hang)
+    click.secho(lines, dim=faint, err=err)
+
+
+def ask(
+    text: str,
+    read: Callable[[str], Answer],
+    where: str = "",
+    proposal: str = "",
+    more: str = "",
+    doubt: Callable[[Answer], str] = lambda _: "",
+) -> Answer:
+    """Ask until the answer can be read; Enter takes the proposal, ``?`` shows more.
+
+    ``where`` says where the answer is found, ``doubt`` why it may be wrong: it is taken when it is
+    given once more. Raises click.Abort at Ctrl-C and Ctrl-D.
+    """
+    echo("", err=True)
+    if where:
+        say(where, faint=True)
+    return answered(text, read, proposal, more or where, doubt)
+
+
+def answered(
+    text: str,
+    read: Callable[[str], Answer],
+    proposal: str,
+    more: str,
+    doubt: Callable[[Answer], str] = lambda _: "",
+) -> Answer:
+    """Ask as ``ask`` does, in one line, without where the answer is found."""
+    doubted = None
+    while True:
+        answer: str = click.prompt(
+            printable(text), default=proposal, show_default=bool(proposal), err=True
+        ).strip()
+        if answer == QUESTION:
+            say(more)
+            continue
+        try:
+            value = read(answer)
+            why = doubt(value)
+        except ExfitError as fault:
+            say(str(fault))
+            continue
+        if not why or answer == doubted:
+            return value
+        say(f"{why}. To keep it, enter it once more.")
+        doubted = answer
+
+
+def number(text: str) -> float:
+    """Read a number; raises ExfitError."""
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        raise ExfitError(f"{text!r} is not a number") from None
+
+
+def one_of(words: Sequence[str]) -> Callable[[str], str]:
+    """Return what reads the number or the beginning of a word of a list."""
+
+    def read(text: str) -> str:
+        if text.isdigit() and 0 < int(text) <= len(words):
+            return words[int(text) - 1]
+        begun = [word for word in words if text and word.lower().startswith(text.lower())]
+        if len(begun) != 1 and text not in words:
+            raise ExfitError(f"{text!r} is not in the list; {near(text, words)}")
+        return text if text in words else begun[0]
+
+    return read
+
+
+def list_rows(rows: Mapping[str, str]) -> None:
+    """Write a list of what can be chosen, each behind the word that chooses it."""
+    echo("", err=True)
+    width = max(map(len, rows), default=0)
+    for name, text in rows.items():
+        say(f"  {name:{width}}  {text}".rstrip(), hang=width + 4)
