@@ -178,13 +178,13 @@ class Ripple:
         if self.folded_from is None:
             return text
         return (
-            f"{text}; it may be {self.folded_from:g} Hz, folded by sampling at {self.rate:.4g} Hz"
+            f"{text}; it may be {self.folded_from:g} Hz, aliased by sampling at {self.rate:.4g} Hz"
         )
 
     @property
     def remedy(self) -> str:
         """What to do about it."""
-        sine = "sine: {frequency: {start: auto}} on the channel lets the fit find it"
+        sine = "sine: {frequency: {start: auto}} on the channel fits it"
         if self.folded_from is not None:
             return f"record faster or through an anti-alias filter, or {sine}"
         if self.frequency < SLOW:

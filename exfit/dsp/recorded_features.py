@@ -40,7 +40,7 @@ MOST_APART = 0.5  # of the error: a middle of the draws with a wider gap is of t
 LEFT_IS_NOISE = 1.5  # times what differs from sample to sample: beside a line, no more is left
 LINE_BY_CHANCE = 0.01  # probability that white noise has a line as large: a likelier one stays
 NOT_SEEN = "the noise does not show it"
-EITHER = "the noise leaves open which of several instants it is"
+EITHER = "by the noise several times are possible"
 
 
 class _Smoothing(NamedTuple):

@@ -60,7 +60,7 @@ def mean_rms(phases: Array) -> Array:
     mean = np.asarray(np.mean(phases, axis=1))
     present = np.isfinite(mean)
     if not present.any():
-        raise ValueError("there is no instant at which all three phases have a number")
+        raise ValueError("no sample has a number in all three phases")
     away = np.max(np.abs(phases[present] - mean[present, None]), axis=1)
     lasting = float(np.quantile(away - MOST_UNBALANCE * np.abs(mean[present]), 1.0 - MOST_OUTLIERS))
     if lasting > 0.0 or not np.median(mean[present]) > 0.0:

@@ -268,10 +268,10 @@ class Stop(Enum):
     STEP = "the Gauss-Newton step fell below the tolerance"
     KINK = "no trial lowers the cost: it has a kink here, beyond which the linear model is invalid"
     CREEPING = "ten iterations, all with rejected trials, gained less than a millionth of the cost"
-    UNCONFIRMED = "the lowest minimum is in doubt, and no other start led to it"
+    UNCONFIRMED = "the lowest minimum is in doubt, and no other start converged to it"
     ITERATIONS = "the iteration limit was reached"
     EVALUATIONS = "the limit of evaluations was reached"
-    INTERRUPTED = "interrupted: this is the best point seen until then"
+    INTERRUPTED = "interrupted: this is the best point so far"
     JACOBIAN = "the Jacobian is not finite here"
     STALLED = "no trial lowers the cost visibly, although the linear model promises a lower one"
     FULL_STEP = (
@@ -283,11 +283,11 @@ class Stop(Enum):
         "use strategy dgn or lm-then-dgn"
     )
     LOST = (
-        "the search ran off to where the residuals depend no longer on one of the variables: "
-        "set bounds or x_scale, or begin elsewhere"
+        "the search left the range where the residuals depend on every variable: "
+        "set bounds or x_scale, or another start"
     )
-    MATCH = "the curves differ by less than the tolerance given: the search went no farther"
-    FLAT = "the gradient fell below the tolerance given: the search went no farther"
+    MATCH = "the curves differ by less than the tolerance given: the search stopped there"
+    FLAT = "the gradient fell below the tolerance given: the search stopped there"
     TRUSTED = "a full Gauss-Newton step fits the trust region and proved good"  # only inside
 
 

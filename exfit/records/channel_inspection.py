@@ -309,7 +309,7 @@ def _questions(channel: InspectedChannel, guess: Guess, still: bool) -> Iterator
     if reading.system_base:
         yield (
             f"1 pu of {reading.why} is that of the grid, mostly 100 MVA: its base is the rated MVA "
-            "over it"
+            "divided by that"
         )
 
 

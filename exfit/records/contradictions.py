@@ -58,8 +58,8 @@ def contradictions(channels: Channels, steps: Sequence["RecordedStep"]) -> Itera
             size = step.sizes[channel.name]
             yield (
                 f"{channel.name}: {'falls' if size < 0.0 else 'rises'} by {abs(size):.3g} at "
-                f"{step.at:.4g} s, against the voltage: which way that step went is open, give its "
-                "size with its sign"
+                f"{step.at:.4g} s, against the voltage: the direction of that step is open, give "
+                "its size with its sign"
             )
 
 
@@ -67,7 +67,7 @@ def size_in_words(size: float) -> str:
     """Describe a step of the reference (pu) as too large for a test."""
     return (
         f"{size:+.4g} pu is {100.0 * size:+.4g} % of rated voltage, beyond "
-        f"{100.0 * LARGEST_STEP:g} %: no regulator is tested so; 5 % is 0.05 pu"
+        f"{100.0 * LARGEST_STEP:g} %: too large for a test; 5 % is 0.05 pu"
     )
 
 
@@ -170,21 +170,21 @@ def base_findings(channels: Channels) -> Iterator[str]:
             yield (
                 f"{rests}, the machine {'on load' if on_load else 'with the breaker open'} at "
                 f"{low:.3g} to {high:.3g} pu: 1 pu of {channel.signal} is that of the air-gap "
-                "line; give the channel its base, or have its scale found"
+                "line; give the base of the channel, or fit its scale"
             )
             continue
         in_range[channel.name] = level
         if abs(level / _voltage(channels) - 1.0) < WITHOUT_SATURATION and not on_load:
             yield (
                 f"{rests}, as the voltage does: a machine without saturation, or is 1 pu of "
-                f"{channel.signal} that without load? Then its base is 1 / (1 + S(1.0)), as 0.89"
+                f"{channel.signal} that at no load? Then its base is 1 / (1 + S(1.0)), e.g. 0.89"
             )
     if len(in_range) == len(FIELD) and min(in_range.values()) > 0.0:
         (first, at), (second, other) = in_range.items()
         if abs(at - other) > SAME_BASE * max(at, other):
             yield (
                 f"{first} rests at {at:.4g}, {second} at {other:.4g}: in per unit of the air-gap "
-                "line both are equal at rest, so that one of them has another base"
+                "line both are equal at rest, so one of the two bases is wrong"
             )
 
 

@@ -345,8 +345,8 @@ def _clock_findings(inspection: Inspection) -> Iterator[str]:
         more = len(sampling.backward) - len(inspection.backward_at)
         rest = f" and {more} more" if more else ""
         yield (
-            f"time repeats or goes back at {places}{rest}: left out here, refused by a fit but for "
-            "rows that are alike, or of which `repeats: first` or `repeats: last` leaves one"
+            f"time repeats or goes back at {places}{rest}: left out here; a fit refuses them "
+            "unless the rows are identical, or with `repeats: first` or `repeats: last`"
         )
     if sampling.step >= 1.0:
         yield f"samples are {sampling.step:g} s apart: is the time in s?"

@@ -259,7 +259,7 @@ def smooth_angle(table: RecordTable, column: str, angle: Array, rows: Places) ->
         return unwrapped(angle)
     except AngleError as fault:
         place = table.place(int(rows[fault.row]))
-        remedy = "give a faster record, or leave samples out that are none (record.window, status)"
+        remedy = "give a faster record, or leave out invalid samples (record.window, status)"
         raise RecordError(f"{place}: column {column!r}: {fault}: {remedy}") from None
 
 
@@ -303,7 +303,7 @@ def bad_rows(table: RecordTable, status: Status) -> tuple[BadRow, ...]:
         refused = f"accepted: {listed(status.accept)}"
         why = {flag: "" if kinds[flag] in good else refused for flag in kinds}
     elif {*kinds.values()} in ({0, 1}, {1}):
-        what = "holds 0 and 1, of which either may be good: record.status.accept says which"
+        what = "contains 0 and 1: give the one that means valid under record.status.accept"
         raise column_error(table.path, status.column, what)
     else:
         why = {flag: _fault(kind) for flag, kind in kinds.items()}

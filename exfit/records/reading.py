@@ -304,6 +304,6 @@ def _signal(
         raise column_error(table.place(row), channel.column, what)
     peak = float(np.nanmax(np.abs(signal)))
     if 0.0 < peak < SMALLEST:
-        what = f"at most {peak:g} pu all along, below {SMALLEST:g}"
+        what = f"at most {peak:g} pu throughout, below {SMALLEST:g}"
         raise column_error(table.path, channel.column, what)
     return np.asarray(signal, np.float64)

@@ -53,12 +53,11 @@ class BreakerOpening:
         if self.jump is not None:
             return (
                 f"{columns} jumps by {100.0 * self.jump:+.2g} % at {self.at:.4g} s, between two "
-                "samples, as no exciter moves it: it seems that the breaker opens (a load "
-                "rejection)"
+                "samples, faster than any exciter: the breaker seems to open (a load rejection)"
             )
         falls = "falls" if len(self.seen_in) == 1 else "fall"
         return (
-            f"{columns} {falls} to zero for good at {self.at:.4g} s: the breaker opens (a load "
+            f"{columns} {falls} permanently to zero at {self.at:.4g} s: the breaker opens (a load "
             "rejection), which is no step of the reference"
         )
 

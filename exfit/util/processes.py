@@ -55,7 +55,7 @@ def ending(code: int, process: str) -> str:
             name = signal.Signals(-code).name
         except ValueError:
             name = f"signal {-code}"
-        likely = ", for want of memory or by hand" if name == "SIGKILL" else ""
+        likely = ", out of memory or by hand" if name == "SIGKILL" else ""
         return f"{process} was ended by {name}{likely}"
     if code > HIGHEST_CODE:  # an exception of Windows
         return f"{process} was ended by {code:#x}"

@@ -246,7 +246,7 @@ def test_rms_values_that_are_not_positive_are_refused(level):
 def test_rms_values_of_which_one_is_always_missing_are_refused():
     phases = np.full((50, 3), 9.0)
     phases[:, 1] = np.nan
-    with pytest.raises(ValueError, match="no instant at which all three"):
+    with pytest.raises(ValueError, match="no sample has a number in all three"):
         mean_rms(phases)
 
 

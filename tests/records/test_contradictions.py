@@ -54,7 +54,7 @@ def test_a_field_voltage_that_rests_where_no_machine_does_needs_a_base_or_has_it
     assert "0.95 to 1.6 pu" in finding
     assert "air-gap line" in finding
     (finding,) = with_fault(efd=CHANNELS["efd"] / CHANNELS["efd"][0])
-    assert "is 1 pu of efd that without load?" in finding
+    assert "is 1 pu of efd that at no load?" in finding
 
 
 @pytest.mark.parametrize("signal", ["vref", "vt"])

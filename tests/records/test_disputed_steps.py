@@ -80,7 +80,7 @@ def test_a_field_current_that_moves_with_the_voltage_once_and_once_against_it_is
     disputed = inspected(channels(np.random.default_rng(2), vt=(0.05, 0.05)))
     assert sizes(disputed, 0.05) == [(0.05,), (None,)]
     (finding,) = disputed.findings
-    assert "which way that step went is open" in finding
+    assert "the direction of that step is open" in finding
 
 
 def test_a_field_current_that_always_moves_against_the_voltage_leaves_the_sign_to_it():

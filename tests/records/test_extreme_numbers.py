@@ -106,7 +106,7 @@ def test_a_scale_or_base_that_makes_numbers_beyond_all_measure_is_refused(write,
 
 
 def test_a_signal_below_all_measure_is_refused(write):
-    with pytest.raises(RecordError, match=r"column 'vt': at most 1\.05e-308 pu all along, below"):
+    with pytest.raises(RecordError, match=r"column 'vt': at most 1\.05e-308 pu throughout, below"):
         read(write(t=TIME, vt=VOLTAGE * 1e-308))
 
 

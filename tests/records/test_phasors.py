@@ -102,7 +102,7 @@ def test_flags_zero_and_one_need_the_word_which_is_good(tmp_path):
     columns = pmu_columns(smooth_course())
     columns["UNIT1-SF"] = ["1"] * len(columns["UNIT1-SF"])
     path = write_table(tmp_path / "pmu.csv", columns)
-    with pytest.raises(RecordError, match=r"status\.accept says which"):
+    with pytest.raises(RecordError, match=r"the one that means valid under record\.status\.accept"):
         read(section(path, status={"column": "UNIT1-SF"}), tmp_path)
     read(section(path, status={"column": "UNIT1-SF", "accept": [1]}), tmp_path)
 

@@ -242,5 +242,5 @@ def test_a_coarse_step_is_held_against_the_error_of_the_signal_that_it_moves(tmp
         }
         content = {**one(TEST, channels, ["KA"]), "simulation": {"step": 0.02}}
         notes = [one for one in fit(case_of(content, tmp_path)).notes if "halving" in one]
-        assert any("moves efd by" in one for one in notes) == noted
-        assert not any("moves vt by" in one for one in notes)
+        assert any("changes efd by" in one for one in notes) == noted
+        assert not any("changes vt by" in one for one in notes)

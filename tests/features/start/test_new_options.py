@@ -76,7 +76,7 @@ def test_a_size_for_all_that_one_test_contradicts_is_refused_with_the_remedy(rec
     few_of(
         [
             ("up=-0.05", "vt rises there"),
-            ("5", "no regulator is tested so"),
+            ("5", "too large for a test"),
             ("0", "0 is no step"),
             ("sideways=0.05", "no test of that name; the record's tests: up-5%-at-30s"),
             ("up=five", "not of the form 0.05 or up=0.05"),
