@@ -17,22 +17,19 @@ from contextlib import ExitStack, chdir, contextmanager
 from dataclasses import dataclass
 from decimal import Decimal
 from html import unescape
-from importlib.metadata import version
 from pathlib import Path
 from typing import ClassVar
 from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
-import numpy as np
 from field_record import FILE, field_record
 from film import film, lines_of
 from matplotlib.figure import Figure
-from matplotlib.ft2font import __freetype_version__
-from PIL import Image, PngImagePlugin
 from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 from rich.text import Text
+from small_svg import same_svg, small_svg
 
 from exfit.cli import main
 from exfit.output import figures as plots
@@ -44,8 +41,6 @@ FOLDER = PAGE.parent / "img"
 OTHERS = ("thesis_", "verdict_")  # pictures of other pages: those of tests/studies
 BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
-DPI = 84  # of the figures: 756 points wide, that of a page
-COLOURS = 96  # of a figure; its lines have a few, each with shades to white
 COLUMNS = 80  # of the terminal
 PROMPT, EARLY, ITERATION, STAGE, RESULT = 0.7, 0.7, 0.25, 0.6, 4.0  # s: of a frame of a film
 FEW = 5  # iterations that are shown as early ones: the response changes visibly
@@ -53,13 +48,6 @@ FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that
 # fonts of a server: a picture of its own has none
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 
-# largest mean difference, of 255, over blocks of so many points: between processors it is below 5,
-# a line of 1.0 in place of 1.4 points makes 47 and a changed letter 53
-POINTS, APART = 4, 12.0
-# the same between versions of Matplotlib or FreeType, which set letters and so axes a point or two
-# apart: other hinting of the letters makes 32
-OTHER_POINTS, OTHER_APART = 32, 48.0
-DRAWN_BY = f"Matplotlib {version('matplotlib').rpartition('.')[0]}, FreeType {__freetype_version__}"
 VANISHED = 1e-6  # a gradient or a step below it is what rounding leaves, and another machine rounds
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]\d+)?")
 
@@ -112,19 +100,19 @@ RUNS = (  # in the order of the page
             Picture(
                 "fit.svg", "a fit as it goes on: the iterations, the response, the fitted values"
             ),
-            Picture("overlay.png", "measured, start values and fitted", "overlay.png"),
-            Picture("iterations.png", "the response after each iteration", "iterations.png"),
-            Picture("convergence.png", "cost, gradient and damping", "convergence.png"),
-            Picture("correlation.png", "correlation of the estimates", "correlation.png"),
+            Picture("overlay.svg", "measured, start values and fitted", "overlay.png"),
+            Picture("iterations.svg", "the response after each iteration", "iterations.png"),
+            Picture("convergence.svg", "cost, gradient and damping", "convergence.png"),
+            Picture("correlation.svg", "correlation of the estimates", "correlation.png"),
             Picture(
-                "sensitivity.png", "effect of each parameter on the voltage", "sensitivity.png"
+                "sensitivity.svg", "effect of each parameter on the voltage", "sensitivity.png"
             ),
         ),
         rows=32,
     ),
     Run(
         f"exfit profile {FIT} KA KC KD",
-        (Picture("profile.png", "profiles of three parameters", "profile.png"),),
+        (Picture("profile.svg", "profiles of three parameters", "profile.png"),),
     ),
     Run(
         f"exfit identify {FIT}",
@@ -134,7 +122,7 @@ RUNS = (  # in the order of the page
         f"exfit identify {FIT} --design --limit vt=0.05 --limit efd=4 --channels vt,efd",
         (
             Picture(
-                "designed_test.png", "the test within limits that shows most", "designed_test.png"
+                "designed_test.svg", "the test within limits that shows most", "designed_test.png"
             ),
         ),
     ),
@@ -142,33 +130,33 @@ RUNS = (  # in the order of the page
         f"exfit inspect {RECORD}",
         (
             Picture("inspect.svg", "contents of a recorder's file, and the sections of a case"),
-            Picture("inspect.png", "step, spikes and gap of that record", "inspect.png"),
+            Picture("inspect_figure.svg", "step, spikes and gap of that record", "inspect.png"),
         ),
     ),
     Run(
         f"exfit fit {FIELD}",
-        (Picture("field_overlay.png", "voltage and field current in one fit", "overlay.png"),),
+        (Picture("field_overlay.svg", "voltage and field current in one fit", "overlay.png"),),
     ),
     Run(
         f"exfit fit {EVENT} --search local",
         (
             Picture(
-                "grid_event.png", "a grid event: what was played in, then P and Q", "overlay.png"
+                "grid_event.svg", "a grid event: what was played in, then P and Q", "overlay.png"
             ),
         ),
     ),
     Run(
         f"exfit simulate {FIT}",
-        (Picture("response.png", "every signal and state", "response.png"),),
+        (Picture("response.svg", "every signal and state", "response.png"),),
     ),
     Run(
         f"exfit fit {FIT} {UNIT} --strategy dgn --strategy lm",
-        (Picture("fits.png", "two cases, each with two strategies", "fits.png"),),
+        (Picture("fits.svg", "two cases, each with two strategies", "fits.png"),),
     ),
     Run(
         "exfit compare runs/ac1a_typical-simulate runs/ac1a_typical-fit "
         "--record sample_data/ac1a_up.csv",
-        (Picture("compare.png", "two responses and a record", "compare.png"),),
+        (Picture("compare.svg", "two responses and a record", "compare.png"),),
     ),
 )
 # what a command draws beside its pictures
@@ -212,7 +200,7 @@ def drawn() -> dict[str, bytes]:
             screen = ran(run)
             for picture in run.pictures:
                 source = run.folder / picture.source if picture.source else None
-                pictures[picture.name] = smaller(source.read_bytes()) if source else screen
+                pictures[picture.name] = source.read_bytes() if source else screen
     return pictures
 
 
@@ -232,7 +220,8 @@ def ran(run: Run) -> bytes:
     console.print(f"$ {run.command}", style="bold", soft_wrap=True)
     words = run.command.split()[1:]
     with ExitStack() as changes:
-        changes.enter_context(patch.object(plots.style, "DPI", DPI))
+        changes.enter_context(patch.object(plots, "drawn", small_svg))
+        changes.enter_context(patch.object(plots, "encoded", bytes))
         changes.enter_context(patch.object(terminal, "console", lambda: console))
         changes.enter_context(patch.object(live, "LiveIterations", Filmed))
         changes.enter_context(patch.object(live, "QUIET", math.inf))
@@ -253,45 +242,10 @@ def ran(run: Run) -> bytes:
     return svg.replace(*FRAME).encode()
 
 
-def smaller(png: bytes) -> bytes:
-    """Return a figure in its most frequent colours, with what it was drawn by."""
-    out, about = io.BytesIO(), PngImagePlugin.PngInfo()
-    about.add_text("Software", DRAWN_BY)
-    image = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=np.int64)
-    packed, place, counts = np.unique(
-        image @ (1 << 16, 1 << 8, 1), return_inverse=True, return_counts=True
-    )
-    colours = np.stack([packed >> 16, packed >> 8 & 255, packed & 255], axis=1)
-    palette = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
-    nearest = np.argmin(np.sum((colours[:, None] - palette) ** 2, axis=2), axis=1)
-    few = Image.fromarray(nearest[place].reshape(image.shape[:2]).astype(np.uint8))
-    few.putpalette(palette.astype(np.uint8).tobytes())
-    few.save(out, "PNG", optimize=True, pnginfo=about)
-    return out.getvalue()
-
-
 def same(one: bytes, other: bytes) -> bool:
     """Return whether two pictures differ by no more than another machine or version does."""
-    figures = [content.startswith(b"\x89PNG") for content in (one, other)]
-    return same_figure(one, other) if all(figures) else same_words(one, other)
-
-
-def same_figure(one: bytes, other: bytes) -> bool:
-    """Return whether two figures are alike, compared block by block."""
-    first, second = (Image.open(io.BytesIO(png)) for png in (one, other))
-    if first.size != second.size:
-        return False
-    alike = first.text == second.text
-    points, apart = (POINTS, APART) if alike else (OTHER_POINTS, OTHER_APART)
-    difference = np.subtract(*(np.asarray(it.convert("RGB"), float) for it in (first, second)))
-    return bool(np.all(np.abs(means(difference, points)) <= apart))
-
-
-def means(image: np.ndarray, points: int) -> np.ndarray:
-    """Return the means of an image (height, width, 3) over square blocks."""
-    down, across = (np.arange(0, length, points) for length in image.shape[:2])
-    sums = np.add.reduceat(np.add.reduceat(image, down, axis=0), across, axis=1)
-    return sums / points**2
+    figures = all(b"<!-- Matplotlib" in content for content in (one, other))
+    return same_svg(one, other, same_word) if figures else same_words(one, other)
 
 
 def same_words(one: bytes, other: bytes) -> bool:

@@ -83,8 +83,8 @@ def test_every_reproduced_figure_is_a_picture_or_a_diagram():
 
 
 def test_the_page_shows_every_picture_of_the_thesis_and_they_are_small():
-    pictures = sorted(IMAGES.glob("thesis_*.png"))
-    assert sorted(re.findall(r"img/(thesis_\w+\.png)", PAGE)) == [path.name for path in pictures]
+    pictures = sorted(IMAGES.glob("thesis_*.svg"))
+    assert sorted(re.findall(r"img/(thesis_\w+\.svg)", PAGE)) == [path.name for path in pictures]
     assert max(path.stat().st_size for path in pictures) < LARGEST
 
 
@@ -218,7 +218,7 @@ def test_the_jacobian_of_the_page_is_what_the_study_makes(study):
 
 @pytest.mark.long
 def test_a_picture_of_the_page_is_what_the_study_draws(study):
-    assert same((IMAGES / "thesis_jacobian.png").read_bytes(), study.drawn("jacobian"))
+    assert same((IMAGES / "thesis_jacobian.svg").read_bytes(), study.drawn("jacobian"))
 
 
 @pytest.mark.long

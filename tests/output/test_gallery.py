@@ -3,10 +3,9 @@
 import re
 from html import unescape
 
-import gallery
-import matplotlib
 import numpy as np
 import pytest
+import small_svg
 from field_record import AT, FILE, QUANTUM, UNIT, VT0, field_record
 from film import film
 from gallery import (
@@ -20,7 +19,6 @@ from gallery import (
     own_files,
     same,
     same_word,
-    smaller,
     with_section,
 )
 from rich.text import Text
@@ -34,7 +32,7 @@ from exfit.records.inspection import inspect
 pytestmark = pytest.mark.long  # every figure of the documentation is drawn
 
 PICTURES = [picture.name for run in RUNS for picture in run.pictures]
-LARGEST, TOGETHER = 60_000, 600_000  # bytes: a page that opens at once
+LARGEST, TOGETHER = 75_000, 600_000  # bytes: a page that opens at once
 
 
 def test_every_picture_is_what_its_command_makes():
@@ -148,8 +146,7 @@ def figure():
     return plots.inspection(FOUND, "title")
 
 
-def picture(one):
-    return smaller(plots.png(one))
+picture = small_svg.small_svg
 
 
 @pytest.fixture(scope="module")
@@ -162,20 +159,22 @@ def test_a_figure_is_the_same_when_it_is_drawn_again(unchanged):
     assert same(unchanged, picture(figure()))
 
 
-def test_letters_of_another_version_change_a_figure_only_of_the_same_version(
-    unchanged, monkeypatch
-):
-    with matplotlib.rc_context({"text.hinting": "none"}):
-        other = picture(figure())
-        monkeypatch.setattr(gallery, "DRAWN_BY", "Matplotlib 99.0")
-        assert not same(unchanged, other)
-        assert same(unchanged, picture(figure()))
+def test_axes_of_another_version_change_a_figure_only_of_the_same_version(unchanged, monkeypatch):
+    def moved():
+        one = figure()
+        one.get_layout_engine().set(w_pad=7.0 / 72.0)  # of 5: as wider letters of the ticks do
+        return picture(one)
+
+    assert not same(unchanged, moved())
+    monkeypatch.setattr(small_svg, "DRAWN_BY", "Matplotlib 99.0")
+    assert same(unchanged, moved())
 
 
 @pytest.mark.parametrize(
     "change",
     [
         lambda one: one.axes[0].lines[0].set_linewidth(0.5),
+        lambda one: one.axes[0].lines[0].set_ydata(1.001 * one.axes[0].lines[0].get_ydata()),
         lambda one: one.axes[1].lines[0].set_color("#9d174d"),
         lambda one: one.axes[0].set_ylabel("Ugen\nvt\n(MV)", fontsize=8),
         lambda one: one.suptitle("titel", fontsize=11),

@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from unittest.mock import patch
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
@@ -25,8 +24,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 import thesis_figures as figures
 import thesis_tables as tables
-from gallery import same, smaller
+from gallery import same
 from places import ROOT, SAMPLES
+from small_svg import small_svg
 from thesis_figures import Curve, Panel
 from thesis_numbers import (
     APPROXIMATE,
@@ -54,13 +54,11 @@ from thesis_runs import (
 
 import exfit
 from exfit.models import MODELS
-from exfit.output.figures import style
 from exfit.output.figures.style import SIMULATED, START
 
 PAGE = ROOT / "docs" / "thesis.md"
 FOLDER = PAGE.parent / "img"
 TEMPLATE = Path(__file__).with_suffix(".md.jinja")
-DPI = 84  # of the figures: 756 points wide, that of a page
 
 # figures of a case: its start, then what each method came to
 RESPONSES = {
@@ -202,7 +200,7 @@ def numbers_of(picture: str) -> str:
 def image(picture: str) -> str:
     """Return a picture as the page shows it."""
     numbers = numbers_of(picture)
-    return f"![figure{'s' if ',' in numbers else ''} {numbers}](img/thesis_{picture}.png)"
+    return f"![figure{'s' if ',' in numbers else ''} {numbers}](img/thesis_{picture}.svg)"
 
 
 def diagram(number: str) -> str:
@@ -235,14 +233,13 @@ def page() -> str:
 
 def drawn(picture: str) -> bytes:
     """Return a picture as the bytes of its file."""
-    with patch.object(style, "DPI", DPI):
-        return smaller(style.png(PICTURES[picture]()))
+    return small_svg(PICTURES[picture]())
 
 
 def write() -> None:
     """Write the page and its pictures; one that has hardly changed stays as it is."""
     for picture in PICTURES:
-        path, content = FOLDER / f"thesis_{picture}.png", drawn(picture)
+        path, content = FOLDER / f"thesis_{picture}.svg", drawn(picture)
         if not (path.exists() and same(path.read_bytes(), content)):
             path.write_bytes(content)
             print(f"{path.relative_to(ROOT)}: {len(content) / 1e3:.0f} kB")

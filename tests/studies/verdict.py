@@ -5,10 +5,9 @@
 fits each case with its fault, and the same without it, by the noise of the same record. Verdict and
 cause that are right stand in tests/support/faulty_cases.py, beside the fault. Chi-square is by how
 much the fault raises the lowest cost that a fit reaches. The table and the figure go to
-docs/verification.md and docs/img/verdict_faults.png. It takes some ten minutes of processor time.
+docs/verification.md and docs/img/verdict_faults.svg. It takes some ten minutes of processor time.
 """
 
-import io
 import os
 import sys
 from collections import Counter
@@ -39,11 +38,11 @@ from faulty_cases import (
     cause_rank,
     drawn,
 )
-from gallery import smaller
 from places import ROOT
+from small_svg import small_svg
 
 from exfit.errors import ExfitError
-from exfit.output.figures.style import GREEN, LIMIT, MEASURED, SIMULATED, WIDTH
+from exfit.output.figures.style import GREEN, LIMIT, MEASURED, SIMULATED, WIDTH, PowersOfTen
 from exfit.results.comparisons import Overlay
 from exfit.results.model import FitResult
 from exfit.results.verdict import Cause
@@ -57,9 +56,8 @@ STRETCH = 50  # of a record: for so long it lasts
 NEAR_CONSTANT = 5.0  # per cent: a match within this of a constant's may be called either
 BAND = 1.5  # a deviation within this factor of the visible one may be called either
 WORKERS = 2  # processes
-DPI = 84  # of the figure
 PAGE_WIDTH = 120  # letters
-PAGE, FIGURE = ROOT / "docs" / "verification.md", ROOT / "docs" / "img" / "verdict_faults.png"
+PAGE, FIGURE = ROOT / "docs" / "verification.md", ROOT / "docs" / "img" / "verdict_faults.svg"
 LEAST_DRAWN = 1.0  # chi-square
 MARKERS = {
     "right verdict and cause": ("o", GREEN),
@@ -236,7 +234,7 @@ def section(results: Sequence[Outcome], seed: int) -> str:
         f"* The same {len(results)} cases without their fault: {plain} good, {len(doubted)} "
         f"matches, not all determined, {len(alarms)} worse.",
         "",
-        "![Chi-square of each fault by kind, and what was said of it](img/verdict_faults.png)",
+        "![Chi-square of each fault by kind, and what was said of it](img/verdict_faults.svg)",
         "",
     ]
     wrapped = [fill(text, PAGE_WIDTH, subsequent_indent=indent(text)) for text in paragraphs]
@@ -264,6 +262,7 @@ def figure(results: Sequence[Outcome]) -> Figure:
         )
     axes.axvline(SEEN, color=MEASURED, linestyle="--", linewidth=1.0)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(PowersOfTen())
     axes.set_xlabel(f"chi-square by which the fault raises the lowest cost (dashed: {SEEN:g})")
     axes.set_yticks([*rows.values()], [*rows])
     axes.invert_yaxis()
@@ -304,9 +303,7 @@ def main() -> None:
     print("\n".join(table(results)))
     if share == 1.0 and seed == SEED:
         write_page(section(results, seed))
-        picture = io.BytesIO()
-        figure(results).savefig(picture, format="png", dpi=DPI)
-        FIGURE.write_bytes(smaller(picture.getvalue()))
+        FIGURE.write_bytes(small_svg(figure(results)))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 import exfit
-from exfit.output.figures.style import COLORS, MEASURED, SIMULATED, START, tidy
+from exfit.output.figures.style import COLORS, MEASURED, SIMULATED, START, logarithmic, tidy
 from exfit.results.comparisons import Comparison
 
 Array = NDArray[np.float64]
@@ -115,13 +115,14 @@ def costs_and_steps(fits: Mapping[str, exfit.FitResult]) -> Figure:
     grid = figure.subplots(2, len(fits), squeeze=False, sharex="col", sharey="row")
     for (upper, lower), (title, result) in zip(grid.T, fits.items(), strict=True):
         numbers = [line.number for line in result.history]
-        upper.semilogy(numbers, [line.cost for line in result.history], "o-", color=START, ms=3)
+        upper.plot(numbers, [line.cost for line in result.history], "o-", color=START, ms=3)
         steps = [line.step_norm if line.step_norm > 0.0 else np.nan for line in result.history]
-        lower.semilogy(numbers, steps, "o-", color=SIMULATED, ms=3)
+        lower.plot(numbers, steps, "o-", color=SIMULATED, ms=3)
         upper.set_title(title, fontsize=SMALL, loc="left")
         lower.set_xlabel("iteration", fontsize=SMALL)
         lower.xaxis.set_major_locator(MaxNLocator(integer=True))
         for axes in (upper, lower):
+            logarithmic(axes)
             axes.tick_params(labelsize=SMALL)
             tidy(axes)
     grid[0, 0].set_ylabel("cost f (pu²)", fontsize=SMALL)
