@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
+from exfit.errors import ExfitError
 from exfit.features.start.answers import checked
 from exfit.features.start.making import new_case
 from exfit.util.files import write
@@ -56,6 +57,8 @@ def new(
         >>> exfit.new("bump.csv", dyr="unit.dyr", bus=101, step=0.05, output="unit.yaml")
         >>> exfit.fit("unit.yaml").verdict.verdict
     """
+    if model is None and dyr is None:
+        raise ExfitError("model: missing; or give dyr, a planner's file with the unit")
     given = {
         "record": record, "model": model, "dyr": dyr, "bus": bus, "id": id, "step": step, "kv": kv,
         "mva": mva, "base": base, "machine": machine, "exciter": exciter, "sources": sources,
