@@ -38,7 +38,7 @@ def feedback(efd: Signal, p: Signal) -> Signal:
 
 
 def ac3a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """AC3A: alternator exciter, its own supply (IEEE Std 421.5-2005, 6.3).
+    """AC3A: self-excited alternator exciter (IEEE Std 421.5-2005, 6.3).
 
               vsum           UEL       VAMAX               VE <= VEMAX
                 ▼
@@ -105,7 +105,7 @@ AC3A = documented(
 
 
 def ac3c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """AC3C: alternator exciter, its own supply, with a PID (IEEE Std 421.5-2016).
+    """AC3C: self-excited alternator exciter with a PID (IEEE Std 421.5-2016).
 
               vsum     VPIDMAX                   UEL OEL      VAMAX
                 ▼
@@ -180,7 +180,7 @@ AC3C = documented(
 
 
 def exac3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """EXAC3: alternator exciter, its own supply (IEEE type AC3 of 1981).
+    """EXAC3: self-excited alternator exciter (IEEE type AC3 of 1981).
 
               vsum             VAMAX                  VE >= 0
                 ▼

@@ -119,7 +119,7 @@ AC8B = documented(
 
 
 def ac8c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """AC8C: alternator exciter, PID and supply of its own (IEEE Std 421.5-2016).
+    """AC8C: alternator exciter with PID and power stage supply (IEEE Std 421.5-2016).
 
              vsum        VPIDMAX                   VRMAX         VE <= VEMAX
                ▼ UEL OEL                UEL OEL

@@ -83,7 +83,7 @@ DC4B = documented(
 
 
 def dc4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """DC4C: commutator exciter, PID regulator, own supply (IEEE Std 421.5-2016).
+    """DC4C: commutator exciter, PID regulator with supply (IEEE Std 421.5-2016).
 
                              VRMAX/KA             UEL   OEL
     vref + vs + vsum ─►(+)─►[KPR + KIR/s      ]───►HV───►LV────┐

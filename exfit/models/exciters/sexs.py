@@ -25,7 +25,7 @@ PSLF_RECORDS = record(
     "TATB TB K TE EMIN EMAX KC TC EFDMIN EFDMAX SPARE",
     absent={"TC": 0.0, "EFDMIN": -999.0, "EFDMAX": 999.0, "SPARE": 0.0},
     ignored="KC",
-    doubt="what stands behind EMAX is not confirmed; it is taken to be without effect",
+    doubt="the constants after EMAX are not confirmed; they are taken to have no effect",
 )
 
 STATES = "VL EFD"

@@ -93,7 +93,7 @@ IEEEG1 = documented(
 
 
 def ieesgo(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """IEESGO: steam turbine governor of one gain and three shares (PSS/E).
+    """IEESGO: steam turbine governor with one gain and three power fractions (PSS/E).
 
                                          PMAX
     pref ─────────────────────────►(+)─►[clip]─►[   1   ]─► v4

@@ -215,7 +215,7 @@ OEL3C = documented(
 
 
 def oel5c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """OEL5C: overexcitation limiter that takes over, with inverse time (IEEE Std 421.5-2016).
+    """OEL5C: takeover overexcitation limiter with inverse time (IEEE Std 421.5-2016).
 
     ifd ─►[KSCALE1 ]─┬─► i
           [1 + sTF1] └─►[1 + sTCOEL]─► ic

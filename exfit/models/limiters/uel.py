@@ -135,7 +135,7 @@ def reduction(u: Signal, p: Signal) -> Signal:
 
 
 def uel2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """UEL2C: underexcitation limiter with a characteristic of points (IEEE Std 421.5-2016).
+    """UEL2C: underexcitation limiter with a piecewise-linear characteristic (IEEE Std 421.5-2016).
 
     vt ─►[   1    ]─► v
          [1 + sTUV]
