@@ -1,4 +1,4 @@
-"""A simulated response beside a record: its samples, and how well they match; what drove it."""
+"""A simulated response beside a record: samples, match, and the signals that drove it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -113,11 +113,11 @@ class StepFeatures(NamedTuple):
 
 
 class ValidatedStep(NamedTuple):
-    """A step of a record that was given by hand: when (s) and by how much (pu).
+    """A step of a record for validation: its time (s) and size (pu).
 
-    ``found`` says what the record shows of it and no one gave: instant, size. The error ``rmse``
-    (pu) is that at the instants that are judged. If they were found, it is least, ``best_rmse``,
-    with the step at ``best_at``, within what the record allows.
+    ``found`` says which of instant and size were detected in the record, not given. The error
+    ``rmse`` (pu) is that at the times that are judged. If they were detected, it is least,
+    ``best_rmse``, with the step at ``best_at``, within the uncertainty of the time.
     """
 
     signal: str
@@ -181,7 +181,7 @@ class DrivingSignal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """What of a signal was recorded and simulated but is not compared (M,); nan elsewhere."""
+    """Samples of a signal that are recorded and simulated but not compared (M,); nan elsewhere."""
 
     measured: Array
     simulated: Array
@@ -306,7 +306,7 @@ class AsFound:
 
 @dataclass(frozen=True, eq=False)
 class PhaseEnd:
-    """Where a phase of the descent from the start of the case handed over to the next.
+    """The end of a phase of the run from the start of the case, where the next one continues.
 
     ``iteration`` is its number in the history, ``values`` are those of the free parameters and of
     all others of the exciter there, ``comparisons`` the response to them beside each record.

@@ -34,7 +34,7 @@ class JudgedCriterion:
 
 @dataclass(frozen=True)
 class CriteriaVerdict:
-    """All criteria of a report, and what they come to."""
+    """All criteria of a report, and their result."""
 
     criteria: tuple[JudgedCriterion, ...]
 
@@ -53,7 +53,7 @@ class CriteriaVerdict:
 
     @property
     def sentence(self) -> str:
-        """What the criteria come to, in a sentence."""
+        """The result of the criteria, in a sentence."""
         count = len(self.criteria)
         met = sum(criterion.met is True for criterion in self.criteria)
         if not count:

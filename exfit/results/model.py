@@ -1,4 +1,4 @@
-"""A fit as data: what was found, how, and how well it matches.
+"""A fit as data: its parameters, its search, and its match with the records.
 
 The classes describe result.json, too: `results.io` writes and reads it by their annotations.
 """
@@ -104,7 +104,7 @@ class FittedParameter:
 
     @property
     def linear_error(self) -> float | None:
-        """The standard error where linear theory serves: where the interval is its own."""
+        """The standard error where the interval is that of linear theory."""
         return self.std_error if self.interval is not None and not self.interval_note else None
 
     @property
@@ -128,16 +128,16 @@ class FittedParameter:
 
     @property
     def interval_note(self) -> str:
-        """How an interval was found that is not that of linear theory; else ""."""
+        """The method of an interval that is not that of linear theory; else ""."""
         method = None if self.interval is None else self.interval_method
         return "" if method is None or method == "linear" else method
 
 
 class Minimum(NamedTuple):
-    """A minimum of the cost: the values there, and how many descents led to it.
+    """A minimum of the cost: the values there, and how many runs converged to it.
 
-    ``chi_square`` is how far it lies above the lowest one, in variances of the residuals; it is
-    ``refuted`` where that exceeds the limit of the likelihood ratio at 95 %; minima in one
+    ``chi_square`` is its height above the lowest one, in variances of the residuals; it is
+    ``refuted`` (rejected) where that exceeds the limit of the likelihood ratio at 95 %; minima in one
     ``valley``, 0 for that of the result, count as one. None: not known.
     """
 
@@ -164,11 +164,11 @@ def multiple(ratio: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Minima:
-    """What a search from several starts found: the distinct minima, the lowest first.
+    """The distinct minima of a search from several starts, the lowest first.
 
     ``start_costs`` (starts,) are inf where there is no response, ``end_costs`` (starts,) nan where
-    a start was not refined; those of the case's own start come first. ``ways`` (starts,) says what
-    each descent began with: the strategy of the case, its linear phase, or the model itself.
+    a start was not refined; those of the start of the case come first. ``ways`` (starts,) says what
+    each run began with: the strategy of the case, its linear phase, or the model itself.
     """
 
     DERIVED: ClassVar = {"starts": "starts", "refined": "refined", "failed": "failed"}
@@ -194,7 +194,7 @@ class Minima:
         return int(np.count_nonzero(np.isinf(self.start_costs) & np.isnan(self.end_costs)))
 
     def summary(self, cost: float) -> str:
-        """Say from where the search went, and where its descents led; ``cost`` is the result's."""
+        """Say from where the search started, and where its runs ended; ``cost`` is the result's."""
         further = self.starts - max(1, self.ways.count("strategy"))
         here = sum(minimum.starts for minimum in self.minima if minimum.cost == cost)
         unfinished = int(np.count_nonzero(np.isnan(self.end_costs))) - self.failed
@@ -208,7 +208,7 @@ class Minima:
         return f"from the start of the case and {starts}: {', '.join(ends)}"
 
     def _elsewhere(self, cost: float) -> Iterator[str]:
-        """Yield the counts of descents to other minima: in the valley, open ones, refuted ones."""
+        """Yield the counts of runs to other minima: in the valley, open ones, rejected ones."""
         others = [minimum for minimum in self.minima if minimum.cost != cost]
         along = sum(minimum.starts for minimum in others if minimum.valley == 0)
         if along:
@@ -221,14 +221,14 @@ class Minima:
         if len(refuted) == 1:
             yield f"{refuted[0].starts} to another {refuted[0].height(cost)} (rejected)"
         elif refuted:
-            descents = sum(minimum.starts for minimum in refuted)
+            runs = sum(minimum.starts for minimum in refuted)
             height = f"{refuted[0].height(cost)} or more"
-            yield f"{descents} to {len(refuted)} others {height} (rejected)"
+            yield f"{runs} to {len(refuted)} others {height} (rejected)"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class FitResult:
-    """A fit: what was found, how, and how well it matches.
+    """A fit: its parameters, its search, and its match with the records.
 
     ``parameters`` holds the fitted ones under their names in the system: KA, machine.Tpd0.
     ``fixed`` are the exciter's others, and helpers; ``machine``, ``network``, ``stabiliser`` and
@@ -236,11 +236,11 @@ class FitResult:
     are None where the case has no such part; ``limiters`` holds those by kind (oel, uel). Values
     that follow others by ``ties`` are among these.
     ``sources`` says where every value comes from: typical, nameplate ..., not stated;
-    ``typical_values`` what those that are typical and not 0 would move, if they were 20 % off.
+    ``typical_values`` the effect of each typical value that is not 0, if it were 20 % off.
 
-    ``cost`` is what the fit made small, ``comparisons`` are with each record,
-    ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
-    what identifies the unit and the test. ``inputs`` is the SHA-256 of every file by its label,
+    ``cost`` is the minimised sum, ``comparisons`` are with each record, ``knowledge`` are errors
+    and intervals of the parameters, None where these are not known; ``about`` identifies unit
+    and test. ``inputs`` is the SHA-256 of every file by its label,
     ``files`` its name. ``given_values`` are those in place of the case's. ``as_found`` is
     the model before the test, ``criteria`` are those by which a report judges;
     ``other_program`` is what simulated the records where exfit did not; ``windows`` is T'd0

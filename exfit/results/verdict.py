@@ -1,4 +1,4 @@
-"""What a fit comes to: one of five verdicts, and what may be wrong where it is not good."""
+"""The verdict of a fit: one of five, and the likely causes where it is not good."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class ResidualTests:
 
 
 class Verdict(NamedTuple):
-    """What a fit comes to, with the ``reason`` for it and the likeliest causes, the first first.
+    """The verdict of a fit with its ``reason`` and its causes, the likeliest first.
 
     ``residuals`` are the tests of each channel of each record, empty where none could be made.
     """
@@ -106,7 +106,7 @@ class Verdict(NamedTuple):
     def misfit(self) -> str:
         """Why no parameter has an interval, "" where the response matches or the search failed.
 
-        An interval says how far noise may have moved a value: beside a misfit it says nothing.
+        An interval holds for errors by noise alone: beside a misfit it is meaningless.
         """
         return WITHOUT_INTERVALS.get(self.verdict, ("", ""))[1]
 

@@ -43,16 +43,16 @@ def fit(
 
     Args:
         case: a case, or the path of its file.
-        strategy: of the descent from the start of the case; None: the case's own.
+        strategy: of the run from the start of the case; None: as in the case.
         progress: called with every iteration of the path that leads from the start of the case to
             the result. A KeyboardInterrupt, raised in it too, ends the search with the best point
             so far.
-        search_progress: called with how far the search from further starts is.
+        search_progress: called with the progress of the search from further starts.
         live: called before ``progress`` with the response of that iteration.
         values: in place of those of the case, by name, or those of an earlier fit: of a free
             parameter its start. The result says which.
-        search: "global", or "local" for the descent from the start of the case alone, with the
-            intervals of linear theory; None: the case's own.
+        search: "global", or "local" for the run from the start of the case alone, with the
+            intervals of linear theory; None: as in the case.
 
     Raises ExfitError for input that cannot be used.
 
@@ -97,7 +97,7 @@ def read_record(
         time: column with the time, or the two of date and time of day, or {column, unit}.
         channels: column of each signal, or the mapping that a case has there: {column, unit, base,
             scale, offset} or {phases, kind, unit, base, connection}.
-        window: first and last instant kept, s.
+        window: first and last time kept, s.
         missing: whether a sample may be missing: it becomes nan.
         sheet: of a workbook.
         resample: rate of a slower, even clock, Hz.
@@ -194,18 +194,18 @@ def validate(
     step: float | Sequence[float] = (),
     at: float | Sequence[float] = (),
 ) -> "list[Comparison]":
-    """Compare a case with its records: the fitted ones first, then those that no fit saw.
+    """Compare a case with its records: the fitted ones first, then those that were not fitted.
 
-    Those that no fit saw are judged: ``accepted``, or the ``reason`` why not.
+    Those that were not fitted are judged: ``accepted``, or the ``reason`` why not.
 
     Args:
         case: a case, or the path of its file.
         values: of parameters, by name, or those of a fit.
-        record: in place of all records that no fit saw: a record, or a file with the columns of
-            the first of them, or of the fitted one where there is no other. Its steps are found in
-            it: ``steps`` of the comparison says which.
-        step: size of its step, pu, in place of the one found; of several steps one for each.
-        at: instant of its step, s, in place of the one found; of several steps one for each.
+        record: instead of all records that were not fitted: a record, or a file with the columns of
+            the first of them, or of the fitted one where there is no other. Its steps are
+            detected: ``steps`` of the comparison lists them.
+        step: size of its step, pu, instead of the one detected; for several steps one each.
+        at: time of its step, s, instead of the one detected; for several steps one each.
 
     Raises ExfitError for input that cannot be used, or where there is nothing to validate on.
 
@@ -259,7 +259,7 @@ def profile(
     Args:
         case: a case, or the path of its file.
         names: of free parameters, or of one; none: all.
-        progress: called with how far the profiles are.
+        progress: called with the progress of the profiles.
 
     An interruption keeps what is done of the profiles; one of the fit before them is passed on.
     Raises ExfitError for input that cannot be used.
