@@ -137,8 +137,8 @@ class Minimum(NamedTuple):
     """A minimum of the cost: the values there, and how many runs converged to it.
 
     ``chi_square`` is its height above the lowest one, in variances of the residuals; it is
-    ``refuted`` (rejected) where that exceeds the limit of the likelihood ratio at 95 %; minima in one
-    ``valley``, 0 for that of the result, count as one. None: not known.
+    ``refuted`` (rejected) where that exceeds the limit of the likelihood ratio at 95 %; minima in
+    one ``valley``, 0 for that of the result, count as one. None: not known.
     """
 
     values: Mapping[str, float]
