@@ -103,8 +103,8 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
     loaded = load(case)
     folder = output.folder_of(loaded, "profile", run_folder.OF_PROFILES)
     if output.events is not None:
-        name = output.events.named(case.stem)
-        profiles = workflows.profile(loaded, parameters, partial(output.events, name))
+        watch = partial(output.events, case.stem)
+        profiles = workflows.profile(loaded, parameters, watch)
     elif output.live:
         from exfit.output import live, terminal
 

@@ -152,12 +152,11 @@ def fit_one(
 
     (strategy, search), events = settings, output.events
     if events is not None:
-        from exfit.runs.fits import FitRun
+        from exfit.results.side_by_side import outcome_of
 
-        name = case.path.stem
-        watch = partial(events, events.named(name))
+        watch = partial(events, case.path.stem)
         result = workflows.fit(case, strategy, watch, watch, search=search)
-        events.finished(FitRun(name, name, result))
+        events.done(case.path.stem, outcome_of(result), result.holds)
     elif output.live:
         from exfit.output import live, terminal
 

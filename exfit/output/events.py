@@ -6,23 +6,16 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, Protocol, Self
 
 from exfit.estimate import Progress
 from exfit.results.model import Iteration
+from exfit.runs.runner import Planned
 from exfit.util.typed import plain
 
 
-class Named(Protocol):
-    """A run of a command, by a name that no other has: a fit, a test of a programme, a case."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-
-class Judged(Named, Protocol):
-    """A run that has ended."""
+class Judged(Planned, Protocol):
+    """A run that has ended: a fit, a test of a programme."""
 
     @property
     def verdict(self) -> str:
@@ -31,12 +24,6 @@ class Judged(Named, Protocol):
     @property
     def holds(self) -> bool:
         """Whether it matches and is accepted."""
-
-
-class NamedRun(NamedTuple):
-    """A run that has nothing but a name."""
-
-    name: str
 
 
 class Events:
@@ -53,11 +40,6 @@ class Events:
         self.folder: Path | None = None
         self.write("start", command=command, inputs=inputs, strategies=strategies)
 
-    @staticmethod
-    def named(name: str) -> Named:
-        """Name a run that has no plan."""
-        return NamedRun(name)
-
     def write(self, event: str, **content: Any) -> None:
         """Write an event with the seconds since the start; numbers that are not finite are null."""
         line = {"event": event, "elapsed": round(time.monotonic() - self._began, 3), **content}
@@ -68,15 +50,16 @@ class Events:
         """Write events: as what else shows progress, it is entered first."""
         yield self
 
-    def __call__(self, run: Named, progress: Iteration | Progress | None = None) -> None:
-        """Write how far a run is."""
-        if run.name not in self._begun:
-            self._begun.add(run.name)
-            self.write("begin", run=run.name)
+    def __call__(self, run: Planned | str, progress: Iteration | Progress | None = None) -> None:
+        """Write how far a run is, of a plan or by its name."""
+        name = run if isinstance(run, str) else run.name
+        if name not in self._begun:
+            self._begun.add(name)
+            self.write("begin", run=name)
         if isinstance(progress, Iteration):
-            self.write("iteration", run=run.name, **plain(progress))
+            self.write("iteration", run=name, **plain(progress))
         elif progress is not None:
-            self.stage(run.name, progress.stage, progress.done, progress.total, progress.best)
+            self.stage(name, progress.stage, progress.done, progress.total, progress.best)
 
     def stage(
         self, run: str | None, stage: str, done: int, total: int, best_cost: float | None = None

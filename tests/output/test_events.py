@@ -6,12 +6,14 @@ import signal
 from pathlib import Path
 
 import pytest
-from places import CONFIGS, ROOT
+from places import CONFIGS, ROOT, SAMPLES
+from tiers import few_of
 
 from exfit.output import events
 
 ALWAYS = {"event", "elapsed"}
 CASE = CONFIGS / "ac1a_typical.yaml"
+RECORD = SAMPLES / "ac1a_up.csv"
 LOCAL = ("--search", "local", "--no-plots")
 
 
@@ -66,7 +68,7 @@ def test_the_last_iteration_is_that_of_the_result(run, empty_folder):
     assert (end["exit_code"], end["folder"], end["error"]) == (ran.code, "two", None)
 
 
-@pytest.mark.parametrize("option", ["--quiet", "--json"])
+@pytest.mark.parametrize("option", few_of(["--json", "--quiet"], 1))
 def test_events_come_whatever_standard_output_has(run, empty_folder, option):
     plain_run = run("fit", CASE, *LOCAL, option)
     ran = run("fit", CASE, *LOCAL, option, "--progress", "json")
@@ -120,6 +122,7 @@ def test_numbers_that_are_not_finite_are_null(capsys):
         (("batch", CASE, CONFIGS / "ac1a_good.yaml", "--search", "local", "--workers", "0"), 2, 0),
         (("run", CASE, "--no-plots"), 1, 0),
         (("profile", CASE, "KC", "--no-plots"), 0, 0),
+        (("verify", RECORD, "--model", "AC1A", "--step", "0.05", "-o", "report.html"), 1, 0),
     ],
     ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
@@ -128,7 +131,7 @@ def test_every_command_announces_its_runs_and_its_end(run, empty_folder, command
     read, after = announced(ran.err)
     assert after == ""
     assert read[0]["command"] == command[0]
-    assert str(CASE) in read[0]["inputs"]
+    assert str(command[1]) in read[0]["inputs"]
     assert len(of(read, "done")) == runs
     assert read[-1]["exit_code"] == ran.code
     assert code in (None, ran.code)

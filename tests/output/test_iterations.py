@@ -65,7 +65,7 @@ def same(text, stored):
     [
         ("ac1a_typical", ("--strategy", "gn", "--search", "local")),
         ("ac1a_typical", ("--strategy", "lm-then-dgn", "--search", "local")),
-        ("thesis/ac1a_table_1", ()),
+        pytest.param("thesis/ac1a_table_1", (), marks=pytest.mark.long),
         pytest.param("ac1a_typical", ("--strategy", "gn"), marks=pytest.mark.long),
         pytest.param("ac1a_low", (), marks=pytest.mark.long),
     ],

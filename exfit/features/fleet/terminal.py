@@ -172,7 +172,7 @@ class BatchEvents(BatchObserver):
 
     def started(self, case: str) -> None:
         """Announce that a case begins."""
-        self.events(self.events.named(case))
+        self.events(case)
 
     def finished(self, summary: CaseSummary) -> None:
         """Announce how a case has ended."""
