@@ -29,6 +29,7 @@ VERDICTS = (
     ("no match", "the response matches worse than a constant would"),
     ("not converged", "the search ended after 200 iterations"),
 )
+CAUSE = "a limiter acted that the model lacks: name it under `limiters`"
 FAILURES = (
     ("failed", "plant.machine_parameters.Tpd0: 0 must be above 0"),
     ("timed out", "not finished after 300 s"),
@@ -109,10 +110,11 @@ def _row(k, rng):
     first = next(iter(values))
     if rng.random() < 0.02:
         values[first] = parameter(1.5 * values[first].value, 0.01 * values[first].value)
-    unresolved = ()
+    unresolved, cause = (), "" if holds else CAUSE
     if verdict.startswith("matches"):
         *_, last = values
         unresolved = (last,)
+        cause = f"{last} is not determined: fix it if it is known, or plan a test that shows it"
         values[last] = parameter(values[last].value)
     rmse = float(4e-4 * (1.0 if holds else rng.uniform(3.0, 20.0)))
     return row(
@@ -125,6 +127,7 @@ def _row(k, rng):
         rmse={"vt": rmse, "efd": 20.0 * rmse},
         validation=SummaryValidation("accepted" if holds else "not accepted", 1.2 * rmse),
         unresolved=unresolved,
+        cause=cause,
         parameters={**values, "machine.Xd": parameter(1.8, source="nameplate")},
         curves=(curve(rng, "vt", 0.0 if holds else 0.2), curve(rng, "efd", 0.0 if holds else 0.2)),
     )

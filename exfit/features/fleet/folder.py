@@ -45,7 +45,7 @@ INDEX = "index"
 SUMMARY, FAILED = "summary.json", "failed.json"
 OUTCOMES = (WHOLE_FIT, WHOLE_PROGRAMME, FAILED)
 FIT_OF_PROGRAMME = "fit"
-VERSION = 1  # of a summary; one of another version is made again
+VERSION = 2  # of a summary; one of another version is made again
 KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
 KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
 MOST_POINTS = 120  # of a curve in a summary
@@ -115,10 +115,11 @@ class CaseSummary:
 
     ``name`` is that of no other case of the batch, ``case`` the path of its file, relative to the
     folder of the batch where there is a way, and ``key`` the folder of its fit there, "" without
-    one. ``reason`` says why it is not done, or is the reason of the verdict. ``rmse`` (pu) is by
-    signal, the largest over the fitted records; ``parameters`` are all of the unit's, fitted or
-    not; ``unresolved`` names those fitted that the records do not determine. ``seconds`` is
-    processor time; ``about`` are the facts that the case of a fit states of its unit and test.
+    one. ``reason`` says why it is not done, or is the reason of the verdict, and ``cause`` is the
+    first cause of that with its remedy. ``rmse`` (pu) is by signal, the largest over the fitted
+    records; ``parameters`` are all of the unit's, fitted or not; ``unresolved`` names those fitted
+    that the records do not determine. ``seconds`` is processor time; ``about`` are the facts that
+    the case of a fit states of its unit and test.
     """
 
     name: str
@@ -141,6 +142,7 @@ class CaseSummary:
     seconds: float = 0.0
     notes: tuple[str, ...] = ()
     about: Facts = field(default_factory=dict)
+    cause: str = ""
 
     @property
     def outcome(self) -> str:
@@ -225,6 +227,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
         seconds=round(seconds, 3),
         notes=(*result.notes, *(note for match in result.comparisons for note in match.notes)),
         about=dict(result.about),
+        cause=next((cause.sentence for cause in result.verdict.causes), ""),
     )
 
 

@@ -1,4 +1,4 @@
-"""The page of a batch: one HTML file with all cases, their overlays, and sister units."""
+"""The page of a batch: one HTML file with all cases, their overlays, and similar units."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,6 +25,15 @@ MOST_PICTURES = 3  # of a case: more are in its report
 MOST_SISTERS = 40  # of a table; of more units only those that stand out are in it
 STATUSES = ("failed", "timed out", "crashed", "refused", "not run", "no record")
 VERDICTS: Sequence[str] = (*get_args(VerdictWords), NOT_ACCEPTED, "interrupted")
+REMEDIES: Mapping[str, str] = {  # of what gave no verdict, or none with a cause
+    "failed": "run `exfit check` with this case and correct what it names; then `--retry failed`",
+    "timed out": "give a longer `--time-limit` with `--retry failed`",
+    "crashed": "run `exfit fit` with this case alone; then `--retry failed`",
+    "refused": "correct what is named; `--trust` runs code that cases name",
+    "not run": "run the same command again: it continues the batch",
+    "no record": "add a record to the case",
+    "interrupted": "run `exfit fit` with this case again",
+}
 STYLES: Mapping[str, str] = {GOOD: "good", MATCHES: "fair", "no record": "none", "not run": "none"}
 
 
@@ -86,7 +95,7 @@ def _corners(points: Sequence[Point]) -> Iterator[Point]:
 
 
 def fleet_page(fleet: Fleet, groups: Sequence[SisterGroup]) -> str:
-    """Return the page of a batch, with its sister units, as HTML."""
+    """Write the page of a batch, with its similar units, as HTML."""
     cases, parameters = fleet.cases, [each for group in groups for each in group.parameters]
     among_sisters = {(v.case, each.name): v for each in parameters for v in each.values}
     outcomes = Counter(case.outcome for case in cases)
@@ -106,6 +115,12 @@ def fleet_page(fleet: Fleet, groups: Sequence[SisterGroup]) -> str:
             rank=_rank,
             styles=STYLES,
             link=partial(_link, fleet.folder),
+            remedies=REMEDIES,
+            folder=fleet.folder,
+            unreported=any(
+                case.status == "done" and not _link(fleet.folder, case).endswith(REPORT)
+                for case in cases
+            ),
             marks=_marks,
             interval=_interval,
             pictures=_pictures,

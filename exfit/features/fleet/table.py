@@ -54,18 +54,19 @@ def fleet_table(cases: Sequence[CaseSummary]) -> str:
     """Return cases as CSV, a line for each in the order of their names.
 
     Behind the columns that every table has stands the rmse of each signal, and the value and the
-    ends of the interval of each parameter that any case fitted. What a case does not have is blank.
+    ends of the interval of each parameter that any case fitted; the first cause of the verdict with
+    its remedy is last. What a case does not have is blank.
     """
     signals = [name for name in SIGNALS if any(name in case.rmse for case in cases)]
     parameters = sorted({name for case in cases for name in case.fitted})
     header = [*CASE_COLUMNS, *(f"rmse {signal}" for signal in signals)]
     header += [text_cell(name) + end for name in parameters for end in ("", " low", " high")]
-    rows = [header]
+    rows = [[*header, "cause"]]
     for case in _by_name(cases):
         cells = [*_case_cells(case), *(_cell(case.rmse.get(signal)) for signal in signals)]
         for name in parameters:
             cells += _interval(case.fitted.get(name))
-        rows.append(cells)
+        rows.append([*cells, _cell(case.cause)])
     return BYTE_ORDER_MARK + csv_text(rows)
 
 

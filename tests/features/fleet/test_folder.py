@@ -11,6 +11,7 @@ import exfit
 from exfit.errors import ExfitError
 from exfit.features.fleet.folder import (
     MOST_POINTS,
+    VERSION,
     CaseFacts,
     CaseOutcome,
     Failure,
@@ -85,7 +86,9 @@ def test_a_fleet_has_a_row_for_every_case_of_the_index(folder, result):
     assert read_fleet(folder).counts["done"] == 2
 
 
-@pytest.mark.parametrize("damage", [None, "", "{}", '{"version": 1}', "[1]"])
+@pytest.mark.parametrize(
+    "damage", [None, "", "{}", f'{{"version": {VERSION}}}', '{"version": 1}', "[1]"]
+)
 def test_a_summary_that_is_missing_or_damaged_is_made_again_from_the_result(folder, damage):
     before = plain(read_fleet(folder).cases[0], whole=True)
     file = folder / ("a" * 32) / "summary.json"
@@ -176,7 +179,7 @@ def test_a_summary_as_a_file_is_what_it_was(folder):
     content = json.loads((folder / ("a" * 32) / "summary.json").read_text())
     row = read_fleet(folder).cases[0]
     written = {**plain(row, whole=True), "name": content["name"], "case": content["case"]}
-    assert {"version": 1, **written} == content
+    assert {"version": VERSION, **written} == content
 
 
 def test_an_interval_that_was_not_looked_for_is_not_an_unresolved_parameter(result):

@@ -49,6 +49,31 @@ def test_every_case_is_a_row_with_its_outcome_in_words(batch, page):
         assert case.reason in text
 
 
+def test_every_case_has_its_first_cause_and_remedy_or_the_next_step(tmp_path):
+    cause = "KD is not determined: fix it, or plan a test (`exfit identify`)"
+    cases = (
+        row("vague", cause=cause),
+        row("good", "AC8B"),
+        row("late", "ST1A", status="timed out", key=""),
+        row("left", "ST4B", verdict="interrupted", holds=False),
+    )
+    (rows,) = Page(page_of(Fleet(tmp_path, cases))).tables.values()
+    place = rows[0].index("cause and remedy")
+    told = {line[0].split()[0]: " ".join(line[place].split()) for line in rows[1:]}
+    assert "KD is not determined: fix it, or plan a test (exfit identify)" in told["vague"]
+    assert told["good"] == "–"
+    assert "--time-limit" in told["late"]
+    assert "exfit fit" in told["left"]
+
+
+def test_a_page_says_how_a_missing_report_is_made(tmp_path):
+    case = row("u0")
+    assert "exfit report" in Page(page_of(Fleet(tmp_path, (case,)))).text
+    (tmp_path / case.key).mkdir()
+    (tmp_path / case.key / "report.html").write_text("")
+    assert "exfit report" not in Page(page_of(Fleet(tmp_path, (case,)))).text
+
+
 def test_ids_are_distinct_and_nothing_is_asked_of_a_network(page):
     assert len(page.ids) == len(set(page.ids))
     addresses = [attrs[key] for _, attrs in page.tags for key in ("href", "src") if key in attrs]

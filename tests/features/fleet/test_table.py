@@ -41,11 +41,13 @@ def test_a_case_is_a_line_with_its_figures():
         unresolved=("TA",),
         parameters={"KA": parameter(400.0, 10.0), "TA": parameter(0.02)},
         seconds=1.25,
+        cause="KA is not determined: fix it",
     )
     (line,) = read(fleet_table([case]))
     assert [*line][: len(FIRST)] == FIRST
     assert [*line][len(FIRST) :] == [
         "rmse vt", "rmse efd", "KA", "KA low", "KA high", "TA", "TA low", "TA high",
+        "cause",
     ]  # fmt: skip
     assert (line["bus"], line["id"], line["model"], line["machine"]) == (
         "101",
@@ -58,6 +60,7 @@ def test_a_case_is_a_line_with_its_figures():
     assert (line["KA"], line["KA low"], line["KA high"]) == ("400", "380.4", "419.6")
     assert (line["TA"], line["TA low"], line["unresolved"]) == ("0.02", "", "TA")
     assert line["seconds"] == "1.250"
+    assert line["cause"] == "KA is not determined: fix it"
 
 
 def test_the_order_of_the_work_makes_no_difference():
