@@ -148,7 +148,7 @@ class FittedPoints:
         """Remarks on the noise of the points and on the intervals, in words."""
         if not self.allowed_for:
             return self.confidence.sentences
-        errors = f"the intervals allow for the errors of {listed(self.allowed_for)} (given)"
+        errors = f"the intervals include the errors of {listed(self.allowed_for)} (given)"
         return (*self.confidence.sentences, errors)
 
 

@@ -63,7 +63,7 @@ def test_a_fit_finds_reactances_and_base_within_their_intervals():
 
 
 @pytest.mark.long
-def test_the_intervals_allow_for_the_errors_of_values_and_bases_that_were_given():
+def test_the_intervals_include_the_errors_of_values_and_bases_that_were_given():
     """By what fits with these values off give; 2 % for what curves over a standard error."""
     errors, wanted = {"S12": 0.02, "ifd.base": 5.0}, [free("Xd", 1.2, 0.4, 4.0)]
 
