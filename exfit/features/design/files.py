@@ -74,7 +74,7 @@ def sheet_lines(design: DesignedTest) -> Iterator[str]:
     for number, (signal, (low, high)) in enumerate(design.other_values.extremes.items()):
         if number == 0:
             spread = 100.0 * design.other_values.spread
-            yield f"off values  with each parameter {spread:g} % off, in turn:"
+            yield f"sensitivity with each parameter {spread:g} % off, in turn:"
         yield f"            {NAMES[signal]} {low:.4f} ... {high:.4f} pu"
     back = -level
     if abs(back) > 0.0:
