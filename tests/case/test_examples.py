@@ -9,11 +9,11 @@ from exfit.case.json_schema import json_schema
 from exfit.case.schema import Estimate, RecordFile, ReportRequest
 
 DOCS = CONFIGS.parent / "docs"
-OF_TABLE = re.compile(r"^\|.*$", re.MULTILINE)  # of all keys, made from the schema
+OF_SCHEMA = re.compile(r"<!-- keys -->.*?<!-- /keys -->", re.DOTALL)  # tables made of it
 OF_A_PAGE = re.compile(r"```yaml\n(.*?)```", re.DOTALL)
 EXAMPLES = "\n".join(
     [path.read_text("utf-8") for path in sorted(CONFIGS.rglob("*.yaml"))]
-    + [OF_TABLE.sub("", path.read_text("utf-8")) for path in sorted(DOCS.glob("*.md"))]
+    + [OF_SCHEMA.sub("", path.read_text("utf-8")) for path in sorted(DOCS.rglob("*.md"))]
 )
 
 
@@ -44,7 +44,7 @@ SECTIONS = {"record": RecordFile, "estimate": Estimate, "report": ReportRequest}
 
 
 def test_every_example_of_a_page_is_yaml_and_its_sections_are_sound():
-    for path in sorted(DOCS.glob("*.md")):
+    for path in sorted(DOCS.rglob("*.md")):
         for text in OF_A_PAGE.findall(path.read_text("utf-8")):
             content = yaml.safe_load(text)
             assert content, path
