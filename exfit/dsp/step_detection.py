@@ -159,7 +159,7 @@ def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
     distinct = tuple(_distinct(time, running_median(samples), steps))
     if not distinct:
         size = f"{abs(steps[0].size):.2g} at {steps[0].at:.4g} s"
-        raise ValueError(f"no step stands out: at rest it moves as much as by {size}")
+        raise ValueError(f"no step stands out: at rest the signal moves as much, by {size}")
     return distinct
 
 

@@ -79,7 +79,7 @@ def _brief(
         yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
     if folder is not None:
         shown = quote(folder.as_posix())
-        yield paragraph(f"{written_to(folder)}; all of it: `exfit show --all {shown}`")
+        yield paragraph(f"{written_to(folder)}; details: `exfit show --all {shown}`")
     yield verdict(result)
 
 

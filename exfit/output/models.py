@@ -87,7 +87,7 @@ def check(result: "Check") -> Iterator[Block]:
             row(name, *(f"{value:.0e}" for value in values), f"{min(values):.1e}")
             for name, values in result.deviations.items()
         )
-        title = "exact Jacobian against central differences, relative, by their step"
+        title = "relative difference of exact Jacobian and central differences, by step"
         yield Table(columns("parameter", *heads, numbers=heads), tuple(rows), title)
         agrees = "agree" if result.agrees else "DISAGREE"
         yield paragraph(f"derivatives {agrees}", "ok" if result.agrees else "bad")

@@ -102,7 +102,7 @@ def _real_array(source: Path, name: str, values: ArrayLike) -> Array:
     """Return a read-only copy (M,) of real numbers; raises RecordError for anything else."""
     given = np.asarray(values)
     if given.ndim != 1:
-        raise RecordError(f"{source}: {name}: {given.ndim} dimensions in place of 1")
+        raise RecordError(f"{source}: {name}: {given.ndim} dimensions instead of 1")
     if not np.can_cast(given.dtype, np.float64, "same_kind"):
-        raise RecordError(f"{source}: {name}: {given.dtype} in place of real numbers")
+        raise RecordError(f"{source}: {name}: {given.dtype} instead of real numbers")
     return read_only(np.array(given, np.float64))

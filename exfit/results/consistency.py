@@ -10,7 +10,7 @@ from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported, ValidationResult
 from exfit.util.arrays import Array
 
-UNEVEN = "not one sample for each instant"
+UNEVEN = "not one sample for each time"
 
 
 def contradictions(result: FitResult) -> Iterator[str]:

@@ -210,8 +210,8 @@ def _somewhere(content, draw):
 @pytest.mark.parametrize(
     ("place", "words"),
     [
-        (("records", 0, "time"), "records: fit: overlays: vt: not one sample for each instant"),
-        (("records", 0, "overlays", "vt", "start"), "not one sample for each instant"),
+        (("records", 0, "time"), "records: fit: overlays: vt: not one sample for each time"),
+        (("records", 0, "overlays", "vt", "start"), "not one sample for each time"),
         (("records", 0, "iteration_responses", "samples"), "iteration_responses: not one sample"),
         (("history", 1, "values"), "history: its parameters are not those of the fit"),
         (("knowledge", "sensitivity", 0, "time"), "sensitivity: vt: not one sample"),

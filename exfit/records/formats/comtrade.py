@@ -257,7 +257,7 @@ def _check_lines(files: _Files) -> None:
         raise files.fault(0, "station, device and revision are missing")
     cells = [cell.strip() for cell in lines[0].split(",")]
     if len(cells) not in (2, 3):
-        raise files.fault(0, f"{len(cells)} cells in place of station, device, revision")
+        raise files.fault(0, f"{len(cells)} cells instead of station, device, revision")
     if len(cells) == 3 and cells[2] not in (*REVISIONS, *BY_CELLS):
         supported = ", ".join(REVISIONS[1:])
         raise files.fault(0, f"revision {cells[2]!r} is not one of {supported}")

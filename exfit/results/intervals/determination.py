@@ -182,7 +182,7 @@ def without_limits_of_others(uncertainty: UncertaintyAnalysis) -> UncertaintyAna
     for name, partners in uncertainty.tied_to_bounds.items():
         if parameters[name].determined and parameters[name].method != "linear":
             continue  # a profile, in which the other may leave its bound, is closed
-        why = f"has no interval: the record ties it to {listed(partners)}, on a bound"
+        why = f"has no interval: it is known only together with {listed(partners)}, on a bound"
         parameters[name] = parameters[name]._replace(interval=None, why=why)
     for name, why in uncertainty.by_few_samples.items():
         parameters[name] = parameters[name]._replace(interval=None, why=why)

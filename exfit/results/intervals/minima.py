@@ -189,8 +189,8 @@ def valley_in_words(
     height = f"{'up to ' * (len(others) > 1)}{times(max(each.cost for each in others), cost)}"
     return (
         f"{count} in the same flat valley, {height} this cost, and the record rejects "
-        f"no point between them (chi-square up to {above:.2g}, limit {REFUTED}): along it "
-        f"{', '.join(moves)}"
+        f"no point between them (chi-square up to {above:.2g}, limit {REFUTED}): it "
+        f"extends over {', '.join(moves)}"
     )
 
 

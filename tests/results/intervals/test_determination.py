@@ -189,7 +189,7 @@ def test_a_parameter_tied_to_one_on_its_bound_is_named_with_it(unit2):
     tied = replace(linear, tied_to_bounds={"KPR": ("KD",)})
     parameters = without_limits_of_others(tied).confidence.parameters
     assert parameters["KPR"].interval is None
-    assert parameters["KPR"].why == "has no interval: the record ties it to KD, on a bound"
+    assert parameters["KPR"].why == "has no interval: it is known only together with KD, on a bound"
     assert parameters["KIR"] == linear.confidence.parameters["KIR"]
 
 
