@@ -261,7 +261,7 @@ def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
     )
     before = listing(workplace)
     is_refused(run("fit", case), ["case.yaml", "record", "missing"], before, workplace)
-    words = ["case.yaml", "no record to validate on"]
+    words = ["case.yaml", "validate: missing: all records of the case are fitted"]
     is_refused(run("validate", case, "--parameters", "values.yaml"), words, before, workplace)
     assert run("simulate", case, "--no-plots").code == 0
     assert run("check", case).code == 0
@@ -583,7 +583,7 @@ def test_the_step_of_a_record_by_hand_is_found_in_it_whatever_the_case_stepped(r
     stored = json.loads(Path("runs/case-validate/validation.json").read_text())
     assert restricted(stored, json.loads(ran.out)) == json.loads(ran.out)
     shown = run("validate", case_file(), *BY_HAND, other).out
-    assert f"step: vref {step['size']:+.4g} pu at {step['at']:.4g} s, instant and size" in shown
+    assert f"step: vref {step['size']:+.4g} pu at {step['at']:.4g} s, time and size" in shown
 
 
 def test_the_report_of_a_validation_has_the_record_by_hand_and_whose_values_they_are(run):
@@ -664,7 +664,7 @@ def test_nothing_to_validate_on_is_refused(run, workplace):
 
 def test_the_fitted_record_does_not_validate_its_fit_and_the_command_says_so(run):
     ran = run("validate", case_file(), *BY_HAND, "up.csv")
-    assert "up.csv is a file that was fitted (fit)" in " ".join(ran.out.split())
+    assert "up.csv was fitted (fit)" in " ".join(ran.out.split())
 
 
 def test_a_record_that_is_called_fit_is_not_taken_for_the_fitted_one(run):

@@ -424,7 +424,7 @@ UNUSABLE_ARRAYS = {
     "complex": ([0.0, 1.0], [1.0, 1j], "vt: complex128 instead of real"),
     "text": ([0.0, 1.0], ["1", "2"], "vt: <U1 instead of real"),
     "nothing": ([0.0, 1.0], [1.0, None], "vt: object instead of real"),
-    "timestamps": (np.array([0, 1], "datetime64[s]"), [1.0, 2.0], "time: datetime64[s] in place"),
+    "timestamps": (np.array([0, 1], "datetime64[s]"), [1.0, 2.0], "time: datetime64[s] instead"),
     "nan": ([0.0, 1.0], [1.0, np.nan], "sample 1: vt: nan is not a finite"),
     "inf": ([0.0, 1.0], [np.inf, 1.0], "sample 0: vt: inf is not a finite"),
     "nan in time": ([0.0, np.nan], [1.0, 1.0], "sample 1: time: nan is not a finite"),
