@@ -15,12 +15,13 @@ from exfit.util.vocabulary import HISTORY_PHASES
 COST = "cost f"
 GRADIENT = "gradient norm"
 DAMPING = "damping"
-DAMPINGS = "damping: ν of lm, step length λ of gn and dgn"
+DAMPINGS = "damping (ν of lm, λ of gn, dgn)"
 REJECTING = ("lm", "gn")  # phases whose `inner` counts trials that were rejected, not halvings
 LEGEND = (
-    f"Iteration 0 is the start. {DAMPINGS.capitalize()}. Armijo halvings: how often a step of dgn "
-    "was shortened until Armijo's rule held. Rejected trials: of lm, and of a first step of gn. "
-    "Capped: the step that was tried first was held back. `history.csv` has the parameters as well."
+    "Iteration 0 is the start. Damping: ν of lm, step length λ of gn and dgn. Armijo halvings: how "
+    "often a step of dgn was shortened until Armijo's rule held. Rejected trials: of lm, and of a "
+    "first step of gn. Capped: whether the first trial was shorter than the full Gauss-Newton "
+    "step. `history.csv` has the parameters as well."
 )
 
 Value = float | str | None

@@ -107,15 +107,16 @@ def _facts(result: FitResult) -> Iterator[tuple[str, str]]:
 def _history(result: FitResult) -> Table:
     """Make the table of the iterations; on paper many parameters are left to its file."""
     names = [*result.parameters]
+    columns = [each for each in COLUMNS if each.expendable != 1]
     heads = (
         TableColumn(each.title, each.number, "pu²" if each.title == COST else "")
-        for each in COLUMNS
+        for each in columns
     )
     aside = 1 if len(names) > MOST_PRINTED else 0
     values = (TableColumn(name, number=True, expendable=aside) for name in names)
     rows = (
         row(
-            *(each.text(line, DASH) for each in COLUMNS),
+            *(each.text(line, DASH) for each in columns),
             *(number(line.values[name]) for name in names),
         )
         for line in result.history

@@ -64,7 +64,7 @@ def convergence(result: FitResult) -> Figure:
     rows = (
         ("cost", f"{COST} (pu²)", "o"),
         ("gradient_norm", GRADIENT, "o"),
-        ("damping", DAMPINGS.replace(": ", ":\n"), "s"),
+        ("damping", DAMPINGS.replace(" (", "\n("), "s"),
     )
     for ax, (name, label, marker) in zip(axes, rows, strict=True):
         values = [float(getattr(line, name)) for line in result.history]
