@@ -286,6 +286,7 @@ def refuse_missing(given: "Given", read: "Inspections", source: Path | None) -> 
 
 def finish(given: "Given", read: "Inspections", made: "NewCase", output: Path) -> None:
     """Say what was written and what comes next; draw the record, as inspect does."""
+    from exfit.case.load import load_case
     from exfit.features.start.making import typical_left
     from exfit.features.start.questions import say
     from exfit.output import run_folder
@@ -302,4 +303,5 @@ def finish(given: "Given", read: "Inspections", made: "NewCase", output: Path) -
         folder = show.folder(f"{inspection.path.name}-inspect", run_folder.OF_INSPECTION)
         show.draw(run_folder.write_inspection(inspection, folder))
         echo(f"look at {folder / 'inspect.png'}: is each step in its place?")
+    load_case(output)  # refuses what no single question could show
     echo(f"next: exfit fit {output}")

@@ -51,6 +51,20 @@ USUAL_KV = (
 )  # fmt: skip
 LARGE_SIZE = 0.0075  # pu: a step that is at least so large is rounded to the first of these
 ROUNDED_TO = (0.005, 0.001)  # pu
+IN_WORDS = {
+    "f0": "Rated frequency, Hz",
+    "X": "Reactance from the terminals to the source, pu of the machine",
+    "P": "Active power before the step, pu of the rated MVA",
+    "Q": "Reactive power before the step, pu of the rated MVA",
+    "connection": "Connection of the recorded voltages: phase-to-ground or phase-to-phase",
+    "angle_unit": "Unit of the recorded angle: deg or rad",
+}
+WHERE = {
+    "f0": "Nameplate of the generator.",
+    "X": "Data sheet of the step-up transformer, and the short-circuit power of the grid.",
+    "connection": "Wiring of the recorder; a factor of sqrt(3).",
+}
+CHOICES = {"connection": ("phase-to-ground", "phase-to-phase"), "angle_unit": ("deg", "rad")}
 FACTS = ("Plant", "Unit", "Tested by")
 
 
@@ -131,7 +145,7 @@ def _summary(record: Inspection) -> None:
         f"{sampling.end:.6g} s",
         in_words(sampling),
         ", ".join([*names, *([f"{others} other channels"] if others else [])]),
-        f"tests: {', '.join(tests)}" if tests else "a grid event" * record.is_event or "no step",
+        "a grid event" if record.is_event else f"tests: {', '.join(tests) or 'no step found'}",
     ]
     if record.findings:
         lines.append(f"{len(record.findings)} notes, which stand in the case")
@@ -266,7 +280,7 @@ def _sizes(talk: Conversation) -> float | dict[str, float]:
             return ""
 
         moves = "" if change is None else f"; the voltage changes by {100.0 * change:+.3g} %"
-        which = f"of all {len(found)} steps" if alike and len(found) > 1 else f"of the step {name}"
+        which = f"of the {len(found)} steps" if alike and len(found) > 1 else f"of the step {name}"
         sizes[key] = ask(
             f"Size {'of the step' if len(found) == 1 else which}, pu",
             read,
@@ -289,19 +303,21 @@ def _rounded(change: float) -> float:
 
 def _other(talk: Conversation, value: OpenValue) -> float | str:
     """Ask for any other open value, by its place in the case."""
-    place = dotted(value.place)
-    is_text = value.place[-1] in ("column", "unit", "angle_unit", "connection", "angle")
+    place, key = dotted(value.place), str(value.place[-1])
 
     def read(text: str) -> float | str:
         if not text:
-            raise ExfitError("The case cannot do without it")
-        answer = text if is_text else number(text)
+            raise ExfitError("An answer is needed: the case cannot do without it")
+        answer: float | str = text
+        if key in CHOICES:
+            answer = one_of(CHOICES[key])(text)
+        elif key not in ("column", "unit"):
+            answer = number(text)
         talk.case(open={**talk.given.get("open", {}), place: answer})
         return answer
 
-    return ask(
-        place, read, f"{value.hint}." if value.hint else "", more=f"A key of the case: {place}"
-    )
+    more = f"The key of the case is {place}; docs/case_file.md describes it."
+    return ask(IN_WORDS.get(key, place), read, WHERE.get(key, value.hint), more=more)
 
 
 # ---- the end
@@ -322,7 +338,7 @@ def _validation(talk: Conversation) -> None:
     talk.given["validate"] = ask(
         "Further record of this unit, to check the result on",
         read,
-        "As a step the other way. It is not fitted: it shows whether the result holds.",
+        "Another test, as a step the other way. It is not fitted: it shows if the result holds.",
         NO[0],
         "A path. Its steps are looked for, with the size that you gave.",
     )
