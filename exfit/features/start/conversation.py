@@ -20,7 +20,6 @@ from exfit.features.start.questions import (
     MOST_LISTED,
     NO,
     Conversation,
-    answered,
     ask,
     list_rows,
     number,
@@ -196,16 +195,12 @@ def _fill_in(talk: Conversation, of_unit: bool) -> None:
             talk.given["kv"] = _kv(talk)
         elif key == "mva":
             talk.given["mva"] = ask(
-                "Rated power of the unit, MVA", number, "Nameplate of the generator.", doubt=_usual
+                "Rated power of the unit, MVA", talk.number_of("mva"), "Nameplate of the generator."
             )
         elif key == "step":
             talk.given["step"] = _sizes(talk)
         else:
             talk.given.setdefault("open", {})[dotted(value.place)] = _other(talk, value)
-
-
-def _usual(value: float) -> str:
-    return "" if 0.1 <= value <= 3000.0 else f"{value:g} MVA is no usual rating"
 
 
 def _kv(talk: Conversation) -> float:
@@ -214,11 +209,6 @@ def _kv(talk: Conversation) -> float:
     level = _level_kv(record)
     nearest = min(USUAL_KV, key=lambda kv: abs(kv - level)) if level else None
 
-    def read(text: str) -> float:
-        value = number(text)
-        talk.case(kv=value)
-        return value
-
     def doubt(value: float) -> str:
         doubts = doubtful_bases(talk.case(kv=value).tests)
         return f"The voltage rests at {level:.5g} kV, far from {value:g} kV" if doubts else ""
@@ -226,7 +216,7 @@ def _kv(talk: Conversation) -> float:
     rests = f"; it rests at {level:.5g} kV in the record" if level else ""
     return ask(
         "Rated voltage of the generator, line to line, kV",
-        read,
+        talk.number_of("kv"),
         f"Nameplate of the generator{rests}.",
         f"{nearest:g}" if nearest else "",
         "The voltage that 1 pu is. If the recorder shows the secondary side of a voltage "
@@ -350,13 +340,9 @@ def _facts(given: Given) -> None:
     echo("", err=True)
     say("For the report; Enter skips.", faint=True)
     for name in [name for name, fact in facts.items() if fact == QUESTION]:
-        facts[name] = answered(f"  {name}", _fact, "", "The report shows it on its first page.")
+        facts[name] = ask(f"  {name}", lambda text: text or None, more="Any text.")
     for name in [name for name, fact in facts.items() if fact is None]:
         del facts[name]
-
-
-def _fact(text: str) -> str | None:
-    return text or None
 
 
 def _name(given: Given) -> str:
@@ -370,5 +356,5 @@ def _name(given: Given) -> str:
         return str(path)
 
     stem = Path(str(given.get("record") or "case")).stem
-    more = "The case holds all of it, with comments: it can be edited."
-    return ask("File for the case", read, proposal=f"{stem}.yaml", more=more)
+    where = "It holds all of this, with comments, and can be edited."
+    return ask("File for the case", read, where, f"{stem}.yaml")

@@ -31,6 +31,15 @@ class Conversation(NamedTuple):
         """Make the case that it is with further answers; raises ExfitError."""
         return new_case(self.answers(**others), Path(), self.read)
 
+    def number_of(self, key: str) -> Callable[[str], float]:
+        """Return what reads the number of an answer, which the case must be able to take."""
+
+        def read(text: str) -> float:
+            self.case(**{key: number(text)})
+            return number(text)
+
+        return read
+
     def answers(self, **others: Any) -> Answers:
         """Return the answers so far with others."""
         return checked({**self.given, **others})
@@ -60,27 +69,16 @@ def ask(
     ``where`` says where the answer is found, ``doubt`` why it may be wrong: it is taken when it is
     given once more. Raises click.Abort at Ctrl-C and Ctrl-D.
     """
-    echo("", err=True)
     if where:
+        echo("", err=True)
         say(where, faint=True)
-    return answered(text, read, proposal, more or where, doubt)
-
-
-def answered(
-    text: str,
-    read: Callable[[str], Answer],
-    proposal: str,
-    more: str,
-    doubt: Callable[[Answer], str] = lambda _: "",
-) -> Answer:
-    """Ask as ``ask`` does, in one line, without where the answer is found."""
     doubted = None
     while True:
         answer: str = click.prompt(
             printable(text), default=proposal, show_default=bool(proposal), err=True
         ).strip()
         if answer == QUESTION:
-            say(more)
+            say(more or where)
             continue
         try:
             value = read(answer)

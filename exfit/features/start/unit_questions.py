@@ -15,7 +15,6 @@ from exfit.features.start.questions import (
     MOST_LISTED,
     NO,
     Conversation,
-    answered,
     ask,
     list_rows,
     number,
@@ -210,7 +209,7 @@ def _value(row: Parameter, before: float, typed: float | None) -> float | None:
     printed = row.symbol.replace("pp", "''").replace("p", "'")  # as data sheets have it
     text = f"  {printed:6} {row.meaning}, {row.unit} [{kept:g}]"
     more = f"{row.symbol}: {row.meaning}, from {row.physical_range}; typical {row.typical:g}."
-    return answered(text, read, "", more, doubt)
+    return ask(text, read, more=more, doubt=doubt)
 
 
 def _further_values(talk: Conversation, rows: Mapping[str, Parameter]) -> dict[str, float]:
@@ -228,6 +227,5 @@ def _further_values(talk: Conversation, rows: Mapping[str, Parameter]) -> dict[s
 
     part = talk.case().unit.exciter
     listing = ", ".join(f"{symbol}={part.values[symbol]:g}" for symbol in rows)
-    return answered(
-        "  Other values, as KE=1.0 TR=0.02 (Enter: none)", read, "", f"So far: {listing}."
-    )
+    text = "  Other values, as KE=1.0 TR=0.02 (Enter: none)"
+    return ask(text, read, more=f"So far: {listing}.")

@@ -42,7 +42,7 @@ CONVERSATION = (
     ("9.csv", "cannot be read"), ("2", ""),  # the record
     ("1.75", "The voltage rests at 15.706 kV, far from 1.75 kV"), ("kV", "'kV' is not a number"),
     ("15.75", ""),
-    ("5", "no regulator is tested so"), ("0.02", "changes by +5 % there"), ("0.05", ""),
+    ("5", "5 % is 0.05 pu"), ("0.02", "changes by +5 % there"), ("0.05", ""),
     ("unit.dry", "cannot be read"), ("", ""),  # no planner's file
     ("4", "4 is not in the catalogue"), ("2", ""), ("AC1B", "did you mean AC1A"), ("AC1A", ""),
     ("square", "square is not a machine model"), ("", ""),
