@@ -189,7 +189,7 @@ def test_python_inspects_a_record_and_makes_a_case(empty_folder):
     assert yaml.safe_load(planned)["as_found"]["bus"] == 101
     with pytest.raises(ExfitError, match="model: missing"):
         exfit.new(SAMPLES / "field_record.csv")
-    with pytest.raises(ExfitError, match="5 % is 0.05 pu"):
+    with pytest.raises(ExfitError, match=r"5 % is 0\.05 pu"):
         exfit.new(SAMPLES / "field_record.csv", "AC1A", step=5)
 
 
