@@ -49,7 +49,7 @@ def test_the_report_shows_the_values_beside_the_case_that_does_not_have_them(run
     run("fit", "case.yaml", "--set", "k=6", "-o", "out", "--no-plots", "-q")
     page = html(load_result("out"), workplace / "out")
     assert "--set k=6.0" in page
-    assert "Values that the fit had in place of those of the case file" in page
+    assert "Values used in place of those in the case file" in page
     run("fit", "case.yaml", "-o", "plain", "--no-plots", "-q")
     assert "in place of those" not in html(load_result("plain"), workplace / "plain")
 

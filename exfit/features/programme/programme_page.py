@@ -130,7 +130,7 @@ def _v_curve_chart(result: VCurve, reading: FieldReading, key: str) -> Chart:
         f"{key}-{reading.signal}",
         f"V-curves: {reading.signal}",
         f"{reading.signal} over reactive power: the points, and the machine's model as lines; "
-        f"below, simulated less measured, {reading.rms:.2e} pu rms.",
+        f"below, simulated minus measured, {reading.rms:.2e} pu rms.",
         "q (pu)",
         (
             Panel(f"{reading.signal} (pu)", (*curves, *dots), TALL),

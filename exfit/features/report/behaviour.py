@@ -57,13 +57,13 @@ def usability(result: Reported) -> tuple[UsabilityCheck, ...]:
     runs = behaviour.flat_runs
     tests = f"{len(runs)} test{'' if len(runs) == 1 else 's'}"
     without = [run.test for run in runs if not isfinite(run.drift)]
-    rest = f"a state of rest is found in {len(runs) - len(without)} of {tests}"
+    rest = f"a steady state exists in {len(runs) - len(without)} of {tests}"
     rest += f"; not in {', '.join(without)}" if without else ""
     moving = [run.test for run in runs if not run.rests]
     drift = max((run.drift for run in runs if isfinite(run.drift)), default=None)
     most = "not known" if drift is None else f"{drift:.2g} pu"
     flat = f"without a step the signals drift by at most {most} in 60 s, in {tests}"
-    flat += f"; no rest in {', '.join(moving)}" if moving else ": the start is a state of rest"
+    flat += f"; no steady state in {', '.join(moving)}" if moving else ": the start is steady"
     return (
         UsabilityCheck("Initialises without error", not without, rest),
         UsabilityCheck("No-disturbance run (flat run)", not moving, flat),
@@ -113,7 +113,7 @@ def usability_table(result: Reported) -> Iterator[Block]:
     yield Table(columns("check", "passed", "result"), rows, title)
     if not has_no_equations(result):
         by = "exfit" if result.other_program is None else "the twin in exfit"
-        again = " The planner's program is to repeat it with the records that follow."
+        again = " Repeat it in the planner's program with the PSS/E dynamics records."
         only = again if isinstance(result, FitResult) else ""
         yield Note(f"By the simulation of {by}, with {values_of(result)}.{only}")
 
@@ -185,7 +185,7 @@ def _poles(view: SmallSignal, title: str) -> Table:
         )
         for pole in view.poles
     )
-    heads = (*columns(*numbers, numbers=numbers), TableColumn("states that take part", folds=True))
+    heads = (*columns(*numbers, numbers=numbers), TableColumn("participating states", folds=True))
     return Table(heads, tuple(rows), title, leading=0)
 
 
@@ -238,8 +238,10 @@ def limits(result: Reported) -> Iterator[Block]:
     if rows:
         numbers = ("value (pu)", "first at (s)", "for (s)", "share of the test")
         heads = columns("test", "limit", "signal", *numbers, numbers=numbers)
-        yield Table(heads, tuple(rows), f"Limits that the response {fitted}was on")
+        yield Table(heads, tuple(rows), f"Limits that the response {fitted}reached")
     free = [run.test for run in result.behaviour.limits if not run.hits]
     if free:
         records = "its record shows" if len(free) == 1 else "their records show"
-        yield Note(f"No limit was hit on {', '.join(free)}: {records} nothing of the limits.")
+        yield Note(
+            f"No limit was reached in {', '.join(free)}: {records} nothing about the limits."
+        )

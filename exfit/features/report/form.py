@@ -9,7 +9,7 @@ from exfit import __version__
 from exfit.features.programme.folder import KEY
 from exfit.features.programme.result import ProgrammeResult
 from exfit.features.report.behaviour import UsabilityCheck, no_usability, usability
-from exfit.features.report.words import DASH, number
+from exfit.features.report.words import DASH, INTERRUPTED, number
 from exfit.models.families import family_of
 from exfit.output.blocks import (
     Block,
@@ -45,8 +45,7 @@ REPORT = (facts.WRITTEN, facts.CHECKED, facts.APPROVED, facts.REVISION, facts.RE
 NOT_IN_MODEL = f"{NOT_STATED}; none in the model"
 NO_TEST = "no bump test in this programme"
 CONSTANT_POWER = "none in the model: the mechanical power is constant"
-INTERRUPTED = "The result does not hold this: the fit was interrupted."
-SILENT = "The case does not say which unit this is: its section `about` is empty."
+SILENT = "The case does not say which unit this is: state it under `about`."
 WHERE_STATED = (
     "A case states facts of the unit, the test and the report under `about`, by the names of their "
     "rows, and the sources of values under `sources`."
@@ -303,7 +302,7 @@ def unit_without_bumps(result: ProgrammeResult) -> Iterator[Block]:
     """Yield the unit and tests of a programme whose bump tests gave no fit."""
     fits = (test.result for test in result.tests if isinstance(test.result, FitResult))
     tests = tuple(test for fit in fits for test in fit.tests)
-    return _unit(result.about, tests, "No test with a record in time was fitted.")
+    return _unit(result.about, tests, "No test with a recorded response was fitted.")
 
 
 def _unit(about: facts.Facts, tests: Sequence[RecordedTest], missing: str) -> Iterator[Block]:
@@ -373,12 +372,12 @@ def reproduction(result: Reported, folder: Path) -> Iterator[Block]:
         yield Table(
             columns("parameter", *numbers, "role", "given by", numbers=numbers),
             tuple(given),
-            "Values that the fit had in place of those of the case file",
+            "Values used in place of those in the case file",
         )
     if result.case_text:
         yield Verbatim(result.case_text, "The case file")
     else:
-        yield Note("The result does not hold the text of a case.", mark="faint")
+        yield Note("The result does not contain the case file.", mark="faint")
 
 
 def signatures(result: Reported | ProgrammeResult) -> Iterator[Block]:

@@ -8,7 +8,7 @@ import numpy as np
 from exfit.dsp.features import LABELS
 from exfit.dsp.sampling import envelope, kept_rows
 from exfit.features.report.charts import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
-from exfit.features.report.words import DASH, number
+from exfit.features.report.words import DASH, INTERRUPTED, number
 from exfit.output.blocks import (
     Block,
     Cell,
@@ -40,8 +40,7 @@ MOST_POINTS = 40_000  # drawn in all overlays: 400 KB
 MOST_SENT = 16_000  # samples for the interactive overlays: 600 KB
 DIGITS = 7  # of a sample: beyond what a recorder resolves
 DIFFERENCE = "simulated - measured (1e-3 pu)"
-INTERRUPTED = "The result does not hold this: the fit was interrupted."
-NO_SAMPLES = "No overlay: the result holds no samples."
+NO_SAMPLES = "No figure: the result contains no samples."
 NO_STEP = "No step features: the record shows no step of the reference in vt."
 NOTHING_ALIKE = (
     "No test has the same name in both, or the samples are missing: no responses are shown."
@@ -56,7 +55,7 @@ def fitted_matches(result: Reported, key: str = "") -> Iterator[Block]:
 def validation_matches(result: Reported) -> Iterator[Block]:
     """Yield the records that were not fitted, beside their simulations."""
     if not result.validation:
-        yield Note("There is none: the case keeps no record for a validation.", mark="faint")
+        yield Note("The case has no record for a validation.", mark="faint")
     yield from _matches(result, len(result.comparisons), result.validation, "")
 
 
@@ -126,7 +125,7 @@ def _departures(match: Comparison) -> Iterator[Block]:
     yield Table(
         columns("signal", "use", *numbers, "unit", numbers=numbers),
         tuple(rows),
-        f"Simulated less recorded, and the largest departures of both from rest: {match.name}",
+        f"Simulated minus recorded, and the largest departures of both from rest: {match.name}",
     )
     yield Note(
         f"The record is at rest until {number(match.played.begins, 4)} s; recorded and simulated: "

@@ -109,7 +109,7 @@ def other_program(result: Reported) -> Iterator[str]:
         if label.startswith("program")
     ]
     yield (
-        f"The simulated responses are runs of the planner's own simulator, `{program.command}`, "
+        f"The simulated responses are runs of the planner's simulator, `{program.command}`, "
         f"not of exfit: {program.runs} runs{failed}.{''.join(files)}"
     )
     fitted = isinstance(result, FitResult)
@@ -263,7 +263,7 @@ def criteria(result: Reported) -> Iterator[Block]:
         titles = ("record", "used", "criterion", "difference", "limit", "unit", "result")
         heads = columns(*titles, numbers=("difference", "limit"))
         yield Table(heads, tuple(rows), "Criteria: simulated minus recorded")
-    own = "The case gives limits of its own. " if result.criteria != Criteria() else ""
+    own = "The case sets limits. " if result.criteria != Criteria() else ""
     yield Note(f"{own}{ORIGIN_OF_CRITERIA}.")
 
 

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parent / "templates"
 CHART_STYLE = TEMPLATES / "chart.css"
-FORM = "The form of a verification report"
+FORM = "Verification form"
 CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of caption counts
 CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
 SECTION_LINK = re.compile(r'<a href="#([\w-]+)"></a>')  # to be numbered
@@ -54,7 +54,7 @@ HEAD = 2000  # characters at the beginning of a page, among which it says what m
 
 @dataclass(frozen=True)
 class Headline:
-    """What the fit comes to: a word, a sentence, whether it is good, and the causes.
+    """The outcome in brief: a word, a sentence, whether it is good, and the causes.
 
     ``good`` is None where it is neither good nor bad. ``criteria`` says whether the responses meet
     the limits of the report, ``passed`` as `CriteriaVerdict` has it.
@@ -78,7 +78,7 @@ class ReportSection(NamedTuple):
 
 @dataclass(frozen=True)
 class Page:
-    """What a page shows: its title, what it comes to, its sections."""
+    """The content of a page: its title, its headline, its sections."""
 
     title: str
     headline: Headline
@@ -147,7 +147,7 @@ def summary(result: Reported) -> Iterator[Block]:
         yield replace(fitted_table(result, of_records=False), title=title, style="brief")
     yield from map(in_a_line, result.validation)
     if not result.validation:
-        yield Note("No record was kept for a validation.", mark="faint")
+        yield Note("The case has no record for a validation.", mark="faint")
 
 
 def headline(result: Reported) -> Headline:
@@ -192,7 +192,7 @@ def _rmse(matches: Iterable[Comparison]) -> str:
 def _validated(result: Reported) -> Iterator[str]:
     """Yield the limits that accepted validations keep."""
     if not result.validation:
-        yield "no record was kept for a validation"
+        yield "the case has no record for a validation"
     elif result.accepted:
         limits = [
             f"{match.limit:.2e} pu ({match.name})"

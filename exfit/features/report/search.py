@@ -49,11 +49,11 @@ MOST_PRINTED = 8  # columns of parameters beside which a history is read on pape
 PERCENT = 1e-2
 UNKNOWN = "Not known: the search did not end at a minimum with finite derivatives."
 TOGETHER = (
-    "Near 1 or -1 two parameters can move together: the records determine each alone less well."
+    "Near 1 or -1 the records determine a combination of two parameters better than each alone."
 )
 OF_MINIMA = (
     "Chi-square: how far a minimum lies above the lowest one, in variances of the residuals. "
-    "Beyond 3.84 the record refutes it (likelihood ratio, 95 %)."
+    "Above 3.84 the records reject it (likelihood ratio, 95 %)."
 )
 
 
@@ -89,7 +89,7 @@ def _facts(result: FitResult) -> Iterator[tuple[str, str]]:
         return f"{cost:.4e} pu²" if isfinite(cost) else "none"
 
     yield "strategy", result.strategy
-    yield "ended because", result.message
+    yield "stopped because", result.message
     yield "cost at the start", square(result.start_cost)
     yield "cost at the end", square(result.cost)
     yield "iterations", show(result.nit)
@@ -135,15 +135,15 @@ def _minima(search: Minima, names: Sequence[str]) -> Table:
     several = sum(minimum.valley == 0 for minimum in search.minima) > 1
     rows = []
     for minimum in search.minima:
-        by_record = {None: "", True: "refuted", False: "not refuted"}[minimum.refuted]
+        by_record = {None: "", True: "rejected", False: "not rejected"}[minimum.refuted]
         if minimum.valley == 0 and several:
             by_record += ", in the valley of the result"
         above = "" if minimum.chi_square is None else number(minimum.chi_square, 3)
         values = (number(minimum.values[name], 4) for name in names)
         rows.append(row(number(minimum.cost), str(minimum.starts), above, by_record, *values))
-    numbers = ("cost (pu²)", "descents", "chi-square")
+    numbers = ("cost (pu²)", "runs", "chi-square")
     heads = columns(*numbers, "by the record", *names, numbers=(*numbers, *names))
-    title = "Distinct minima that the descents led to, the lowest first"
+    title = "Distinct minima that the runs converged to, lowest first"
     return Table(heads, tuple(rows), title, leading=0, style="minima")
 
 
@@ -192,9 +192,9 @@ def waterfall(search: Minima, cost: float) -> Chart:
     )
     return Chart(
         key="waterfall",
-        title="Where the descents of the search ended, in the order of their costs",
+        title="Costs where the runs of the search ended, in rising order",
         text=search.summary(cost),
-        x_title="descent, by the cost that it led to",
+        x_title="run, in the order of the costs reached",
         panels=(Panel("cost f (pu²)", series, HALF, logarithmic=True),),
         whole=True,
     )
@@ -249,7 +249,7 @@ def identifiability(result: FitResult) -> Iterator[Block]:
         yield Note(UNKNOWN, mark="faint")
         return
     if known.sentences:
-        yield Note("The records do not determine everything", see="findings")
+        yield Note("The records do not determine every parameter", see="findings")
     elif by_weight(result.typical_values):
         text = "The records determine every parameter, and every combination of them"
         yield Note(f"{text}, as far as the typical values that matter hold", see="parameters")
@@ -265,7 +265,7 @@ def identifiability(result: FitResult) -> Iterator[Block]:
             )
             for each in known.effects
         )
-        title = "Change for 1 % of each parameter, the strongest first"
+        title = "Change for 1 % of each parameter, strongest first"
         yield Table(columns("parameter", *numbers, numbers=numbers), tuple(rows), title)
     labels = {effect.parameter: effect.label for effect in known.effects}
     for k, channel in enumerate(known.sensitivity):

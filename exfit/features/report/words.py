@@ -6,6 +6,7 @@ from exfit.results.model import FitResult
 from exfit.results.validation_result import Reported
 
 DASH = "–"
+INTERRUPTED = "Not in the result: the fit was interrupted."
 NO_TWIN = "not stated: it needs the equations of a twin, and the case has none"
 
 
@@ -28,4 +29,4 @@ def no_behaviour(result: Reported) -> str:
     """Explain why nothing shows how the model behaves."""
     if has_no_equations(result):
         return f"{NO_TWIN}.".capitalize()
-    return "The result does not hold this: the fit was interrupted."
+    return INTERRUPTED

@@ -68,7 +68,7 @@ def test_p_and_q_are_judged_and_shown_below_what_was_played_in(page):
     labels = [row[2] for row in page.tables["Criteria: simulated minus recorded"][1:]]
     assert labels == ["rms of the difference, p", "rms of the difference, q"] * 2
     for name in ("fit", "night"):
-        title = f"Simulated less recorded, and the largest departures of both from rest: {name}"
+        title = f"Simulated minus recorded, and the largest departures of both from rest: {name}"
         assert [row[0] for row in page.tables[title][1:]] == ["vt", "frequency", "p", "q"]
     assert {"played-0", "played-1"} <= set(page.ids)
     assert "in p, in q by the same rule" in page.text

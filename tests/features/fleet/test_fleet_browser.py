@@ -70,7 +70,9 @@ def test_the_page_opens_from_disk_without_a_fault_or_a_question_to_the_network(
     )
     assert wide <= room
     assert names(page) == [case.name for case in batch.cases[:AT_ONCE]]
-    assert barriers(page) == ""
+    for colours in ("light", "dark"):
+        page.emulate_media(color_scheme=colours)
+        assert barriers(page) == ""
 
 
 def test_a_column_sorts_by_its_numbers_from_the_keyboard(opened, batch):

@@ -349,7 +349,7 @@ def test_the_dynamics_record_is_at_the_place_where_the_unit_was_found(fits, page
 
 def test_a_playback_shows_what_was_played_in_and_no_features_of_a_step(pages):
     page = pages("playback")
-    title = "Simulated less recorded, and the largest departures of both from rest: fit"
+    title = "Simulated minus recorded, and the largest departures of both from rest: fit"
     heads, *rows = page.tables[title]
     assert [row[:2] for row in rows] == [
         ["vt", "played in"], ["ifd", "played in"], ["efd", "compared"]
