@@ -1,8 +1,11 @@
 """What `--progress json` announces: the table of docs/commands.md, in strict JSON, to the end."""
 
 import json
+import os
 import re
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,6 +25,24 @@ def documented():
     section = (ROOT / "docs" / "commands.md").read_text().partition("## Progress for programs")[2]
     rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", section.partition("\n## ")[0], re.MULTILINE)
     return {name: ALWAYS | {*re.findall(r"`(\w+)`", text)} for name, text in rows}
+
+
+@pytest.mark.long
+def test_the_example_of_the_page_prints_each_iteration(empty_folder):
+    page = (ROOT / "docs" / "commands.md").read_text().partition("## Progress for programs")[2]
+    example = re.search(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)[1]
+    Path("configs").symlink_to(CONFIGS)
+    places = [str(Path(sys.executable).parent), os.environ["PATH"]]
+    ran = subprocess.run(
+        [sys.executable, "-c", example],
+        env={**os.environ, "PATH": os.pathsep.join(places)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    history = json.loads(Path("runs/ac1a_typical-fit/result.json").read_text())["history"]
+    printed = [line for line in ran.stdout.splitlines() if re.match(r"\d+ \d", line)]
+    assert printed == [f"{line['number']} {line['cost']}" for line in history]
 
 
 def refused(constant):
