@@ -37,7 +37,7 @@ TYPES = {
     "string": "text",
     "boolean": "true or false",
 }
-WIDTH, HEIGHT, DPI = 7.2, 2.2, 110  # of a figure and of each of its panels, inches
+WIDTH, HEIGHT = 7.2, 2.2  # of a figure and of each of its panels, inches
 LABELS = {name: f"{name} (pu)" for name in ("vt", "efd", "ifd", "p", "q", "it")}
 
 Schema = Mapping[str, Any]
@@ -329,7 +329,7 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
     for model in MODELS.values():
         case = CASES / f"{model.name.lower()}.yaml"
         responses = {"": exfit.simulate(exfit.load_case(case)).response}
-        _draw(responses, ("vt", "efd"), folder / f"{model.name}.png")
+        _draw(responses, ("vt", "efd"), folder / f"{model.name}.svg")
         caption = f"The response of the case `configs/models/{case.name}`, which has typical data."
         pages.append(_model_page(model, caption, folder))
     on_load = "The active power of a GENROU machine with ST1A on load, "
@@ -349,13 +349,13 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
                 for line in (f"{kind}: {{model: {model.name}}}", "")
             )
             responses = {f"with {kind}": _response(with_it), "without": _response(without)}
-            _draw(responses, ("p",), folder / f"{model.name}.png")
+            _draw(responses, ("p",), folder / f"{model.name}.svg")
             caption = f"{on_load}{event} All data are typical."
             pages.append(_model_page(model, caption, folder))
     pages += [_limiter_page(model, folder) for model in LIMITERS.values()]
     for machine in MACHINES.values():
         responses = {"": _response(MACHINE_CASE.format(name=machine.name))}
-        _draw(responses, ("vt", "efd"), folder / f"{machine.name}.png")
+        _draw(responses, ("vt", "efd"), folder / f"{machine.name}.svg")
         pages.append(_machine_page(machine, folder))
     return pages
 
@@ -368,7 +368,7 @@ def _limiter_page(model: Any, folder: Path) -> Path:
         LIMITER_CASE.format(exciter=exciter, limiter=line, step=step) for line in (limiter, "")
     )
     responses = {"with limiter": _response(with_it), "without": _response(without)}
-    _draw(responses, (signal,), folder / f"{model.name}.png")
+    _draw(responses, (signal,), folder / f"{model.name}.svg")
     data = f", with {given}" if given else ""
     caption = (
         f"A GENROU machine with {exciter} on load after a step of {100.0 * step:g} % of the "
@@ -396,7 +396,7 @@ def _model_page(model: Any, caption: str, folder: Path) -> Path:
         *([f"{model.name} {_escaped(model.doubt)}."] if model.doubt else []),
         f"## Data sheet\n\n{_sheet(model.sheet)}",
         f"States: {', '.join(model.states)}.",
-        f"## Response\n\n![response of {model.name}]({model.name}.png)\n\n{caption}",
+        f"## Response\n\n![response of {model.name}]({model.name}.svg)\n\n{caption}",
         f"## Sources\n\n{_sources(source, model)}",
     ]
     return _write(folder / f"{model.name}.md", parts)
@@ -413,7 +413,7 @@ def _machine_page(machine: Any, folder: Path) -> Path:
         f"## Data sheet\n\n{_sheet(machine.sheet)}",
         f"States: {', '.join(machine.d_axis)}.{q_axis if machine.q_axis else ''}",
         "## Response",
-        f"![response of {machine.name}]({machine.name}.png)",
+        f"![response of {machine.name}]({machine.name}.svg)",
         "On open circuit with SEXS, a step of 5 % of the reference. All data are typical.",
         f"## Sources\n\n{_sources('', machine)}",
     ]
@@ -460,10 +460,11 @@ def _sources(source: str, model: Any) -> str:
 
 def _draw(responses: Mapping[str, Any], signals: Iterable[str], path: Path) -> None:
     """Draw some signals of responses, each under its label."""
+    import matplotlib
     from matplotlib.figure import Figure
 
     names = [name for name in signals if all(name in it.signals for it in responses.values())]
-    figure = Figure(figsize=(WIDTH, HEIGHT * len(names)), layout="constrained", dpi=DPI)
+    figure = Figure(figsize=(WIDTH, HEIGHT * len(names)), layout="constrained")
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axes, name in zip(panels, names, strict=True):
         for label, response in responses.items():
@@ -473,7 +474,8 @@ def _draw(responses: Mapping[str, Any], signals: Iterable[str], path: Path) -> N
         if len(responses) > 1:
             axes.legend(frameon=False)
     panels[-1].set_xlabel("time (s)")
-    figure.savefig(path)
+    with matplotlib.rc_context({"svg.fonttype": "none"}):
+        figure.savefig(path)
 
 
 # ---- Markdown

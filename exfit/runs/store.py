@@ -1,4 +1,4 @@
-"""The store of runs: what each came to lies in a file, under a key of all that goes into it.
+"""The store of runs: the result of each is a file, under a key of all that goes into it.
 
 A run whose key is there is not run again. Batches name a folder after the key, programmes one after
 the test, and the key stands in its file.

@@ -129,7 +129,7 @@ class Simulator:
         and the sub-steps found so far are shared. Raises ValueError where a step is another.
         """
         if [_fixed(change) for change in steps] != [_fixed(change) for change in self.inputs.steps]:
-            raise ValueError("only the sizes of steps and the instants of smooth ones may change")
+            raise ValueError("only the sizes of steps and the times of smooth ones may change")
         pairs = zip(steps, self.inputs.steps, strict=True)
         changed = {new.signal for new, old in pairs if new != old}
         result = copy(self)

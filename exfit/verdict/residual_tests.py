@@ -179,7 +179,7 @@ def _errors(record: FittedRecord) -> Array:
 def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[Scatter]]]:
     """Yield the factor from a weighted error to one of the channel, pu, and the channel's scatter.
 
-    That of white errors is what they were before, whose size their noise foretells: it is as
+    That of white errors is what they were before, whose size their noise predicts: it is as
     certain as the scatter of the signals that drive, by the median of fourth differences.
     """
     experiment, first = record.setup.experiment, 0

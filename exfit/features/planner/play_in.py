@@ -1,4 +1,4 @@
-"""Play-in files of PSS/E (.plb): what drove the fit of a grid event, and its model PLBVFU1."""
+"""Play-in files of PSS/E (.plb): the recorded input of a grid event, and its model PLBVFU1."""
 
 from collections.abc import Iterable
 from pathlib import Path

@@ -105,7 +105,7 @@ def _events(
 ) -> tuple[StartingTest, ...]:
     """Return the grid events that phasor measurement units recorded, one a record.
 
-    Of the first ``alternate`` every other one validates, of the others each.
+    Of the first ``alternate`` each second one validates, of the others all.
 
     Raises ExfitError for sizes of steps, and for a record of another kind beside them.
     """

@@ -160,7 +160,7 @@ class Evidence:
     def noise_cost(self) -> float:
         """Cost of the noise of the records alone, as they scatter.
 
-        Errors that are weighted by the noise of what drives them are as large as that foretells.
+        Errors that are weighted by the noise of what drives them are as large as that predicts.
         """
         if self.weighted_by_noise:
             return 0.5 * self.residuals.count * self.residuals.noise**2
