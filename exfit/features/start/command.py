@@ -145,10 +145,10 @@ def new(
     the answer is found, and a proposal. Ctrl-C keeps the answers.
 
     The file of a phasor measurement unit is a grid event, which is played back into the unit.
-    Of several tests in a record, each is a record of the case with a window; the first is
-    fitted, the second validates, and so on. Values are typical, or those of a planner's file. Without a terminal, what the record
-    does not show is left as "?", and the case is refused until it is filled in; with --answers
-    what is missing is named.
+    Of several tests in a record, each is a record of the case with a window; the first is fitted,
+    the second validates, and so on. Values are typical, or those of a planner's file. Without a
+    terminal, what the record does not show is left as "?", and the case is refused until it is
+    filled in; with --answers what is missing is named.
     """
     from exfit.features.start.answers import checked, contradictions
     from exfit.features.start.making import new_case
