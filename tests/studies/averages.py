@@ -4,7 +4,7 @@
 
 draws each kind of record so many times: a step of AC1A whose instant is free, at several rates,
 with noise. It counts how often the verdict names averages, how often it says that the record does
-not tell, and how many intervals miss the truth. docs/verdict.md has the figures.
+not tell, and how many intervals miss the truth. docs/uncertainty.md has the figures.
 """
 
 import os

@@ -3,7 +3,7 @@
     python tests/studies/event_causes.py [SEED ...]
 
 fits, for each kind of tests/support/faulty_events.py and each seed, the case with the fault and the
-one without. docs/verdict.md has the figures.
+one without. docs/verification.md has the figures.
 """
 
 import os
