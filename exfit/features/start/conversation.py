@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from exfit.case.case_draft import OpenValue
-from exfit.case.suggestion import RecordSettings
 from exfit.case.yaml import QUESTION
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import refuse_existing
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 from exfit.features.start.answers import ALL_TESTS, Given
-from exfit.features.start.making import Inspections, key_of
+from exfit.features.start.making import Inspections, inspected, key_of
 from exfit.features.start.questions import (
     MOST_LISTED,
     NO,
@@ -77,7 +76,7 @@ def converse(given: Given, read: Inspections, introduced: bool, names_case: bool
     if introduced:
         say("Enter takes the answer in brackets, ? explains, Ctrl-C stops and keeps the answers.")
     if "record" not in given and "tests" not in given:
-        given["record"] = _record()
+        given["record"] = _record(talk)
         introduced = True
     if "record" in given and introduced:
         _summary(talk.inspection)
@@ -103,13 +102,13 @@ def converse(given: Given, read: Inspections, introduced: bool, names_case: bool
 # ---- the record
 
 
-def _record() -> str:
+def _record(talk: Conversation) -> str:
     """Ask for the record: the number of a file of the folder, or a path."""
     files = [str(path) for path in records_among(sorted(Path().iterdir()))][:MOST_LISTED]
 
     def read(text: str) -> str:
         file = files[int(text) - 1] if text.isdigit() and 0 < int(text) <= len(files) else text
-        return _readable(file)
+        return _readable(talk, file)
 
     list_rows({str(k): name for k, name in enumerate(files, 1)})
     return ask(
@@ -123,12 +122,12 @@ def _record() -> str:
     )
 
 
-def _readable(file: str) -> str:
+def _readable(talk: Conversation, file: str) -> str:
     """Return the path of a record that can be read; raises ExfitError."""
     if not file:
         raise ExfitError("A record is needed")
     path: Path = GivenFile(Kind.RECORD).convert(Path(file).expanduser(), None, None)
-    RecordSettings().inspect(path)
+    inspected(talk.answers(), path, talk.read)
     return str(path)
 
 
@@ -321,7 +320,7 @@ def _validation(talk: Conversation) -> None:
     def read(text: str) -> list[str]:
         if text.lower() in NO:
             return []
-        files = [_readable(text)]
+        files = [_readable(talk, text)]
         talk.case(validate=files)
         return files
 

@@ -96,24 +96,28 @@ def verify(
     given, read = command.merged(answers_file, options), dict[Path, Any]()
     if "output" in given:
         refuse_report(Path(given["output"]), force)
-    if command.is_terminal() and not quiet and events is None:
+    asks = command.is_terminal() and not quiet and events is None
+    if asks:
         command.complete(given, read, "verify", introduced=answers_file is None)
     else:
         command.refuse_missing(given, read, answers_file)
-    stem = Path(given.get("record") or given["tests"]).stem
-    place = Path(given.get("output") or f"{stem}-report.html")
+    source = Path(given.get("record") or given["tests"])
+    place = Path(given.get("output") or f"{source.stem}-report.html")
+    case = place.with_name(f"{source.stem}.yaml")
+    if asks:
+        command.keep(given, case.with_suffix(command.ENDING))
     refuse_report(place, force)
-    case = place.with_name(f"{stem}.yaml")
     if not force:
         _refuse_edited(case)
     made = new_case(checked(given), case.parent, read)
-    show = Output(None, True, quiet, False, progress, events)
+    show = Output(None, True, quiet, as_json=False, progress=progress, events=events)
     show.warn(made.doubts)
     write_text(_marked(made.draft.text), case, ())
     if show.shown:
-        tests = ", ".join(test.name for test in made.tests)
+        validating = sum(test.validates for test in made.tests)
+        counts = f"{len(made.tests) - validating} fitted, {validating} for validation"
         left = typical_left(made)
-        echo(f"record: {stem}; tests: {tests}")
+        echo(f"record: {source.name}; tests: {counts}")
         echo(f"case: {case}" + (f"; typical, not of this unit: {left}" if left else ""))
     result, folder = fit_case(load(case), show)
     pages = write_report(folder, place, force)

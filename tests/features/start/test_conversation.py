@@ -1,11 +1,14 @@
 """new and verify as a conversation, by a file of answers, and from Python: nobody edits a file."""
 
 import re
+import subprocess
+import sys
 from shutil import copy
 
 import pytest
 from click.testing import CliRunner
 from places import SAMPLES
+from stepped_record import stepped_record
 from tiers import few_of
 
 from exfit import cli
@@ -26,7 +29,7 @@ def folder(empty_folder):
 def talk(monkeypatch):
     """Return a function that runs a command whose questions get some lines; figures are left."""
     monkeypatch.setattr(command, "is_terminal", lambda: True)
-    monkeypatch.setattr(command, "names_case", lambda _: True)
+    monkeypatch.setattr(command, "names_case", lambda given: "output" not in given)
     monkeypatch.setattr(run_folder.FigureFiles, "draw", lambda *_: ())
 
     def run(*arguments, lines):
@@ -119,3 +122,80 @@ def test_what_was_answered_before_an_interruption_is_not_asked_again(folder, tal
     assert ran.exit_code == 0, ran.output
     values = load_case(folder / "field_record.csv.yaml").values()
     assert (values["machine.Tpd0"], values["machine.S12"], values["VRMIN"]) == (6.0, 0.4, -14.5)
+
+
+def test_with_a_planners_file_only_the_size_of_the_step_and_facts_are_asked(folder, talk):
+    for name in ("unit.dyr", "ac1a_channels.csv"):
+        copy(SAMPLES / name, folder)
+    options = ("--record", "ac1a_channels.csv", "--dyr", "unit.dyr", "--bus", "101")
+    ran = talk("new", *options, lines=["", "", "", "", ""])
+    assert ran.exit_code == 0, ran.output
+    asked = [line for line in ran.output.splitlines() if line.rstrip().endswith((":", "]:"))]
+    assert [text.split(",")[0].split("[")[0].strip(" :") for text in asked] == [
+        "Size of the 2 steps", "Plant", "Unit", "Tested by", "File for the case"
+    ]  # fmt: skip
+    assert "typical" not in ran.output
+    assert load_case(folder / "ac1a_channels.yaml").as_found.bus == 101
+    ran = talk("new", *options, "--step", "0.05", "-o", "other.yaml", lines=["", "", ""])
+    assert ran.exit_code == 0, ran.output
+    assert load_case(folder / "other.yaml").values() == (
+        load_case(folder / "ac1a_channels.yaml").values()
+    )
+
+
+def test_of_several_units_of_a_planners_file_one_is_chosen(folder, talk):
+    text = (SAMPLES / "unit.dyr").read_text(encoding="utf-8")
+    (folder / "units.dyr").write_text(text + text.replace("101 '", "102 '"), encoding="utf-8")
+    lines = ["field_record.csv", "", "", "", "3", "103 1", "102 1", "", "", "", "", ""]
+    ran = talk("new", lines=lines)
+    assert ran.exit_code == 0, ran.output
+    assert "'103 1' is not in the list" in ran.output
+    assert load_case(folder / "field_record.yaml").as_found.bus == 102
+
+
+def test_tests_of_different_size_are_asked_one_by_one(folder, talk):
+    stepped_record(folder / "steps.csv")
+    lines = ["15.75", "", "", "0.03", "0.03", "-0.02", *[""] * 30]
+    ran = talk("new", "--record", "steps.csv", "--model", "SEXS", "-o", "u.yaml", lines=lines)
+    assert ran.exit_code == 0, ran.output
+    said = " ".join(ran.output.split())
+    assert "To keep it, enter it once more" in said
+    assert "vt rises there" in said
+    case = load_case(folder / "u.yaml")
+    tests = [each.test for each in (*case.recordings, *case.validations)]
+    assert sorted(test.vref[0].step for test in tests) == [-0.05, -0.03, 0.02, 0.05]
+
+
+def test_verify_asks_as_new_does_keeps_the_answers_and_refuses_an_edited_case_with_them(
+    folder, talk
+):
+    (folder / "field_record.yaml").write_text("model: AC1A\n")
+    options = ("--kv", "15.75", "--step", "0.05", "--model", "SEXS")
+    ran = talk("verify", "field_record.csv", *options, lines=[""] * 30)
+    assert ran.exit_code == 1
+    assert "field_record.yaml: exists already" in ran.output
+    assert "model: SEXS" in (folder / "field_record.answers.yaml").read_text(encoding="utf-8")
+    ended = talk("verify", "field_record.csv", "--kv", "15.75", lines=["0.05"])
+    assert ended.exit_code == 130
+    assert "exfit verify --answers field_record.answers.yaml" in ended.output
+
+
+def test_another_file_with_the_name_of_the_answers_is_kept(folder, talk):
+    (folder / "field_record.answers.yaml").write_text("mine: 1\n")
+    ended = talk("new", lines=["2"])
+    assert "exfit new --answers field_record.answers-2.yaml" in ended.output
+    assert (folder / "field_record.answers.yaml").read_text() == "mine: 1\n"
+
+
+def test_the_first_question_waits_for_no_heavy_library(folder):
+    code = (
+        "import sys, atexit; from exfit.features.start import command; "
+        "command.is_terminal = lambda: True; "
+        "atexit.register(lambda: print(*sys.modules)); from exfit.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "new"], input="", capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 130
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert not loaded & {"scipy", "matplotlib", "rich", "jinja2", "llvmlite"}

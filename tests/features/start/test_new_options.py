@@ -2,36 +2,22 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 from places import CONFIGS, SAMPLES
 from programme_files import BUS, programme_file
-from records import workbook_of, write
+from records import workbook_of
+from stepped_record import stepped_record
 from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.models import MODELS
-
-STEPS = ((30.0, 0.05), (60.0, -0.05), (90.0, -0.02), (120.0, 0.02))  # s, pu
-LAG = 0.4  # s
 
 
 @pytest.fixture
 def record(empty_folder):
     """Write a record of four tests in kV; return its path."""
     return stepped_record(empty_folder / "record.csv")
-
-
-def stepped_record(path, base=15.75):
-    """Write a voltage that follows the steps as a second-order response does."""
-    time = np.arange(0.0, 150.0, 0.02)
-    vt = np.ones_like(time)
-    for at, step in STEPS:
-        since = np.maximum(time - at, 0.0) / LAG
-        vt += step * (1.0 - (1.0 + since) * np.exp(-since))
-    vt += 1e-4 * np.random.default_rng(15).standard_normal(time.size)
-    return write(path, **{"t": time, "Ugen (kV)": base * vt})
 
 
 @pytest.fixture
