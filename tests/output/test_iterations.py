@@ -35,7 +35,9 @@ def printed(run, empty_folder, monkeypatch):
     """Return a function that fits, and gives the table as printed, and history.csv."""
 
     def command(case, *options, columns=NARROW):
-        assert run("fit", CONFIGS / f"{case}.yaml", "--no-plots", "-o", "fit", *options).code != 1
+        if not Path("fit").exists():
+            fit = run("fit", CONFIGS / f"{case}.yaml", "--no-plots", "-q", "-o", "fit", *options)
+            assert fit.code != 1
         monkeypatch.setenv("COLUMNS", str(columns))
         ran = run("show", "fit", "--history")
         assert (ran.code, ran.err) == (0, "")
@@ -84,13 +86,10 @@ def test_the_table_is_that_of_history_csv_by_the_names_of_the_thesis(printed, ca
                 assert same(text, value), (title, text, value)
     for phase in {line["phase"] for line in stored}:
         assert f"{phase}: {HISTORY_PHASES[phase]}" in legend
-
-
-def test_a_wide_terminal_has_all_columns(printed):
-    rows, stored, _ = printed("ac1a_typical", "--search", "local", columns=120)
-    assert [*rows[0]] == [*KEYS]
-    assert [row["evaluations"] for row in rows] == [line["nfev"] for line in stored]
-    assert [row["capped"] for row in rows] == [line["capped"] or "-" for line in stored]
+    wide, _, _ = printed(case, *options, columns=120)
+    assert [*wide[0]] == [*KEYS]
+    assert [row["evaluations"] for row in wide] == [line["nfev"] for line in stored]
+    assert [row["capped"] for row in wide] == [line["capped"] or "-" for line in stored]
 
 
 @pytest.mark.long
@@ -103,11 +102,8 @@ def test_the_history_of_a_search_leads_to_its_result(printed):
     assert numbers == [*range(len(rows))]
 
 
-def test_a_validation_has_no_iterations(run, printed):
-    printed("ac1a_typical", "--search", "local")
-    case = CONFIGS / "ac1a_typical.yaml"
-    given = ("--parameters", "fit/parameters.yaml", "--no-plots", "-o", "validated")
-    assert run("validate", case, *given).code == 0
-    ran = run("show", "validated", "--history")
+def test_a_validation_has_no_iterations(run, empty_folder):
+    Path("validation.json").write_text("{}")
+    ran = run("show", "validation.json", "--history")
     assert ran.code == 1
     assert "no iterations" in ran.err
