@@ -381,11 +381,11 @@ def reproduction(result: Reported, folder: Path) -> Iterator[Block]:
 
 
 def signatures(result: Reported | ProgrammeResult) -> Iterator[Block]:
-    """Yield the block of revision and signatures: empty cells are to be filled in by hand."""
+    """Yield the block of unit, revision and signatures: empty cells are filled in by hand."""
     about = result.about
     named = {
         fact.key: given
-        for fact in (facts.REVISION, facts.REPORTED, facts.CHANGES)
+        for fact in (facts.PLANT, facts.UNIT, facts.REVISION, facts.REPORTED, facts.CHANGES)
         if (given := stated(about, fact)) is not None
     }
     if named:

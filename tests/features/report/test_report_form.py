@@ -121,7 +121,7 @@ def test_every_fact_that_a_report_asks_for_is_in_the_documentation():
 
 def test_a_role_without_a_name_has_an_empty_cell_to_be_signed(unit):
     facts, block = signatures(unit)
-    assert facts.pairs == (("Revision", "3"),)
+    assert facts.pairs == (("Plant", "Höllental"), ("Unit", "2"), ("Revision", "3"))
     rows = [[cell.text for cell in row] for row in block.rows]
     assert [row[1] for row in rows] == ["N. N.", "M. M.", "", ""]
     assert rows[0] == ["Tested by", "N. N.", "2026-05-03", ""]
