@@ -21,7 +21,7 @@ from exfit.case.schema.values import (
 )
 from exfit.case.suggestion import relative
 from exfit.case.yaml import QUESTION, Fault, open_places, read_text, read_yaml
-from exfit.errors import ExfitError, FileError
+from exfit.errors import FileError
 from exfit.util.text import dotted
 
 HEADING = "Answers to the questions of exfit new and exfit verify"  # begins a file of answers
@@ -37,11 +37,6 @@ def _of_all(value: Any) -> Any:
     return value if isinstance(value, Mapping) else {ALL_TESTS: value}
 
 
-def _for_all(value: Any) -> Any:
-    """Read a single word as the source of all values."""
-    return {ALL_TESTS: value} if isinstance(value, str) else value
-
-
 def _as_text(value: Any) -> Any:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
@@ -54,6 +49,8 @@ def _with_texts(value: Any) -> Any:
     return {k: f"{v:.12g}" if isinstance(v, plain) else v for k, v in value.items()}
 
 
+NONE: Any = Field(default_factory=nothing)
+List = Annotated[tuple[Text, ...], BeforeValidator(_as_list)]
 Values = Frozen[Number]
 Texts = Annotated[Frozen[Text], BeforeValidator(_with_texts)]
 
@@ -61,53 +58,32 @@ Texts = Annotated[Frozen[Text], BeforeValidator(_with_texts)]
 class Answers(Section):
     """The answers to what a new case needs, each under the name of its option."""
 
-    record: Text | None = Field(default=None, description="Record of the tests.")
-    time: Annotated[tuple[Text, ...], BeforeValidator(_as_list)] = Field(
-        default=(), description="Column of the time, or those of date and time."
-    )
-    time_unit: Text | None = Field(default=None, description="Unit of the time: s, ms, us, min.")
-    sheet: Text | None = Field(default=None, description="Sheet of a workbook.")
-    memory: Positive | None = Field(default=None, description="Memory for reading, GB.")
-    vt: Text | None = Field(default=None, description="Column of the terminal voltage.")
-    kv: Positive | None = Field(default=None, description="Rated voltage, line to line, kV.")
-    mva: Positive | None = Field(default=None, description="Rated power, MVA.")
-    base: Texts = Field(
-        default_factory=nothing, description="Value of 1 pu by signal, as {ifd: 550A}."
-    )
-    step: Annotated[Values, BeforeValidator(_of_all)] = Field(
-        default_factory=nothing,
-        description="Size of the steps, pu, or of single tests: {up: 0.05, at-312s: 0.02}.",
-    )
-    tests: Text | None = Field(default=None, description="Table of tests.")
-    dyr: Text | None = Field(default=None, description="Planner's file, .dyr or .dyd.")
-    bus: Bus | None = Field(default=None, description="Bus of the unit in it.")
-    id: Annotated[MachineId, BeforeValidator(_as_text)] | None = Field(
-        default=None, description="Machine id of the unit in it."
-    )
-    model: Text | None = Field(default=None, description="Model of the exciter.")
-    machine_model: Text | None = Field(default=None, description="Model of the generator.")
-    machine_from: Text | None = Field(
-        default=None, description="Another case, whose generator is taken."
-    )
-    machine: Values = Field(
-        default_factory=nothing, description="Data of the generator that are not typical."
-    )
-    exciter: Values = Field(
-        default_factory=nothing, description="Data of the exciter that are not typical."
-    )
-    sources: Annotated[Frozen[Source], BeforeValidator(_for_all)] = Field(
-        default_factory=nothing,
-        description="Where these data are from: a word for all of them, or one each.",
-    )
-    open: Frozen[Number | Text] = Field(
-        default_factory=nothing,
-        description="Other values that a case needs, by their place: {plant.network.X: 0.2}.",
-    )
+    record: Text | None = None
+    time: List = ()  # column, or date and time
+    time_unit: Text | None = None
+    sheet: Text | None = None
+    memory: Positive | None = None  # GB
+    vt: Text | None = None  # column of the terminal voltage
+    kv: Positive | None = None  # rated, line to line
+    mva: Positive | None = None  # rated
+    base: Texts = NONE  # value of 1 pu by signal, {ifd: 550A}
+    step: Annotated[Values, BeforeValidator(_of_all)] = NONE  # pu; {up: 0.05, at-312s: 0.02}
+    tests: Text | None = None  # a table of tests
+    dyr: Text | None = None
+    bus: Bus | None = None
+    id: Annotated[MachineId, BeforeValidator(_as_text)] | None = None
+    model: Text | None = None  # of the exciter
+    machine_model: Text | None = None
+    machine_from: Text | None = None  # another case, whose generator is taken
+    machine: Values = NONE  # data of the generator that are not typical
+    exciter: Values = NONE  # data of the exciter that are not typical
+    sources: Annotated[Frozen[Source], BeforeValidator(_of_all)] = NONE  # of these data
+    open: Frozen[Number | Text] = NONE  # other values by their place, {plant.network.X: 0.2}
     validations: Annotated[tuple[Text, ...], BeforeValidator(_as_list)] = Field(
-        default=(), alias="validate", description="Further records, on which the fit is validated."
+        (), alias="validate"
     )
-    about: Texts = Field(default_factory=nothing, description="Facts for the report.")
-    output: Text | None = Field(default=None, description="File of the case, or of the report.")
+    about: Texts = NONE
+    output: Text | None = None  # file of the case, or of the report
 
     @property
     def sizes(self) -> tuple[str, ...]:
@@ -202,9 +178,3 @@ def contradictions(answers: Answers) -> Iterator[str]:
         yield "--machine: not allowed with --dyr or --machine-from."
     if not answers.dyr and (answers.bus is not None or answers.id is not None):
         yield "--bus and --id: only with --dyr."
-
-
-def refuse_contradictions(answers: Answers) -> None:
-    """Raise ExfitError where answers exclude each other."""
-    for text in contradictions(answers):
-        raise ExfitError(text)

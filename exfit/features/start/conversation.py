@@ -169,7 +169,7 @@ def _confirm_voltage(talk: Conversation) -> None:
     )
     talk.given["vt"] = ask(
         "Column of the terminal voltage: its number or name",
-        one_of(names),
+        one_of(names, numbered=True),
         "List of the recorder's channels.",
         channel.name if channel else "",
     )

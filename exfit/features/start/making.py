@@ -11,7 +11,7 @@ from exfit.case.suggestion import RecordSettings, bases_of, rated_bases, relativ
 from exfit.errors import ExfitError, FileError
 from exfit.features.planner.fields import located
 from exfit.features.planner.import_case import import_unit, unit_data
-from exfit.features.start.answers import Answers, refuse_contradictions
+from exfit.features.start.answers import Answers, contradictions
 from exfit.features.start.starting_case import (
     PartData,
     UnitData,
@@ -55,7 +55,8 @@ def new_case(answers: Answers, folder: Path, read: Inspections) -> NewCase:
     Without a model of the exciter it has any. Raises ExfitError for answers that contradict each
     other, the record or a data sheet.
     """
-    refuse_contradictions(answers)
+    for text in contradictions(answers):
+        raise ExfitError(text)
     tests = tests_of_answers(answers, read)
     unit, warnings = unit_of_answers(answers, folder)
     draft = starting_case(unit, tests, folder, answers.about)

@@ -100,16 +100,16 @@ def number(text: str) -> float:
         raise ExfitError(f"{text!r} is not a number") from None
 
 
-def one_of(words: Sequence[str]) -> Callable[[str], str]:
-    """Return what reads the number or the beginning of a word of a list."""
+def one_of(words: Sequence[str], numbered: bool = False) -> Callable[[str], str]:
+    """Return what reads the beginning of a word of a list, or its number."""
 
     def read(text: str) -> str:
-        if text.isdigit() and 0 < int(text) <= len(words):
+        if numbered and text.isdigit() and 0 < int(text) <= len(words):
             return words[int(text) - 1]
         begun = [word for word in words if text and word.lower().startswith(text.lower())]
-        if len(begun) != 1 and text not in words:
-            raise ExfitError(f"{text!r} is not in the list; {near(text, words)}")
-        return text if text in words else begun[0]
+        if text in words or len(begun) == 1:
+            return text if text in words else begun[0]
+        raise ExfitError(f"{text!r} is not in the list; {near(text, words)}")
 
     return read
 
