@@ -1,4 +1,4 @@
-"""Sister units beside each other: which are sisters, what is compared, what stands out."""
+"""Similar units side by side: which are similar, what is compared, what stands out."""
 
 import numpy as np
 import pytest
