@@ -59,7 +59,7 @@ Values = Mapping[str, float]
 EARLIER_OR_LATER = {"min": ("earlier", "late"), "max": ("later", "early")}
 LONE_RECORD = "record"  # its name, as in the case
 NOTHING_TO_VALIDATE_ON = (
-    "missing: all records of the case are fitted; name another one there, or give it by "
+    "missing: the case has no record that was not fitted; name one there, or give it by "
     "`exfit validate CASE --record FILE` (record in Python)"
 )
 

@@ -261,7 +261,7 @@ def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
     )
     before = listing(workplace)
     is_refused(run("fit", case), ["case.yaml", "record", "missing"], before, workplace)
-    words = ["case.yaml", "validate: missing: all records of the case are fitted"]
+    words = ["case.yaml", "validate: missing: the case has no record that was not fitted"]
     is_refused(run("validate", case, "--parameters", "values.yaml"), words, before, workplace)
     assert run("simulate", case, "--no-plots").code == 0
     assert run("check", case).code == 0
@@ -656,7 +656,7 @@ def test_nothing_to_validate_on_is_refused(run, workplace):
     ran = run("validate", case, "--parameters", "values.yaml")
     is_refused(
         ran,
-        ["case.yaml: validate: missing", "all records of the case are fitted", "--record"],
+        ["case.yaml: validate: missing", "the case has no record that was not fitted", "--record"],
         before,
         workplace,
     )
