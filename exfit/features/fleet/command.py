@@ -85,12 +85,12 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
 @click.option(
     "--strategy",
     type=click.Choice([*STRATEGIES]),
-    help=f"Strategy in place of that of the cases. {EXPLAINED}.",
+    help=f"Strategy, instead of that of the cases. {EXPLAINED}.",
 )
 @click.option(
     "--search",
     type=click.Choice([*SEARCHES]),
-    help=f"How far to search, in place of what the cases say. {SEARCHES_EXPLAINED}.",
+    help=f"Search, instead of that of the cases. {SEARCHES_EXPLAINED}.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON and nothing else.")

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     "--search",
     type=click.Choice([*SEARCHES]),
     default="global",
-    help=f"How far to search for each. {SEARCHES_EXPLAINED}.",
+    help=f"Search for each model. {SEARCHES_EXPLAINED}.",
 )
 @progress_option
 @output_options

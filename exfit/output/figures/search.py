@@ -153,7 +153,7 @@ def waterfall(search: Minima, title: str) -> Figure:
             if own.any():
                 axes.plot(ranks[own], ends[own], marker, color=color, markersize=5, label=text)
     logarithmic(axes)
-    axes.set_xlabel("run, in the order of the costs reached")
+    axes.set_xlabel("run, by the cost at its end")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=8)
