@@ -46,7 +46,7 @@ class SimulationCounter:
 
 
 class Robust(NamedTuple):
-    """A loss that bears spikes, from ``scale`` standard deviations of a channel's noise on."""
+    """A loss that tolerates spikes, from ``scale`` standard deviations of a channel's noise on."""
 
     loss: "Loss"
     scale: float

@@ -1,4 +1,4 @@
-"""What controls a unit on load, its governor and its stabiliser: what it hears, how it rests."""
+"""What controls a unit on load, its governor and its stabiliser: their inputs, their state of rest."""
 
 from collections.abc import Mapping
 
