@@ -105,7 +105,7 @@ class WindowSpread:
         values = ", ".join(rounded_value(window.value, window.std_error) for window in steps)
         least, most = (pick(self.windows, key=lambda w: w.value) for pick in (min, max))
         ends = " ... ".join(rounded_value(end.value, end.std_error) for end in (least, most))
-        each = f"{self.name} is {values} {self.unit} by the {len(steps)} steps one by one"
+        each = f"{self.name} is {values} {self.unit} from each of the {len(steps)} steps"
         spread = f"{ends} {self.unit} over {len(self.windows)} windows"
         if not self.moves:
             return f"{each}, {spread}: the spread is that of the noise"

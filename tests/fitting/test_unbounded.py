@@ -280,7 +280,7 @@ def test_what_a_model_refuses_costs_infinity(found):
         ({"min": 1.0}, "min: not allowed with bounds: none"),
         ({"max": 1.0}, "max: not allowed with bounds: none"),
         ({"scale": "log"}, "bounds: none leaves no min above 0"),
-        ({"start": 0.0}, "start: 0 is no size"),
+        ({"start": 0.0}, "start: 0 sets no scale for the search: use another"),
         ({"start": 0.0, "scale": "raw"}, "start: 0 sets no scale"),
     ],
 )
