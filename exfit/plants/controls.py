@@ -1,4 +1,4 @@
-"""What controls a unit on load, its governor and its stabiliser: their inputs, their state of rest."""
+"""Governor and stabiliser, which control a unit on load: their inputs, their state of rest."""
 
 from collections.abc import Mapping
 

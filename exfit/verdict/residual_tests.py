@@ -225,7 +225,7 @@ def _tests_of(
 ) -> ResidualTests:
     """Return the tests of a channel, whose steps are at ``instants`` (s).
 
-    ``errors`` (M,) are as the loss counts them. What deviates for long is none that a loss tolerates.
+    ``errors`` (M,) are as the loss counts them. A long deviation is no spike.
     """
     name, signal = record.comparison.name, channel.signal
     overlay, largest = record.comparison.overlays[signal], max(each.std for each in scatter)
