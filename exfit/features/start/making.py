@@ -22,6 +22,7 @@ from exfit.features.start.starting_case import (
 from exfit.features.start.starting_tests import StartingTest, doubtful_bases, starting_tests
 from exfit.features.start.tables import read_test_table, tests_of_table
 from exfit.models.sheet import Parameter
+from exfit.plants import KINDS
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import tests_of
 from exfit.util.text import dotted, listed, near
@@ -46,7 +47,8 @@ class NewCase(NamedTuple):
     @property
     def on_load(self) -> bool:
         """Whether the machine is on load: in a grid event, or where the record shows power."""
-        return self.draft.kind_of_plant not in ("none", "open-circuit")
+        kind = KINDS.get(self.draft.kind_of_plant)
+        return kind is not None and kind.on_load
 
 
 def new_case(answers: Answers, folder: Path, read: Inspections) -> NewCase:
