@@ -362,7 +362,7 @@ def test_a_result_is_printed_as_the_command_prints_it(result, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("use", "fault"),
     [
-        (lambda result: exfit.export(result, form="dvr"), "dvr: no format .* did you mean dyr"),
+        (lambda result: exfit.export(result, form="dvr"), "dvr: .* did you mean dyr"),
         (lambda _: exfit.compare([CASE]), "one curve alone"),
         (lambda _: exfit.import_units(DYR, "out", steps=["0.05"]), "only with a folder of records"),
     ],
