@@ -73,6 +73,8 @@ def converse(given: Given, read: Inspections, introduced: bool, names_case: bool
     the name of the case is asked, too. Raises click.Abort at Ctrl-C and Ctrl-D.
     """
     talk = Conversation(given, read)
+    if {"record", "tests"} & given.keys():
+        talk.case()  # refuses what contradicts itself already, before anything is asked
     if introduced:
         say("Enter takes the answer in brackets, ? explains, Ctrl-C stops and keeps the answers.")
     if "record" not in given and "tests" not in given:
