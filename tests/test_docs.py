@@ -242,7 +242,7 @@ def fault_of(line: str) -> str:
     command = COMMANDS.get(words[0])
     if command is None:
         return "a command"
-    context = click.Context(command, info_name=words[0])
+    context = click.Context(command, info_name=words[0], **main.context_settings)
     try:
         values, _, _ = command.make_parser(context).parse_args([*words[1:], "VALUE"])
     except click.UsageError as fault:

@@ -5,7 +5,7 @@ import pytest
 from exfit.features.compare import files as compare
 from exfit.features.design import files as design
 from exfit.features.rank import ranking_output as rank
-from exfit.features.report.writing import PAGE, PRINT
+from exfit.features.report.writing import PAGE
 from exfit.features.translate import files as translate
 from exfit.output import run_folder
 from exfit.util.file_names import (
@@ -87,7 +87,7 @@ def test_all_that_is_written_beside_what_is_named_after_records_is_known():
     files = {*run_folder.FILES_OF_FIT, *run_folder.OF_FIT, *run_folder.OF_SIMULATION}
     files |= {*run_folder.OF_VALIDATION, *run_folder.OF_PROFILES, *run_folder.OF_INSPECTION}
     files |= {*run_folder.OF_SERIES, *compare.FILES, *design.FILES, *rank.FILES, *translate.FILES}
-    files |= {WHOLE_PROGRAMME, PAGE, PRINT}
+    files |= {WHOLE_PROGRAMME, PAGE, PAGE.replace("html", "pdf")}
     assert {name.partition(".")[0] for name in files} <= {*OWN_NAMES}
 
 
