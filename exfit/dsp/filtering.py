@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import even_step
-from exfit.util.arrays import Array, Mask, Places, median
+from exfit.util.arrays import Array, Mask, Places, median, median_step
 
 LOWEST_CUTOFF = 1e-6  # of the sampling rate: the coefficients for a lower one are rounded away
 BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice
@@ -148,7 +148,7 @@ class Filtering:
         """How many samples a window of the record's averages holds, 1 where it has none."""
         if self.averaged is None:
             return 1
-        return max(1, round(self.averaged.window / float(median(np.diff(self.time)))))
+        return max(1, round(self.averaged.window / median_step(self.time)))
 
     @property
     def window_between(self) -> float:

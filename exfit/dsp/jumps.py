@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from exfit.dsp.noise import SECOND_DIFFERENCE, spread
-from exfit.util.arrays import Array, Places, distinct, median
+from exfit.util.arrays import Array, Places, distinct, median, median_step
 
 Jump = tuple[int, int]  # the samples before and after it
 
@@ -142,7 +142,7 @@ def jumps_while_moving(time: Array, samples: Array, least: float) -> list[Jump]:
     """
     if len(samples) < 3:
         return []
-    noise, spacing = scatter(samples), float(median(np.diff(time)))
+    noise, spacing = scatter(samples), median_step(time)
     times_least, times_beside = NOISE_WHILE_MOVING
     found: list[Jump] = []
     for width in (1, 2) if 2.0 * spacing <= LONGEST_SPREAD else (1,):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.dsp.sampling import even_step
-from exfit.util.arrays import Array, Mask, median
+from exfit.util.arrays import Array, Mask, median_step
 
 Range = tuple[float, float]
 
@@ -200,7 +200,7 @@ def ripple_at_rest(time: Array, samples: Array, rests: list[tuple[float, float]]
     t, y = time[rest][-MOST_AT_REST:], samples[rest][-MOST_AT_REST:]
     if len(t) < FEWEST_AT_REST:
         return None
-    spacing = float(median(np.diff(t)))
+    spacing = median_step(t)
     count = int((t[-1] - t[0]) / spacing)
     if count > MOST_FILLED_IN * len(t):
         return None

@@ -7,7 +7,7 @@ import numpy as np
 
 from exfit.dsp.filtering import OUTLIER_WINDOW, outliers
 from exfit.dsp.noise import noise
-from exfit.util.arrays import Array, Mask, Places, distinct, median
+from exfit.util.arrays import Array, Mask, Places, distinct, median, median_step
 
 EXCERPT, EXCERPT_PARTS = 200_000, 20  # samples that are enough to estimate noise; in parts
 JUMP_SHARE = 0.75  # of a spike's least size: it begins or ends with such a jump
@@ -123,7 +123,7 @@ def mains_frequency(time: Array, samples: Array) -> float | None:
     mean, deviation = float(np.mean(y)), float(np.std(y))
     if deviation == 0.0 or abs(mean) > LARGEST_MEAN * deviation:
         return None
-    step = float(median(np.diff(t)))
+    step = median_step(t)
     power = np.abs(np.fft.rfft((y - mean) * np.hanning(len(y)))) ** 2
     frequencies = np.fft.rfftfreq(len(y), step)
     top = int(np.argmax(power))

@@ -19,7 +19,7 @@ import numpy as np
 from exfit.dsp.features import TIMES, Features, RemovedLine, features, features_after, figures_of
 from exfit.dsp.lines import cosine_and_sine, largest_line
 from exfit.dsp.noise import noise
-from exfit.util.arrays import Array, Mask, Places, distinct, median
+from exfit.util.arrays import Array, Mask, Places, distinct, median_step
 
 SEED = 421  # any: what matters is that a run can be repeated
 DRAWS = 200  # of the noise: enough for the deviation to 5 %
@@ -124,7 +124,7 @@ def recorded_features(response: RecordedResponse) -> Features | None:
     figures = figures_of(t[read], curves[:, :-2], curves[:, -2])
     for name in ("peak_time", "settling_time"):  # since the step, wherever that is
         figures[name] = figures[name] - (curves[:, -1] - late)
-    between_samples = SAMPLING_ERROR * float(median(np.diff(t)))
+    between_samples = SAMPLING_ERROR * median_step(t)
     return replace(_with_errors(own, figures, between_samples), without=lines)
 
 

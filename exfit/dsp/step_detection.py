@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import present_samples
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median, median_step
 
 SAMPLES_AT_REST = 10  # before a step: fewer do not determine the level it starts from
 MEDIAN_SAMPLES = 7  # of a running median: three may be spikes
@@ -366,7 +366,7 @@ def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) 
         least, freedom = float(np.min(costs)), max(len(y) - FITTED_VALUES, 1)
         left, known = least / freedom, max(scatter / sqrt(block), NOISELESS * float(np.ptp(y))) ** 2
         interval = interval_below(instants, costs, least + CHI_SQUARE * max(known, left))
-        margin = SHAPE_ERROR * rise + CLOCK_ERROR * float(median(np.diff(t)))
+        margin = SHAPE_ERROR * rise + CLOCK_ERROR * median_step(t)
         result = Onset(interval.earliest - margin, interval.latest + margin)
         if left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom)):
             break
@@ -417,7 +417,7 @@ def _costs(time: Array, samples: Array, instants: Array) -> Array:
     Level and size are eliminated (Golub and Pereyra 1973).
     """
     rise = float(time[-1] - instants[0])
-    lags = np.maximum(LAGS * rise, SHORTEST_LAG * float(median(np.diff(time))))
+    lags = np.maximum(LAGS * rise, SHORTEST_LAG * median_step(time))
     ago = np.maximum(time - instants[:, None], 0.0)[:, None, :] / lags[:, None]
     y = samples - np.mean(samples)
     costs = np.full(len(instants), y @ y)

@@ -18,7 +18,7 @@ from exfit.errors import RecordError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.recordings import column_of
 from exfit.records.record import Record
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median_step
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Filtering
@@ -75,7 +75,7 @@ def filtered_end(file: RecordFile, record: Record) -> tuple[tuple[float, float],
         return ()
     end = float(record.time[-1])
     if isinstance(file.filter, MedianSection):
-        reach = file.filter.median // 2 * float(median(np.diff(record.time)))
+        reach = file.filter.median // 2 * median_step(record.time)
     else:
         reach = 1.0 / file.filter.lowpass
     return ((end - reach, end),)

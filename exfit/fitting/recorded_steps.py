@@ -41,7 +41,7 @@ from exfit.plants import REFERENCES
 from exfit.records.reading import read_record
 from exfit.records.record import Record
 from exfit.simulation.inputs import RecordedInput
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median_step
 from exfit.util.text import show
 
 INSIDE_INTERVAL = 1e-6  # of it: a sample at its end would be on the other side of the jump
@@ -235,7 +235,7 @@ def references_of(
 
 def is_table(record: Record) -> bool:
     """Test whether a file is a table of few rows and not the samples of a recorder."""
-    spacing = float(median(np.diff(record.time)))
+    spacing = median_step(record.time)
     return spacing > LONGEST_JUMP and len(record.time) <= MOST_ROWS
 
 

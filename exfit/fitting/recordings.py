@@ -31,7 +31,7 @@ from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
 from exfit.records.units import base_of_own
 from exfit.signals import OF_EVENT, SIGNALS
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median_step
 from exfit.util.text import show
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def _refuse_other_test(case: Case, test: BumpTest, record: Record) -> None:
 
 def _refuse_other_clock(case: Case, test: BumpTest, record: Record) -> None:
     """Raise RecordError where the steps lie between the first samples, which are seconds apart."""
-    spacing = float(median(np.diff(record.time)))
+    spacing = median_step(record.time)
     if test.begin is None and test.instants and spacing >= SLOW_SAMPLES:
         last = test.instants[-1] - float(record.time[0])
         if last < spacing and len(record.time) * spacing > OTHER_CLOCK * last:

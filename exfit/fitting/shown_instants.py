@@ -16,7 +16,7 @@ from exfit.fitting.experiment import ExperimentSetup, Values, compared
 from exfit.fitting.noise import noise_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import BREAKER
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median, median_step
 
 TRIED, STAGES = 41, 2  # instants in an interval, first in that of the record, then about the best
 REST_BEFORE = 2.0  # s: so long a rest before a step is looked at
@@ -102,7 +102,7 @@ def _shown(
         low = max(low, interval.earliest - beside)
         high = min(high, interval.latest + beside)
     at = _vertex(tried, costs, best)
-    least = LEAST_ERROR * float(median(np.diff(setup.record.time)))
+    least = LEAST_ERROR * median_step(setup.record.time)
     return replace(
         instant,
         start=at,

@@ -26,7 +26,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slices
 from exfit.inference.noise import SURPRISING, is_white, whiteness
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, median_step
 from exfit.util.text import digits
 
 
@@ -127,7 +127,7 @@ def _name(setup: ExperimentSetup, channel: Channel) -> str:
 def _refuse_unseen(name: str, setup: ExperimentSetup, *frequencies: float) -> None:
     """Raise RecordError for a frequency with no whole period, or fewer than two samples in one."""
     time = setup.record.time
-    low, high = 1.0 / float(time[-1] - time[0]), 0.5 / float(np.median(np.diff(time)))
+    low, high = 1.0 / float(time[-1] - time[0]), 0.5 / median_step(time)
     for frequency in frequencies:
         if not low <= frequency <= high:
             raise RecordError(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from exfit.inference.confidence import Confidence
 from exfit.inference.linear import Factors, Linearisation, factored, tall_svd
 from exfit.inference.noise import Noise
-from exfit.util.arrays import Array, Mask
+from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 from exfit.util.typed import KEY
 
@@ -248,7 +248,13 @@ def _fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
     while np.count_nonzero(factors.has_effect & model) > 1 and np.any(
         now[factors.has_effect & model] > WEAK
     ):
-        fixed.append(_next_to_fix(factors, noise, model))
+        singular, directions = _seen_directions(factors, noise)
+        own = np.flatnonzero(model[factors.has_effect])
+        parts = np.round(directions[:, own], TIED)
+        # the last one at least: a fit that weights signals badly may determine less than its record
+        limit = 0.0 if singular[-1] == 0.0 else max(1.0 / WEAK, singular[-1])
+        longest = np.argmax(np.linalg.norm(parts[singular <= limit], axis=0))
+        fixed.append(int(np.flatnonzero(factors.has_effect)[own[longest]]))
         kept = factors.has_effect.copy()
         kept[fixed] = False
         factors = factored(lin, kept)
@@ -265,17 +271,6 @@ def _errors_of(factors: Factors, noise: Sequence[Noise]) -> Array:
     """Return the relative standard errors of the parameters (N,), infinite if not determined."""
     covariance = factors.covariance(noise)
     return np.where(factors.determined, np.sqrt(np.diag(covariance)), inf)
-
-
-def _next_to_fix(factors: Factors, noise: Sequence[Noise], model: Mask) -> int:
-    """Return the parameter of the model that moves most in what the record sees least."""
-    singular, directions = _seen_directions(factors, noise)
-    own = np.flatnonzero(model[factors.has_effect])
-    parts = np.round(directions[:, own], TIED)
-    # the last one at least: a fit may determine less than its record, if it weights signals badly
-    limit = 0.0 if singular[-1] == 0.0 else max(1.0 / WEAK, singular[-1])
-    longest = np.argmax(np.linalg.norm(parts[singular <= limit], axis=0))
-    return int(np.flatnonzero(factors.has_effect)[own[longest]])
 
 
 def _fixing_sentence(

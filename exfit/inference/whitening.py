@@ -95,19 +95,14 @@ def _parts(noise: PropagatedNoise, order: Rows, scale: float) -> Iterator[Whiten
     while done < len(order):
         first = max(done - ROWS_BEFORE, 0)
         window = order[first : first + ROWS_BEFORE + ROWS_TOGETHER]
-        matrix = scale * inverse_factor(noise.covariance(window))
+        from scipy.linalg.lapack import dpotrf, dtrtri
+
+        factor, _ = dpotrf(noise.covariance(window), lower=1, clean=1)
+        inverse, _ = dtrtri(factor, lower=1)
+        matrix = scale * np.asarray(inverse)
         for row in range(done - first, len(window), ROWS_OF_A_PART):
             rows = slice(row, min(row + ROWS_OF_A_PART, len(window)))
             yield WhitenedRows(
                 window[rows], window[: rows.stop], np.ascontiguousarray(matrix[rows, : rows.stop])
             )
         done = first + len(window)
-
-
-def inverse_factor(covariance: Array) -> Array:
-    """Return the inverse of the lower Cholesky factor of a covariance (M, M)."""
-    from scipy.linalg.lapack import dpotrf, dtrtri
-
-    factor, _ = dpotrf(covariance, lower=1, clean=1)
-    inverse, _ = dtrtri(factor, lower=1)
-    return np.asarray(inverse)

@@ -15,7 +15,7 @@ from exfit.records.formats.table import NONE, RecordTable, column_error, listed
 from exfit.records.formats.text import TextTable
 from exfit.records.units import alike, scale_between
 from exfit.signals import OF_CURRENT_PHASOR, OF_PHASORS, OF_VOLTAGE_PHASOR, PHASOR_COLUMNS
-from exfit.util.arrays import Array, Complex, Places
+from exfit.util.arrays import Array, Complex, Places, median_step
 
 if TYPE_CHECKING:
     from exfit.dsp.three_phase import Connection
@@ -245,7 +245,7 @@ def angle_findings(time: Array, name: str, angle: Array, frequency: Array | None
 
 def _smoothed(time: Array, samples: Array) -> Array:
     """Return a signal (M,) averaged over a short time about each instant."""
-    width = max(round(SMOOTHED_OVER / float(np.median(np.diff(time)))), 1)
+    width = max(round(SMOOTHED_OVER / median_step(time)), 1)
     padded = np.pad(samples, (width // 2, width - 1 - width // 2), mode="edge")
     return np.convolve(padded, np.ones(width) / width, "valid")
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from exfit.errors import SimulationError
 from exfit.simulation.interpolation import ON_GRID, GridSegment
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median_step
 
 MOST_STEPS = 1e7  # three hours at 1 ms
 PAUSE = 1e-9  # s: steps and ramps that follow one another sooner are one move
@@ -112,7 +112,7 @@ class RecordedInput:
         Where samples lie closer than these, it is averaged over the grid with a linear B-spline: so
         the area under it stays the same, and what lies between grid points is not lost.
         """
-        if float(median(np.diff(self.time))) >= part.step * (1.0 - ON_GRID):
+        if median_step(self.time) >= part.step * (1.0 - ON_GRID):
             return np.interp(part.times, self.time, self.samples)
         grid = part.start + part.step * np.arange(-1, part.steps + 2)  # one more on each side
         inside = self.time[(self.time > grid[0]) & (self.time < grid[-1])]

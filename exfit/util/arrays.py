@@ -25,6 +25,11 @@ def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
     return np.expand_dims(middle, axis) if keepdims else middle[()]
 
 
+def median_step(times: NDArray[Any]) -> float:
+    """Return the median time between samples at instants (M,)."""
+    return float(median(np.diff(times)))
+
+
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
     """Return the distinct values of an array in ascending order, as `np.unique` does."""
     ordered = np.sort(values, axis=None)

@@ -187,7 +187,15 @@ def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[S
     carried = propagated_noise(record.setup, values) if whitening is None else []
     for k, channel in enumerate(experiment.channels):
         if whitening is None:
-            scatter = _scatter(record, channel, values)
+            shape = noise_shape(channel)
+            samples = max(1, channel.samples // shape.apart)
+            measured = record.setup.experiment.measured(channel, values)
+            own = scatter_of(replace(channel, measured=measured)) * shape.gain
+            overlay = record.comparison.overlays[channel.signal]
+            until = -np.inf if record.steady_until is None else record.steady_until
+            resting = (record.comparison.time < until) & np.isfinite(overlay.error)
+            at_rest = rest_scatter(overlay.measured[resting], samples)
+            scatter = [sample_scatter(own, samples), *([] if at_rest is None else [at_rest])]
             if carried:
                 scatter = [with_carried(each, carried[k]) for each in scatter]
             yield 1.0 / channel.weight, scatter
@@ -197,22 +205,6 @@ def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[S
             uncertain = (OF_RMS + OF_FOURTH_DIFFERENCES) / channel.samples
             yield std / whitening.scale, [Scatter(std, uncertain)]
         first += channel.size
-
-
-def _scatter(record: FittedRecord, channel: Channel, values: Values) -> list[Scatter]:
-    """Return the scatter of a channel's record as the fit scales it, as far as it is known.
-
-    That from sample to sample, and that before the first step, where it should be at rest.
-    """
-    shape = noise_shape(channel)
-    samples = max(1, channel.samples // shape.apart)
-    measured = record.setup.experiment.measured(channel, values)
-    own = scatter_of(replace(channel, measured=measured)) * shape.gain
-    overlay = record.comparison.overlays[channel.signal]
-    until = -np.inf if record.steady_until is None else record.steady_until
-    resting = (record.comparison.time < until) & np.isfinite(overlay.error)
-    at_rest = rest_scatter(overlay.measured[resting], samples)
-    return [sample_scatter(own, samples), *([] if at_rest is None else [at_rest])]
 
 
 def _tests_of(

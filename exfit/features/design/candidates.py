@@ -13,7 +13,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import slopes_of
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Run, Simulator
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, median_step
 from exfit.util.text import near
 
 Extremes = Mapping[str, tuple[float, float]]
@@ -155,7 +155,7 @@ class Bench:
     def simulator(self, moves: Moves, duration: float) -> Simulator:
         """Return the simulator of a test, sampled as often as that of the case."""
         old = self.base.simulator
-        count = round(duration / float(np.median(np.diff(old.times))))
+        count = round(duration / median_step(old.times))
         times = np.linspace(0.0, duration, count + 1)
         inputs = Inputs(0.0, duration, self.steps(moves))
         return Simulator(old.system, inputs, times, old.step, old.least)

@@ -36,6 +36,7 @@ from exfit.fitting.nuisances import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.simulation.simulator import Run
+from exfit.util.arrays import median_step
 from exfit.util.text import near
 from exfit.util.typed import plain
 from exfit.workflows import loaded
@@ -176,7 +177,7 @@ def design_test(
         single=bench.stage("1 step", single, best.channels, duration),
         best=best,
         noise={channel.signal: 1.0 / channel.weight for channel in bench.candidates},
-        rate=1.0 / float(np.median(np.diff(times))),
+        rate=1.0 / median_step(times),
         vt0=float(run.outputs["vt"][0]),
         extremes=extremes_of(run),
         other_values=_at_other_values(bench, best, moves, single),

@@ -24,7 +24,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.verdict import Cause
 from exfit.signals import SIGNALS
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, median_step
 from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion
 
 RATED_VOLTAGES = (0.85, 1.15)  # pu: a unit on load rests between these
@@ -335,7 +335,7 @@ def _swing_cause(name: str, comparison: Comparison, steady: float) -> Iterator[C
 
 def swings(time: Array, samples: Array) -> Array:
     """Return a signal (M,) less its mean over two seconds about each time."""
-    step = float(np.median(np.diff(time)))
+    step = median_step(time)
     half = min(max(round(0.5 * SMOOTHED_OVER / step), 1), len(samples) // 2)
     padded = np.pad(samples, half, mode="edge")
     sums = np.cumsum(np.concatenate([[0.0], padded]))
@@ -350,7 +350,7 @@ def _correlation(a: Array, b: Array) -> float:
 
 def _delay(time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
     """Delay (s) of a signal after another where they are most alike, and that correlation."""
-    step = float(np.median(np.diff(time)))
+    step = median_step(time)
     most = min(round(1.0 / step), len(time) // 4)
     correlations = []
     for lag in range(-most, most + 1):

@@ -17,7 +17,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, median_step
 
 Interface = Literal["co-simulation", "model-exchange"]
 Use = Literal["parameter", "input", "output"]  # set before the start, set at any time, read
@@ -255,7 +255,7 @@ def grid_of(
     anchor = min(begins, default=first)
     step = own_step
     if step is None:
-        spacing = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        spacing = median_step(times) if len(times) > 1 else 0.0
         parts = max(1, int(np.ceil(spacing / LONGEST_STEP - ROUNDING)))
         step = spacing / parts if spacing > 0.0 else LONGEST_STEP
         anchor = float(times[len(times) // 2])

@@ -19,7 +19,6 @@ from exfit.case.case import Case
 from exfit.errors import SimulationError
 from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.descents import descent_near
-from exfit.fitting.experiment import Experiment
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
@@ -27,7 +26,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval
 from exfit.results.influences import STRONG, RecorderAverages
 from exfit.results.intervals.minima import own_values, variance_of
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median_step
 
 USUAL = (0.02, 0.05, 0.1, 0.2, 0.5)  # s: windows of recorders, beside the time between samples
 LONGEST = 0.1  # of the record: a longer window hides the response
@@ -159,22 +158,18 @@ def _averaged(
     usual window holds several samples, and is short beside the records.
     """
     chosen = [residuals.experiments[number] for number in numbers]
-    slowest = max(map(_spacing, chosen))
+    slowest = max(median_step(each.simulator.times) for each in chosen)
     longest = LONGEST * min(float(np.ptp(each.simulator.times)) for each in chosen)
     usual = [window for window in USUAL if slowest < window < longest]
     lates = (0.0,) if any(map(finds_instant, chosen)) else (0.0, 0.5)
     for given, late in product((None, *usual), lates):
-        windows = [given or _spacing(each) for each in residuals.experiments]
+        windows = [given or median_step(each.simulator.times) for each in residuals.experiments]
         experiments = [
             with_averages(each, windows[k], late * windows[k]) if k in numbers else each
             for k, each in enumerate(residuals.experiments)
         ]
         averaged = replace(residuals, experiments=experiments, counter=None)
         yield given or slowest, given is None and not late, averaged
-
-
-def _spacing(experiment: Experiment) -> float:
-    return float(median(np.diff(experiment.simulator.times)))
 
 
 def allowing_for_averages(

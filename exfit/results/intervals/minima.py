@@ -126,7 +126,10 @@ def _of_others(
     by_valley: dict[object, list[tuple[bool, Minimum]]] = {}
     for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
         from_start = search.goes_on and search.own.success and is_same(end.result, search.own)
-        apart = _is_apart(minimum.values, here, std_errors)
+        apart = any(
+            abs(value - here[name]) > WITHIN * std_errors.get(name, 0.0)
+            for name, value in minimum.values.items()
+        )
         if k != search.place and (from_start or (apart and not minimum.refuted)):
             valley = ("alone", k) if minimum.valley is None else minimum.valley
             by_valley.setdefault(valley, []).append((from_start, minimum))
@@ -143,14 +146,6 @@ def _of_others(
 def _above(minima: Sequence[Minimum]) -> float:
     """Find the largest chi-square in the valley of the result."""
     return max(each.chi_square or 0.0 for each in minima if each.valley == 0)
-
-
-def _is_apart(there: Values, here: Values, std_errors: Values) -> bool:
-    """Test whether a minimum lies beyond the errors of the values here."""
-    return any(
-        abs(value - here[name]) > WITHIN * std_errors.get(name, 0.0)
-        for name, value in there.items()
-    )
 
 
 def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:

@@ -14,7 +14,7 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.uncertainty import slices
 from exfit.results.verdict import Cause
-from exfit.util.arrays import Array, median
+from exfit.util.arrays import Array, median, median_step
 from exfit.verdict.causes.evidence import (
     CERTAIN,
     LAST,
@@ -87,7 +87,7 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"a ripple of {frequency:.1f} Hz, {height:.1e} pu, in "
             f"{own.channel.signal}{evidence.name_of(own.number)}",
-            Ripple(frequency, height, 1.0 / float(median(np.diff(own.time)))).remedy,
+            Ripple(frequency, height, 1.0 / median_step(own.time)).remedy,
         )
         yield from suspected(evidence, explained.cost, 3, cause)
 
@@ -96,7 +96,7 @@ def _line(own: ChannelErrors, errors: Array) -> float | None:
     """Return the frequency (Hz) at which the errors of a channel have most, None if too few."""
     if len(errors) < FEWEST_PERIODS:
         return None
-    step, length = float(median(np.diff(own.time))), FINER * len(errors)
+    step, length = median_step(own.time), FINER * len(errors)
     even = np.interp(own.time[0] + step * np.arange(len(errors)), own.time, errors)
     power = np.abs(np.fft.rfft(even - np.mean(even), length)) ** 2
     frequencies = np.fft.rfftfreq(length, step)
@@ -119,7 +119,7 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
         explained = linear.with_columns(columns)
         change = float(explained.coefficients[0])
         of_event = evidence.case.kind.finds_rest  # its phasors hold no ripple of the mains
-        rate = 1.0 / float(median(np.diff(own.time)))
+        rate = 1.0 / median_step(own.time)
         cycles = [mains / rate for mains in MAINS]
         folded = any(abs(each - round(each)) < FOLDED and each > 0.5 for each in cycles)
         folding = ", or aliased ripple of the mains," if folded else ""
@@ -209,7 +209,7 @@ def _likeliest_window(
 ) -> float | None:
     """Return the window (s) of the average that matches best, by linear theory."""
     time = record.setup.record.time
-    step = float(median(np.diff(time)))
+    step = median_step(time)
     found, costs = finds_instant(experiment), dict[float, float]()
     for window in sorted({step, *(window for window in WINDOWS if window > step)}):
         if not window < 0.1 * (time[-1] - time[0]):
