@@ -157,6 +157,10 @@ class Experiment:
         ]
         return simulator.with_inputs(tuple(steps), sum(shifts, start=delay))
 
+    def at(self, values: Values) -> tuple[Simulator, dict[str, float]]:
+        """Return the simulator with the inputs of the values, and the parameters of the system."""
+        return self.with_inputs(values), self.parameters(values)
+
     def direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""
         names = self.simulator.system.parameters
@@ -463,8 +467,8 @@ class ExperimentSetup:
 
     def response(self, values: Values) -> Response:
         """Return everything that the simulation gives, on the clock of the record."""
-        at = self.with_start_values(values)
-        return self.experiment.with_inputs(at).response(self.experiment.parameters(at))
+        simulator, parameters = self.experiment.at(self.with_start_values(values))
+        return simulator.response(parameters)
 
 
 def compared(channel: Channel, samples: Array) -> Array:

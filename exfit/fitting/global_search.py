@@ -7,7 +7,7 @@ noise and the validations.
 
 from collections.abc import Callable, Iterator, Sequence
 from math import nan
-from typing import Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,9 @@ from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIterati
 from exfit.fitting.descents import Announce, following, stopped
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS
+
+if TYPE_CHECKING:
+    from exfit.fitting.search import CaseSearches
 
 Way = Literal["strategy", "linear", "direct"]
 Doubt = Callable[[Result], str]  # what speaks against an end; "" where nothing does
@@ -54,26 +57,6 @@ class FurtherDescents(NamedTuple):
     minima: MultistartResult
     ways: tuple[Way, ...]
     why_direct: str
-
-
-class SearchMethods(Protocol):
-    """The searches of a case."""
-
-    @property
-    def unbounded(self) -> tuple[str, ...]:
-        """The parameters without finite bounds: there no starts can be distributed."""
-
-    def one(self, method: str, announce: Announce) -> Result:
-        """Descend from the start of the case."""
-
-    def further(self, earlier: Sequence[Result]) -> FurtherDescents:
-        """Find the minima from further starts, beside earlier descents."""
-
-    def refined(self, end: Result, announce: Announce) -> Result:
-        """Descend from an end with the full tolerances of the case."""
-
-    def margin(self, lowest: Result) -> float:
-        """Excess of a cost over the lowest up to which the records do not tell the two apart."""
 
 
 class SearchResult(NamedTuple):
@@ -128,14 +111,14 @@ class _Descents(NamedTuple):
 
 
 def local_search(
-    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
+    searches: "CaseSearches", methods: Sequence[str], judge: Judge, announce: Announce
 ) -> SearchResult:
     """Find the best point of the descents from the start of a case."""
     return _best_of(searches, _from_start(searches, methods, judge, announce))
 
 
 def global_search(
-    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
+    searches: "CaseSearches", methods: Sequence[str], judge: Judge, announce: Announce
 ) -> SearchResult:
     """Find the best point of the descents from the start of a case and from further starts.
 
@@ -181,7 +164,7 @@ def global_search(
 
 
 def continued(
-    searches: SearchMethods, found: SearchResult, point: Array, announce: Announce, phase: str
+    searches: "CaseSearches", found: SearchResult, point: Array, announce: Announce, phase: str
 ) -> SearchResult:
     """Return a search that goes on from a point (N,) with a lower cost than its best.
 
@@ -200,7 +183,7 @@ def continued(
 
 
 def judged_again(
-    searches: SearchMethods, found: SearchResult, judge: Judge, announce: Announce
+    searches: "CaseSearches", found: SearchResult, judge: Judge, announce: Announce
 ) -> SearchResult:
     """Return a search whose best minimum is a new one, or one like it if validations hold there."""
     ends = [] if found.minima is None else [local.result for local in found.minima.minima]
@@ -234,7 +217,7 @@ def taken_for_validation(times: float) -> str:
 
 
 def _from_start(
-    searches: SearchMethods, methods: Sequence[str], judge: Judge, announce: Announce
+    searches: "CaseSearches", methods: Sequence[str], judge: Judge, announce: Announce
 ) -> _Descents:
     """Descend by one method after the other, until one ends without doubt.
 
@@ -257,7 +240,7 @@ def _from_start(
     return _Descents(tuple(ends), tuple(doubts), best)
 
 
-def _best_of(searches: SearchMethods, descents: _Descents) -> SearchResult:
+def _best_of(searches: "CaseSearches", descents: _Descents) -> SearchResult:
     best, notes = descents.best, tuple[str, ...]()
     if best.stop is not Stop.INTERRUPTED:
         costs = [end.cost for end in descents.ends]
@@ -306,7 +289,7 @@ def _cost(end: Result) -> float:
     return end.cost
 
 
-def _chosen(searches: SearchMethods, judge: Judge, ends: Sequence[Result]) -> Result:
+def _chosen(searches: "CaseSearches", judge: Judge, ends: Sequence[Result]) -> Result:
     """Choose the lowest end, or one like it if the validations hold on that one alone."""
     lowest, *others = sorted(ends, key=_cost)
     if others and others[0].cost > lowest.cost and judge.refused(lowest):
@@ -316,7 +299,7 @@ def _chosen(searches: SearchMethods, judge: Judge, ends: Sequence[Result]) -> Re
     return lowest
 
 
-def _count_like(lowest: Result, costs: ArrayLike, searches: SearchMethods) -> int:
+def _count_like(lowest: Result, costs: ArrayLike, searches: "CaseSearches") -> int:
     """Count the costs that the records do not tell from the lowest of them."""
     return int(np.count_nonzero(np.asarray(costs) <= lowest.cost + searches.margin(lowest)))
 
@@ -344,7 +327,7 @@ def _notes(doubts: Sequence[str], like: int, costs: ArrayLike) -> Iterator[str]:
 
 
 def _refined(
-    searches: SearchMethods,
+    searches: "CaseSearches",
     history: Sequence[SolverIteration],
     end: Result,
     announce: Announce,

@@ -17,6 +17,7 @@ from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.noise import noise_of
+from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.parameters import FreeParameter, Prior, units_of
 from exfit.simulation.substeps import NO_SUBSTEPS
 from exfit.util.arrays import Array
@@ -90,6 +91,11 @@ class Residuals:
     def samples(self) -> int:
         """Number of samples that are compared: as many, unless they are compressed."""
         return sum(channel.samples for channel in self.channels)
+
+    @property
+    def of_records(self) -> dict[str, Nuisance]:
+        """What is found about the records, by name."""
+        return {own.name: own for each in self.experiments for own in each.nuisances}
 
     @property
     def start(self) -> Array:

@@ -20,9 +20,7 @@ from exfit.fitting.global_search import (
     FurtherDescents,
     Judge,
     SearchResult,
-    continued,
     global_search,
-    judged_again,
     local_search,
     no_doubt,
 )
@@ -44,10 +42,10 @@ CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
 ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
 JACOBIANS: Mapping[str, Callable[[Residuals, Array], Array]] = {
-    "exact": lambda residuals, theta: residuals.exact(theta),
-    "central": lambda residuals, theta: residuals.central(theta),
-    "forward": lambda residuals, theta: residuals.forward(theta),
-    "backward": lambda residuals, theta: residuals.backward(theta),
+    "exact": Residuals.exact,
+    "central": Residuals.central,
+    "forward": Residuals.forward,
+    "backward": Residuals.backward,
 }
 
 
@@ -128,25 +126,6 @@ def search(
         return search_of(searches, METHODS_OF_AUTO, judge, announce)
     judge = (judge or NO_JUDGE)._replace(doubt=no_doubt)
     return search_of(searches, (method,), judge, announce)
-
-
-def continued_from(
-    point: Array,
-    found: SearchResult,
-    problem: FitProblem,
-    announce: Announce,
-    counter: SimulationCounter,
-    options: Estimate,
-    phase: str,
-    judge: Judge | None,
-) -> SearchResult:
-    """Return a search that goes on from a point (N,) with a lower cost than its best.
-
-    With a ``judge`` its end is the result only if validations do not hold on another like it alone.
-    """
-    searches = CaseSearches(problem, options, lambda _: None, counter)
-    found = continued(searches, found, point, announce, phase)
-    return found if judge is None else judged_again(searches, found, judge, announce)
 
 
 @dataclass(frozen=True)

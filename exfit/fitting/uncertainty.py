@@ -18,6 +18,8 @@ from exfit.inference.confidence import (
     CORRELATED,
     TIED,
     Confidence,
+    Uncertainty,
+    closed,
     confidence,
     partners_on_bounds,
     rises,
@@ -89,6 +91,10 @@ class UncertaintyAnalysis:
     def variance_given(self, name: str) -> float:
         """Variance of a parameter by the errors of given values."""
         return sum(error.shifts[name] ** 2 for error in self.given_errors.values())
+
+    def with_parameters(self, parameters: Mapping[str, Uncertainty]) -> "UncertaintyAnalysis":
+        """Return it with what is known of each parameter in place of its own."""
+        return replace(self, confidence=replace(self.confidence, parameters=parameters))
 
     def without_intervals(self, why: str) -> "UncertaintyAnalysis":
         """Return it without what noise would say of the parameters, for a reason.
@@ -162,9 +168,8 @@ def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> 
     within = {**intervals.parameters}
     for parameter in problem.residuals.free:  # no interval beyond the bounds of its parameter
         own = within[parameter.name]
-        low, high = own.interval or (None, None)
-        if low is not None and high is not None:
-            cut = max(low, parameter.low), min(high, parameter.high)
+        if closed(own.interval):
+            cut = max(own.interval[0], parameter.low), min(own.interval[1], parameter.high)
             within[parameter.name] = own._replace(interval=cut)
     intervals = replace(intervals, parameters=within)
     return UncertaintyAnalysis(

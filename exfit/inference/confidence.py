@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import exp, inf, isfinite
 from statistics import NormalDist
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Uncertainty(NamedTuple):
         return closed(self.interval)
 
 
-def closed(interval: Interval | None) -> bool:
+def closed(interval: Interval | None) -> TypeGuard[tuple[float, float]]:
     """Test whether there is an interval with limits on both sides."""
     return interval is not None and None not in interval
 

@@ -76,7 +76,7 @@ def compare_with_record(
         time=setup.record.time,
         overlays=overlays,
         played=_played(setup, overlays, samples) if setup.driving else None,
-        limiters=limiter_actions(setup.experiment.with_inputs(at), setup.experiment.parameters(at)),
+        limiters=limiter_actions(*setup.experiment.at(at)),
     )
 
 

@@ -57,7 +57,7 @@ def notes(
     yield from search_range_notes(case)
     yield from unphysical_notes(case, values)
     for experiment, comparison in zip(residuals.experiments, compared, strict=True):
-        simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        simulator, at = experiment.at(values)
         yield from unstable_rest_notes(simulator, at)
         vt = comparison.overlays.get("vt")
         yield from voltage_notes(case, comparison.time, None if vt is None else vt.simulated)

@@ -16,6 +16,7 @@ from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.nuisances import OPENING, prefix_from
 from exfit.fitting.program import Program
 from exfit.fitting.system import driving_after_opening
+from exfit.inference.confidence import closed
 from exfit.plants import NETWORK, REFERENCES
 from exfit.plants.parts import initial
 from exfit.records.reading import file_hash
@@ -260,9 +261,8 @@ def identified_values(
     }
     for name, parameter in parameters.items():
         if parameter.of_record:
-            low, high = parameter.interval or (None, None)
-            half = None if low is None or high is None else 0.5 * (high - low)
-            found[name] = (parameter.value, half)
+            own = parameter.interval
+            found[name] = (parameter.value, 0.5 * (own[1] - own[0]) if closed(own) else None)
     return found
 
 

@@ -22,12 +22,12 @@ from exfit.fitting.channel_weights import (
 )
 from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.global_search import Judge, SearchResult
+from exfit.fitting.global_search import Judge, SearchResult, continued, judged_again
 from exfit.fitting.noise import LEAST_NOISE, noise_of
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
-from exfit.fitting.search import continued_from, names_of_records, search
+from exfit.fitting.search import CaseSearches, names_of_records, search
 from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.inference.noise import LEAST_P, SURPRISING, whiteness
 from exfit.registry import parts
@@ -111,9 +111,13 @@ class SearchState:
         phase: str = FROM_FURTHER_STARTS,
         judge: Judge | None = None,
     ) -> SearchResult:
-        """Search on from a point (N,) with a lower cost than the best one found."""
-        rest = self.on_line, self.counter, self.options, phase, judge
-        return continued_from(point, found, problem, *rest)
+        """Search on from a point (N,) with a lower cost than the best one found.
+
+        With a ``judge`` its end is the result only if validations do not hold on another alone.
+        """
+        searches = CaseSearches(problem, self.options, _ignore, self.counter)
+        found = continued(searches, found, point, self.on_line, phase)
+        return found if judge is None else judged_again(searches, found, judge, self.on_line)
 
 
 Stage = Callable[[SearchState], SearchState]

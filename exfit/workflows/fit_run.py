@@ -323,12 +323,9 @@ def _parameters(
     ``why`` is the reason where there is no ``uncertainty``.
     """
     rows, fitted = case.rows(), dict[str, FittedParameter]()
-    of_records = {
-        nuisance.name: (nuisance.unit, nuisance.meaning)
-        for experiment in residuals.experiments
-        for nuisance in experiment.nuisances
-    }
-    described = of_records | {name: (row.unit, row.meaning) for name, row in rows.items()}
+    of_records = residuals.of_records
+    described = {name: (own.unit, own.meaning) for name, own in of_records.items()}
+    described |= {name: (row.unit, row.meaning) for name, row in rows.items()}
     for parameter in residuals.free:
         name, value = parameter.name, values[parameter.name]
         unit, meaning = described.get(name, ("", MEANINGS.get(name, "used by ties")))

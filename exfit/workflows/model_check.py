@@ -78,7 +78,7 @@ def check(case: Case, program: Program | None = None) -> Check:
     fixed = {name: value for name, value in values.items() if name not in names}
     drift, error, substeps, of_rest = 0.0, 0.0, 1, list[str]()
     for experiment in experiments:
-        simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        simulator, at = experiment.at(values)
         of_rest += unstable_rest_notes(simulator, at)
         signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))

@@ -261,11 +261,7 @@ def _profile(
     first, *others = profiles
     parameter = residuals.free[first.index]
     low, high = (None if isinf(limit) else parameter.value(limit) for limit in limits_of(profiles))
-    units = {
-        nuisance.name: nuisance.unit
-        for experiment in residuals.experiments
-        for nuisance in experiment.nuisances
-    }
+    units = {name: own.unit for name, own in residuals.of_records.items()} | case.units()
 
     def branch(profile: estimate.CostProfile) -> Branch:
         return Branch(np.array([parameter.value(float(x)) for x in profile.at]), profile.costs)
@@ -277,7 +273,7 @@ def _profile(
         ends = (verdict.no_interval, verdict.no_interval)
     return Profile(
         name=parameter.name,
-        unit={**units, **case.units()}.get(parameter.name, ""),
+        unit=units.get(parameter.name, ""),
         value=parameter.value(float(first.x[first.index])),
         at=branch(first).at,
         costs=first.costs,

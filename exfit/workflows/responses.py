@@ -239,7 +239,7 @@ def behaviour_of(
     flat_runs, alike = list[FlatRun](), dict[object, list[TestWithValues]]()
     for setup, values in tests:
         experiment = setup.experiment
-        simulator, parameters = experiment.with_inputs(values), experiment.parameters(values)
+        simulator, parameters = experiment.at(values)
         try:
             drift = flat_drift(simulator, parameters, experiment.signals)
         except SimulationError:
@@ -249,9 +249,8 @@ def behaviour_of(
         alike.setdefault(key, []).append((setup, values))
     limits = []
     for setup, values in (*tests, *others):
-        at = setup.with_start_values(values)
-        simulator, parameters = setup.experiment.with_inputs(at), setup.experiment.parameters(at)
-        limits.append(HitLimits(setup.name, limits_hit(simulator, parameters)))
+        hits = limits_hit(*setup.experiment.at(setup.with_start_values(values)))
+        limits.append(HitLimits(setup.name, hits))
     return Behaviour(tuple(flat_runs), tuple(map(_small_signal, alike.values())), tuple(limits))
 
 

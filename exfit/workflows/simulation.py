@@ -33,7 +33,7 @@ def simulate(
         if program is not None:
             (setup,) = program.simulated([setup])
         values = setup.with_start_values(values)
-        simulator, at = setup.experiment.with_inputs(values), setup.experiment.parameters(values)
+        simulator, at = setup.experiment.at(values)
         response = simulator.response(at)
         before = setup.record.notes
         if setup.channels:

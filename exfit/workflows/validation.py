@@ -172,7 +172,7 @@ def _validated(
     if setup.name == SINGLE:  # fit is no name for what was not fitted
         setup = replace(setup, experiment=replace(setup.experiment, name=LONE_RECORD))
     comparison = validation_of(case, fitted, setup, values)
-    simulator, at = setup.experiment.with_inputs(values), setup.experiment.parameters(values)
+    simulator, at = setup.experiment.at(values)
     simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
     notes = (
         *comparison.notes,

@@ -59,7 +59,6 @@ def recorder_averages(
     numbers = [*_unstated(case, residuals)]
     if not numbers or sum(residuals.sizes) > MOST_SAMPLES:
         return None
-    of_records = {nuisance.name for each in residuals.experiments for nuisance in each.nuisances}
     found = []
     try:
         errors, slopes = residuals.errors(theta)
@@ -71,7 +70,7 @@ def recorder_averages(
             beyond = [
                 name
                 for name, own in uncertainty.confidence.parameters.items()
-                if name not in of_records and _is_beyond(values[name], own.interval)
+                if name not in residuals.of_records and _is_beyond(values[name], own.interval)
             ]
             found.append(
                 RecorderAverages(
@@ -197,4 +196,4 @@ def allowing_for_averages(
             low, high = own.interval
             interval = moved(free, low, min(shift, 0.0)), moved(free, high, max(shift, 0.0))
             parameters[free.name] = own._replace(interval=interval, method="averages")
-    return replace(uncertainty, confidence=replace(uncertainty.confidence, parameters=parameters))
+    return uncertainty.with_parameters(parameters)

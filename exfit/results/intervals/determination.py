@@ -169,7 +169,7 @@ def without_linear_intervals(
     for name in names:
         if parameters[name].interval is not None:
             parameters[name] = parameters[name]._replace(interval=None, why=why)
-    return without_limits_of_others(with_parameters(uncertainty, parameters))
+    return without_limits_of_others(uncertainty.with_parameters(parameters))
 
 
 def without_limits_of_others(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
@@ -186,14 +186,7 @@ def without_limits_of_others(uncertainty: UncertaintyAnalysis) -> UncertaintyAna
         parameters[name] = parameters[name]._replace(interval=None, why=why)
     for name, why in uncertainty.by_few_samples.items():
         parameters[name] = parameters[name]._replace(interval=None, why=why)
-    return with_parameters(uncertainty, parameters)
-
-
-def with_parameters(
-    uncertainty: UncertaintyAnalysis, parameters: Mapping[str, Uncertainty]
-) -> UncertaintyAnalysis:
-    """Return the uncertainty with what is known of each parameter in place of its own."""
-    return replace(uncertainty, confidence=replace(uncertainty.confidence, parameters=parameters))
+    return uncertainty.with_parameters(parameters)
 
 
 def with_intervals(
@@ -222,7 +215,7 @@ def with_intervals(
                 parameter.high if high is None else high,
             )
     known = uncertainty.identifiability.within(within)
-    return with_parameters(replace(uncertainty, identifiability=known), parameters)
+    return replace(uncertainty, identifiability=known).with_parameters(parameters)
 
 
 def of_profiles(

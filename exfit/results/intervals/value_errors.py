@@ -15,9 +15,9 @@ from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import typical_values_used
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation, slopes_of
-from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
+from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty, closed
 from exfit.results.influences import DEVIATION, TypicalValue
-from exfit.results.intervals.determination import with_parameters, without_linear_intervals
+from exfit.results.intervals.determination import without_linear_intervals
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
@@ -86,8 +86,7 @@ def allowing_for(
         own, name = uncertainty.confidence.parameters[parameter.name], parameter.name
         shift = hypot(*(error.shifts[name] for error in given.values()))
         widened[name] = widened_by(shift, own, parameter, float(x), float(size), [*given])
-    together = replace(uncertainty, given_errors=given)
-    return with_parameters(together, widened)
+    return replace(uncertainty, given_errors=given).with_parameters(widened)
 
 
 def allowing_for_bias(
@@ -112,7 +111,7 @@ def allowing_for_bias(
         widened[parameter.name] = widened_by(
             shift, own, parameter, float(x), float(size), ["the noise of the driving signals"]
         )
-    return with_parameters(uncertainty, widened)
+    return uncertainty.with_parameters(widened)
 
 
 def given_error_notes(
@@ -249,7 +248,14 @@ def influence_of_typical_values(
     by_value = shifts_by_values(residuals, theta, deviations)
     if by_value is None:
         return {}
-    half_widths = _half_widths(residuals, uncertainty)
+    half_widths = {}
+    for symbol, own in uncertainty.confidence.parameters.items():
+        if symbol in residuals.of_records:
+            continue
+        if closed(own.interval):
+            half_widths[symbol] = 0.5 * (own.interval[1] - own.interval[0])
+        elif own.std_error is not None:
+            half_widths[symbol] = IN_STANDARD_ERRORS * own.std_error
     influence = {}
     for (name, value), column in zip(typical.items(), by_value.T, strict=True):
         moved = zip(residuals.free, column.tolist(), strict=True)
@@ -262,18 +268,3 @@ def influence_of_typical_values(
         largest_first = dict(sorted(shares.items(), key=lambda each: -each[1]))
         influence[name] = TypicalValue(value, shifts, largest_first)
     return influence
-
-
-def _half_widths(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> dict[str, float]:
-    """Return half the width of the interval of each parameter of the unit, where it is known."""
-    of_records = {nuisance.name for each in residuals.experiments for nuisance in each.nuisances}
-    half_widths = {}
-    for name, own in uncertainty.confidence.parameters.items():
-        low, high = own.interval or (None, None)
-        if name in of_records:
-            continue
-        if low is not None and high is not None:
-            half_widths[name] = 0.5 * (high - low)
-        elif own.std_error is not None:
-            half_widths[name] = IN_STANDARD_ERRORS * own.std_error
-    return half_widths

@@ -24,7 +24,7 @@ from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.noise import propagated_noise
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty
+from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty, closed
 from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
 from exfit.records.record import Record, read_only
@@ -74,9 +74,9 @@ def spread_over_windows(
     steps = [each for each in estimates if each.kind == "step"]
     if len(steps) < FEWEST_STEPS:
         return None
-    low, high = uncertainty.confidence.parameters[TPD0].interval or (None, None)
-    interval = None if low is None or high is None else (low, high)
-    ends = [each.value for each in estimates] + [*(interval or ())]
+    own = uncertainty.confidence.parameters[TPD0].interval
+    interval = own if closed(own) else None
+    ends = [*(each.value for each in estimates), *(interval or ())]
     for each in steps:
         ends += [each.value - NORMAL * each.std_error, each.value + NORMAL * each.std_error]
     # halves are tested apart from the windows that they are parts of: the smaller counts twice
@@ -114,8 +114,7 @@ def with_spread(
         return uncertainty
     parameters = uncertainty.confidence.parameters
     own: Uncertainty = parameters[spread.name]._replace(interval=spread.hull, method="windows")
-    together = replace(uncertainty.confidence, parameters={**parameters, spread.name: own})
-    return replace(uncertainty, confidence=together)
+    return uncertainty.with_parameters({**parameters, spread.name: own})
 
 
 def windows_of(setup: ExperimentSetup) -> Iterator[Window]:

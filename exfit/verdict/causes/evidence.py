@@ -190,11 +190,7 @@ class Evidence:
     @property
     def own(self) -> tuple[str, ...]:
         """The free parameters of the unit, without what belongs to a record."""
-        of_records = {
-            nuisance.name
-            for experiment in self.residuals.experiments
-            for nuisance in experiment.nuisances
-        }
+        of_records = self.residuals.of_records
         return tuple(free.name for free in self.residuals.free if free.name not in of_records)
 
     @property

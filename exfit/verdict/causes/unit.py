@@ -146,7 +146,7 @@ def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:
     for _, record, experiment in evidence.tests:
         at = record.setup.with_start_values(evidence.values)
         try:
-            reached = extremes(experiment.with_inputs(at), experiment.parameters(at))
+            reached = extremes(*experiment.at(at))
         except SimulationError:
             continue
         farthest: dict[str, Extreme] = {}
