@@ -5,7 +5,6 @@ Each says where the answer is found and proposes one; a wrong answer is explaine
 
 from math import sqrt
 from pathlib import Path
-from typing import Any
 
 from exfit.case.case_draft import OpenValue
 from exfit.case.yaml import QUESTION
@@ -29,14 +28,12 @@ from exfit.features.start.record_files import records_among
 from exfit.features.start.starting_tests import doubtful_bases, refuse_other_size
 from exfit.features.start.unit_questions import (
     ask_data,
-    ask_machine_model,
-    ask_model,
-    ask_planner,
+    ask_models,
 )
 from exfit.output.inspections import in_words
 from exfit.records.channel_names import connection_of
 from exfit.records.inspection import Inspection
-from exfit.records.recorded_tests import tests_of, unique_names
+from exfit.records.recorded_tests import DetectedTest, tests_of, unique_names
 from exfit.records.units import scale_between
 from exfit.signals import SIGNALS
 from exfit.util.text import dotted
@@ -84,13 +81,7 @@ def converse(given: Given, read: Inspections, introduced: bool, names_case: bool
         _summary(talk.inspection)
     _confirm_voltage(talk)
     _fill_in(talk, of_unit=False)
-    if not {"dyr", "model"} & given.keys():
-        ask_planner(talk)
-    if not {"dyr", "model"} & given.keys():
-        given["model"] = ask_model()
-    known = {"dyr", "machine_model", "machine_from", "machine"} & given.keys()
-    if not known and talk.case().draft.kind_of_plant != "none":
-        given["machine_model"] = ask_machine_model()
+    ask_models(talk)
     ask_data(talk)
     _fill_in(talk, of_unit=True)
     if "validate" not in given and "tests" not in given:
@@ -253,37 +244,49 @@ def _sizes(talk: Conversation) -> float | dict[str, float]:
     changes = [test.changes[0] for _, test in found]
     proposals = {_rounded(abs(change)) for change in changes if change}
     alike = len(proposals) == 1 and None not in changes
+    if alike:
+        which = f"of the {len(found)} steps" if len(found) > 1 else "of the step"
+        return _size(talk, which, ALL_TESTS, {}, *found[0])
     sizes: dict[str, float] = {}
     for name, (record, test) in zip(names, found, strict=True):
-        change = test.changes[0]
-        key = ALL_TESTS if alike else name
-
-        def read(text: str, key: str = key) -> float:
-            talk.case(step={**sizes, key: number(text)})
-            return number(text)
-
-        def doubt(value: float, record: Any = record, test: Any = test) -> str:
-            try:
-                refuse_other_size(record, test, value)
-            except ExfitError:
-                share = 100.0 * test.changes[0]
-                return f"The voltage changes by {share:+.2g} % there, a step of {value:g} pu not"
-            return ""
-
-        moves = "" if change is None else f"; the voltage changes by {100.0 * change:+.3g} %"
-        which = f"of the {len(found)} steps" if alike and len(found) > 1 else f"of the step {name}"
-        sizes[key] = ask(
-            f"Size {'of the step' if len(found) == 1 else which}, pu",
-            read,
-            f"Test log: as it was keyed in at the regulator{moves}.",
-            "" if change is None else f"{_rounded(abs(change)):g}",
-            "The change of the voltage reference: 5 % are 0.05 pu. The voltage changes by a "
-            "little less. Its sign is that of the record, unless you give a minus.",
-            doubt,
-        )
-        if alike:
-            return sizes[key]
+        sizes[name] = _size(talk, f"of the step {name}", name, sizes, record, test)
     return sizes
+
+
+def _size(
+    talk: Conversation,
+    which: str,
+    key: str,
+    others: dict[str, float],
+    record: Inspection,
+    test: DetectedTest,
+) -> float:
+    """Ask for the size of the steps that a key names, beside those of others."""
+
+    def read(text: str) -> float:
+        talk.case(step={**others, key: number(text)})
+        return number(text)
+
+    change = test.changes[0]
+
+    def doubt(value: float) -> str:
+        try:
+            refuse_other_size(record, test, value)
+        except ExfitError:
+            share = 100.0 * (change or 0.0)
+            return f"The voltage changes by {share:+.2g} % there, a step of {value:g} pu not"
+        return ""
+
+    moves = "" if change is None else f"; the voltage changes by {100.0 * change:+.3g} %"
+    return ask(
+        f"Size {which}, pu",
+        read,
+        f"Test log: as it was keyed in at the regulator{moves}.",
+        "" if change is None else f"{_rounded(abs(change)):g}",
+        "The change of the voltage reference: 5 % are 0.05 pu. The voltage changes by a "
+        "little less. Its sign is that of the record, unless you give a minus.",
+        doubt,
+    )
 
 
 def _rounded(change: float) -> float:

@@ -62,7 +62,21 @@ def starting_tests(
     if without:
         text = "shows no step; a table of tests can say where it is"
         raise FileError(f"{path}: {text}" for path in without)
-    recorded = [(inspection, test) for inspection in every for test in tests_of(inspection)]
+    return _bump_tests(inspections, validating, sizes, given)
+
+
+def _bump_tests(
+    inspections: Sequence[Inspection],
+    validating: Sequence[Inspection],
+    sizes: Sequence[str],
+    given: Mapping[str, Base],
+) -> tuple[StartingTest, ...]:
+    """Return the tests of records that all show steps."""
+    recorded = [
+        (inspection, test)
+        for inspection in (*inspections, *validating)
+        for test in tests_of(inspection)
+    ]
     fitted = sum(len(tests_of(inspection)) for inspection in inspections)
     amounts = zip(recorded, _amounts(recorded, sizes), strict=True)
     made = [

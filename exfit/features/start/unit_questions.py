@@ -40,7 +40,19 @@ OTHERS = "others"  # stands for the values of an exciter that are not asked one 
 OF_DATA_SHEET = [word for word in SOURCES if word not in (TYPICAL, FITTED)]
 
 
-def ask_planner(talk: Conversation) -> None:
+def ask_models(talk: Conversation) -> None:
+    """Ask for a planner's file, or else for the models of exciter and generator."""
+    given = talk.given
+    if not {"dyr", "model"} & given.keys():
+        _ask_planner(talk)
+    if not {"dyr", "model"} & given.keys():
+        given["model"] = _ask_model()
+    known = {"dyr", "machine_model", "machine_from", "machine"} & given.keys()
+    if not known and talk.case().draft.kind_of_plant != "none":
+        given["machine_model"] = _ask_machine_model()
+
+
+def _ask_planner(talk: Conversation) -> None:
     """Ask for a planner's file and, of several units, for the bus and the id."""
     files = sorted(str(p) for p in Path().iterdir() if p.suffix.lower() in DYNAMICS_FILES)
     given = talk.given
@@ -77,7 +89,7 @@ def ask_planner(talk: Conversation) -> None:
     given.update(dyr=file, bus=unit.bus, id=unit.id)
 
 
-def ask_model() -> str:
+def _ask_model() -> str:
     """Ask for the type of the exciter, then for a model of that type; any name is taken."""
 
     def by_name(text: str) -> str:
@@ -111,7 +123,7 @@ def ask_model() -> str:
     )
 
 
-def ask_machine_model() -> str:
+def _ask_machine_model() -> str:
     """Ask for the model of the generator by its rotor."""
 
     def read(text: str) -> str:
@@ -132,12 +144,7 @@ def ask_data(talk: Conversation) -> None:
     given = talk.given
     for key, title in TITLES.items():
         if key not in given:
-            rows = typical_values(talk.case())[key]
-            if key == "exciter":  # one by one only its limits
-                rows = [row for row in rows if "MAX" in row.symbol or "MIN" in row.symbol]
-                rows = [row for row in rows if abs(row.typical) < NO_LIMIT]
-            others = [OTHERS] if key == "exciter" and rows else []
-            given[key] = dict.fromkeys([*(row.symbol for row in rows), *others], QUESTION)
+            given[key] = dict.fromkeys(_asked_names(talk, key), QUESTION)
         if QUESTION in given[key].values():
             _group(talk, key, title)
     if (given["machine"] or given["exciter"]) and "sources" not in given:
@@ -149,6 +156,15 @@ def ask_data(talk: Conversation) -> None:
             "maker: the data sheet. If values have several sources, enter that of most, and "
             "change the others in the case, under sources.",
         )
+
+
+def _asked_names(talk: Conversation, key: str) -> list[str]:
+    """Name the values of a part that are asked; of the exciter its limits, then all others."""
+    rows = typical_values(talk.case())[key]
+    if key == "machine" or not rows:
+        return [row.symbol for row in rows]
+    limits = [row for row in rows if "MAX" in row.symbol or "MIN" in row.symbol]
+    return [*(row.symbol for row in limits if abs(row.typical) < NO_LIMIT), OTHERS]
 
 
 def _group(talk: Conversation, key: str, title: str) -> None:
@@ -165,9 +181,9 @@ def _group(talk: Conversation, key: str, title: str) -> None:
             values[symbol] = _value(rows[symbol], part.values[symbol], typed.get(symbol))
         typed = {symbol: value for symbol, value in values.items() if value not in (None, QUESTION)}
         of_part = part.model.faults if key == "machine" else _limit_faults
-        for symbol, text in of_part({**part.values, **typed}):
-            say(f"{symbol}: {text}")
-            named = [name for name in values if name in re.findall(r"\w+", f"{symbol} {text}")]
+        for fault in of_part({**part.values, **typed}):
+            say(": ".join(fault))
+            named = values.keys() & re.findall(r"\w+", " ".join(fault))
             values |= dict.fromkeys(named, QUESTION)
     for symbol in [symbol for symbol, value in values.items() if value is None]:
         del values[symbol]
