@@ -443,7 +443,7 @@ def test_only_what_is_smooth_may_change_its_instant():
         (exact,),
     )
     for steps in wrong:
-        with pytest.raises(ValueError, match="instants of smooth ones"):
+        with pytest.raises(ValueError, match="times of smooth ones"):
             simulator.with_inputs(steps, 0.0)
     values, moving = lively_values("AC1A"), Direction(steps={0: (1.0, 0.0)})
     with pytest.raises(ValueError, match=r"the step of vref at 0\.5 s is not smooth"):
