@@ -1,9 +1,9 @@
 """The files of a fit: its tables, its parameters, and result.json, which is read back, too."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from exfit.errors import ExfitError
 from exfit.fitting.nuisances import prefix_from
@@ -34,6 +34,7 @@ from exfit.util.typed import plain
 if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult
 
+Form = TypeVar("Form")
 VERSION = 10  # of the files; others are refused
 
 
@@ -81,17 +82,9 @@ def load_validation(source: Path) -> "ValidationResult":
     """
     from exfit.results.consistency import validation_contradictions
     from exfit.results.validation_result import ValidationResult
-    from exfit.util.typed_reading import FormError, read
 
     content = read_json(source)
-    _refuse_other_version(source, content, "validate again")
-    try:
-        result: ValidationResult = read(ValidationResult, content)
-    except FormError as fault:
-        raise ExfitError(f"{source}: {fault}; validate again") from None
-    for text in validation_contradictions(result):
-        raise ExfitError(f"{source}: {text}; validate again")
-    return result
+    return _read(source, content, ValidationResult, validation_contradictions, "validate again")
 
 
 def load_result(path: str | PathLike[str]) -> FitResult:
@@ -101,7 +94,6 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     fit: with the place in it, and what is wrong there.
     """
     from exfit.results.consistency import contradictions
-    from exfit.util.typed_reading import FormError, read
 
     source = result_file(Path(path))
     if not source.exists() and source.with_name(VALIDATION).is_file():
@@ -109,17 +101,19 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     content = read_json(source)
     if not {"model", "parameters", "fixed"} <= content.keys():
         raise ExfitError(f"{source}: not the result of a fit: model, parameters or fixed missing")
-    _refuse_other_version(source, content, "fit again")
-    try:
-        result: FitResult = read(FitResult, content)
-    except FormError as fault:
-        raise ExfitError(f"{source}: {fault}; fit again") from None
-    for text in contradictions(result):
-        raise ExfitError(f"{source}: {text}; fit again")
-    return result
+    return _read(source, content, FitResult, contradictions, "fit again")
 
 
-def _refuse_other_version(source: Path, content: Mapping[str, Any], remedy: str) -> None:
+def _read(
+    source: Path,
+    content: Mapping[str, Any],
+    form: type[Form],
+    contradictions: Callable[[Form], Iterator[str]],
+    remedy: str,
+) -> Form:
+    """Read a result of this version without contradictions; a remedy ends what is wrong."""
+    from exfit.util.typed_reading import FormError, read
+
     version = content.get("version", 1)  # the first version had none
     shown = f"{source}: version: {show_value(version)}"
     if isinstance(version, bool) or not isinstance(version, int) or version < 1:
@@ -128,6 +122,13 @@ def _refuse_other_version(source: Path, content: Mapping[str, Any], remedy: str)
         raise ExfitError(f"{shown}: written by a later exfit; this one reads {VERSION}")
     if version < VERSION:
         raise ExfitError(f"{shown}: of an earlier exfit; this one reads {VERSION}: {remedy}")
+    try:
+        result: Form = read(form, content)
+    except FormError as fault:
+        raise ExfitError(f"{source}: {fault}; {remedy}") from None
+    for text in contradictions(result):
+        raise ExfitError(f"{source}: {text}; {remedy}")
+    return result
 
 
 def result_file(path: Path) -> Path:

@@ -1,12 +1,10 @@
 """Results of fits beside each other: how each ended, and their parameters."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from exfit.results.model import FitResult
-from exfit.results.tables import DIGITS
+from exfit.results.tables import csv_text, number_text
 from exfit.util.text import rounded_value
 
 INTERRUPTED, NOT_ACCEPTED = "interrupted", "not accepted"  # beside the verdicts
@@ -80,7 +78,7 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
     validations = dict.fromkeys(match.name for fit in fits for match in fit.validation)
     rows = []
     for k, (run, (case, fit)) in enumerate(results.items()):
-        errors = {match.name: _number(match.rmse) for match in fit.validation}
+        errors = {match.name: number_text(match.rmse) for match in fit.validation}
         known = {name: value for name, each in parameters.items() if (value := each[k]) is not None}
         on_bounds = [name for name, value in known.items() if value.at_bound]
         unresolved = [name for name, value in known.items() if not value.resolved]
@@ -92,10 +90,10 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
                 "strategy": fit.strategy,
                 "outcome": outcome_of(fit),
                 "explanation": explanation_of(fit),
-                "f_start": _number(fit.start_cost),
-                "f": _number(fit.cost),
-                "rmse": _number(fit.rmse),
-                "fit_percent": _number(fit.comparison.fit_percent),
+                "f_start": number_text(fit.start_cost),
+                "f": number_text(fit.cost),
+                "rmse": number_text(fit.rmse),
+                "fit_percent": number_text(fit.comparison.fit_percent),
                 "iterations": f"{fit.nit}",
                 "nfev": f"{fit.nfev}",
                 "njev": f"{fit.njev}",
@@ -103,17 +101,9 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
                 "seconds": f"{fit.seconds:.3f}",
                 **{f"rmse {name}": errors.get(name, "") for name in validations},
                 **dict.fromkeys(parameters, ""),
-                **{name: _number(value.value) for name, value in known.items()},
+                **{name: number_text(value.value) for name, value in known.items()},
                 "at_bound": " ".join(on_bounds),
                 "unresolved": " ".join(unresolved),
             }
         )
-    out = io.StringIO()
-    writer = csv.DictWriter(out, rows[0] if rows else (), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()
-
-
-def _number(value: float) -> str:
-    return f"{value:.{DIGITS}g}"
+    return csv_text([*rows[:1], *(row.values() for row in rows)])

@@ -95,11 +95,11 @@ def history_table(result: "FitResult") -> str:
         [
             line.number,
             line.phase,
-            *map(_digits, (line.cost, line.gradient_norm, line.step_norm, line.damping)),
+            *map(number_text, (line.cost, line.gradient_norm, line.step_norm, line.damping)),
             *(line.inner, line.nfev, line.njev, f"{line.quality:.4g}"),
             yes_or_no(line.capped),
             line.trials,
-            *(_digits(line.values[name]) for name in result.parameters),
+            *(number_text(line.values[name]) for name in result.parameters),
         ]
         for line in result.history
     ]
@@ -116,7 +116,7 @@ def effects_table(effects: "Sequence[ParameterEffect]") -> str:
     labels = [*effects[0].rms] if effects else []
     columns = [f"{label.replace(' ', '_')}_rms" for label in labels]
     rows = [
-        [each.parameter, *map(_digits, (*each.rms.values(), each.of_noise)), each.percent_of]
+        [each.parameter, *map(number_text, (*each.rms.values(), each.of_noise)), each.percent_of]
         for each in effects
     ]
     return csv_text([["parameter", *columns, "of_noise", "percent_of"], *rows])
@@ -129,7 +129,8 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
     return out.getvalue()
 
 
-def _digits(value: float) -> str:
+def number_text(value: float) -> str:
+    """Write a number in a table."""
     return f"{value:.{DIGITS}g}"
 
 

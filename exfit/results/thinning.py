@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from exfit.dsp.sampling import kept_rows
 from exfit.fitting.uncertainty import Sensitivity
 from exfit.results.comparisons import (
+    AsFound,
     Comparison,
     IterationResponses,
     LeftOut,
@@ -38,20 +39,15 @@ MOST_RESPONSES = 12  # of iterations in one figure that can be distinguished
 
 def thinned(result: FitResult) -> FitResult:
     """Return a fit with its samples as a file holds them."""
-    count = len(result.history)
-
-    def each(comparisons: Iterable[Comparison]) -> tuple[Comparison, ...]:
-        return tuple(_comparison(match, count) for match in comparisons)
-
-    found, known = result.as_found, result.knowledge
+    count, known = len(result.history), result.knowledge
     return replace(
         result,
-        comparisons=each(result.comparisons),
-        validation=each(result.validation),
+        comparisons=_each(result.comparisons, count),
+        validation=_each(result.validation, count),
         phase_ends=tuple(
-            replace(end, comparisons=each(end.comparisons)) for end in result.phase_ends
+            replace(end, comparisons=_each(end.comparisons, count)) for end in result.phase_ends
         ),
-        as_found=found and replace(found, comparisons=each(found.comparisons)),
+        as_found=_as_found(result.as_found, count),
         knowledge=known and replace(known, sensitivity=tuple(map(_sensitivity, known.sensitivity))),
         behaviour=_behaviour(result.behaviour),
     )
@@ -59,17 +55,20 @@ def thinned(result: FitResult) -> FitResult:
 
 def thinned_validation(result: "ValidationResult") -> "ValidationResult":
     """Return a validation with its samples as a file holds them."""
-
-    def each(comparisons: Iterable[Comparison]) -> tuple[Comparison, ...]:
-        return tuple(_comparison(match, 0) for match in comparisons)
-
-    found = result.as_found
     return replace(
         result,
-        matches=each(result.matches),
-        as_found=found and replace(found, comparisons=each(found.comparisons)),
+        matches=_each(result.matches),
+        as_found=_as_found(result.as_found),
         behaviour=_behaviour(result.behaviour),
     )
+
+
+def _each(comparisons: Iterable[Comparison], iterations: int = 0) -> tuple[Comparison, ...]:
+    return tuple(_comparison(match, iterations) for match in comparisons)
+
+
+def _as_found(found: AsFound | None, iterations: int = 0) -> AsFound | None:
+    return found and replace(found, comparisons=_each(found.comparisons, iterations))
 
 
 def drawn_responses(responses: IterationResponses, iterations: int) -> IterationResponses:

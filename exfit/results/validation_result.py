@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from exfit.results.comparisons import AsFound, Comparison
 from exfit.results.description import (
@@ -29,6 +30,11 @@ class ValidationResult:
     are all of them, named as in the system; ``options`` are those of the command. The rest is as in
     `FitResult`. It describes validation.json, too.
     """
+
+    # nothing is fitted; ``origin`` and ``options`` say whose values these are
+    parameters: ClassVar[Mapping[str, FittedParameter]] = {}
+    typical_values: ClassVar[Mapping[str, TypicalValue]] = {}
+    given_values: ClassVar[Mapping[str, GivenInPlace]] = {}
 
     case: Path
     about: Mapping[str, float | str]
@@ -84,21 +90,6 @@ class ValidationResult:
             for match in self.matches
             for text in (*(step.text for step in match.steps), *match.notes)
         )
-
-    @property
-    def parameters(self) -> Mapping[str, FittedParameter]:
-        """The parameters that were fitted here: none."""
-        return {}
-
-    @property
-    def typical_values(self) -> Mapping[str, TypicalValue]:
-        """What typical values would move: no parameter was found that they could."""
-        return {}
-
-    @property
-    def given_values(self) -> Mapping[str, GivenInPlace]:
-        """The values in place of those of the case: ``origin`` and ``options`` say whose."""
-        return {}
 
     @property
     def of_records(self) -> dict[str, float]:

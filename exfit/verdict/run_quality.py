@@ -52,11 +52,8 @@ def unstable_rest_notes(simulator: Simulator, values: Values) -> Iterator[str]:
     )
 
 
-def voltage_notes(case: Case, time: Array, vt: Array | None, name: str = "") -> Iterator[str]:
-    """Note instants at which a simulated terminal voltage (M,) leaves the range of the models.
-
-    ``name`` is that of its record.
-    """
+def voltage_notes(case: Case, time: Array, vt: Array | None) -> Iterator[str]:
+    """Note instants at which a simulated terminal voltage (M,) leaves the range of the models."""
     if vt is None or case.plant.type == "none":
         return
     beyond = np.abs(vt) > HIGHEST_VOLTAGE
@@ -64,7 +61,7 @@ def voltage_notes(case: Case, time: Array, vt: Array | None, name: str = "") -> 
         first = int(np.argmax(beyond))
         worst = vt[int(np.nanargmax(np.abs(vt)))]
         yield (
-            f"{f'{name}: ' if name else ''}vt is beyond {HIGHEST_VOLTAGE:g} pu from "
+            f"vt is beyond {HIGHEST_VOLTAGE:g} pu from "
             f"{time[first]:.4g} s on, {worst:.4g} pu at most: no unit stays in service there"
         )
 
@@ -118,17 +115,12 @@ def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         if names and part.kind != "network":
             listed = ", ".join(f"{symbol} {typical[part.prefix + symbol]:g}" for symbol in names)
             yield f"typical values taken for {part.name}: {listed}"
-    for name in idle_models(case):
-        yield f"{name} does not act: the breaker is open"
-
-
-def idle_models(case: Case) -> list[str]:
-    """Return the models of a case that do nothing without load, where no test has one."""
-    if case.on_load or case.kind.plays_back:
-        return []
-    added = [case.parts.stabiliser, case.parts.governor]
-    added += [at.model for at in case.parts.limiters if not acts_without_load(at)]
-    return [model.name for model in added if model is not None]
+    if not (case.on_load or case.kind.plays_back):
+        added = [case.parts.stabiliser, case.parts.governor]
+        added += [at.model for at in case.parts.limiters if not acts_without_load(at)]
+        for model in added:
+            if model is not None:
+                yield f"{model.name} does not act: the breaker is open"
 
 
 def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str]:
