@@ -38,9 +38,7 @@ def true_cost(name):
     known = {NAMES.get(key, key): value for key, value in truth.items()}
     wanted = [*loaded.parameters.free, "KA"]
     setup = build_experiments(loaded)[0]
-    return compare_with_record(
-        setup, "truth", values_of(loaded, {key: known[key] for key in wanted})
-    ).cost
+    return compare_with_record(setup, values_of(loaded, {key: known[key] for key in wanted})).cost
 
 
 @pytest.fixture(scope="module")

@@ -97,7 +97,7 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
             f"a gap of {steps[longest]:g} s after {time[longest]:g} s: resampling bridges at most "
             f"{GAP_STEPS:g} sampling steps of {usual:g} s"
         )
-    length = float(time[-1] - time[0])
+    length = float(np.ptp(time))
     own = len(steps) / length
     if not 1.0 / length <= rate < own:
         raise ValueError(

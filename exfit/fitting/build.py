@@ -144,10 +144,7 @@ def _driving(
     driving: Sequence[str],
     switchings: Sequence[Switching],
 ) -> dict[str, RecordedInput | SplinedInput]:
-    """Return the signals of a record that drive the simulation, but for recorded references.
-
-    One whose scale is found is divided by its start, by which it was read: the system multiplies.
-    """
+    """Return recorded signals that drive a simulation; a found scale is divided out by its start."""
     inputs: dict[str, RecordedInput | SplinedInput] = {}
     if case.kind.finds_rest:
         driving = [signal for signal in driving if signal in REFERENCES]
@@ -200,10 +197,7 @@ def _moved(
 
 
 def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:
-    """Return what is found about a record with the starts that were given.
-
-    Raises CaseError for one that lies out of its bounds.
-    """
+    """Return what is found about a record with given starts; CaseError for one out of bounds."""
     free = []
     for own in setup.free:
         given = case.given_values.get(own.name)

@@ -120,10 +120,7 @@ def switchings_of(record: Record) -> tuple[Switching, ...]:
 
 
 def _named_groups(switchings: Sequence[Switching], prefix: str) -> dict[str, tuple[Switching, ...]]:
-    """Return what each switching does to vt and its angle, in order of time, by its instant's name.
-
-    Those whose instants do not matter are left out.
-    """
+    """Return what each large switching does to vt and its angle, by the name of its instant."""
     groups: list[tuple[Switching, ...]] = []
     for switching in sorted(switchings, key=lambda each: each.jump):
         if groups and any(switching.jump[0] < each.jump[1] for each in groups[-1]):
@@ -180,10 +177,7 @@ def switchings_as_steps(
 def _without_jump(
     own: SplinedInput, before: int, after: int, at: float
 ) -> tuple[SplinedInput, float]:
-    """Return an input without a jump, and how large that is at an instant (s).
-
-    That is by lines through the samples on each side; samples inside it lie in a line between.
-    """
+    """Return an input without a jump, and its size at an instant (s), by lines on each side."""
     sides = slice(max(before - BESIDE + 1, 0), before + 1), slice(after, after + BESIDE)
     levels = [np.polyfit(own.time[side] - at, own.samples[side], 1)[1] for side in sides]
     size = float(levels[1] - levels[0])

@@ -214,10 +214,7 @@ class Experiment:
         return [self.with_inputs(own, self._reader) for own in sets] if self.moves else None
 
     def _as_recorded(self, read: Array, axis: int = 0) -> Array:
-        """Return simulated signals (..., M, channels, ...) as the recorder shows them.
-
-        Where it records averages, these are averaged alike; so are derivatives.
-        """
+        """Return simulated signals (..., M, channels, ...) averaged as the recorder does."""
         if self._averages is not None:
             read = self._averages.of(read, axis)
         for k, channel in enumerate(self.channels):

@@ -219,10 +219,7 @@ def taken_for_validation(times: float) -> str:
 def _from_start(
     searches: "CaseSearches", methods: Sequence[str], judge: Judge, announce: Announce
 ) -> _Descents:
-    """Descend by one method after the other, until one ends without doubt.
-
-    An interruption ends them with the best point so far.
-    """
+    """Descend by one method after the other, until one ends without doubt or an interruption."""
     ends, doubts = list[Result](), list[str]()
     try:
         for method in methods:

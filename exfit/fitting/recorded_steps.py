@@ -261,10 +261,7 @@ def _least(value: float | Unknown) -> float:
 def _split(
     reference: _Sampled, steady: float
 ) -> tuple[tuple[FindableStep, ...], RecordedInput | None]:
-    """Split it into its jumps, each between two samples, and how it deviates beside them.
-
-    Both count from its mean until ``steady`` (s). It deviates by None where it only jumps.
-    """
+    """Split it into its jumps, and how it deviates beside them; None if it only jumps."""
     source, time, recorded, filter = reference
     first = int(np.searchsorted(time, steady))
     if first == 0:

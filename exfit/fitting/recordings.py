@@ -107,10 +107,7 @@ def span_of(test: BumpTest, record: Record) -> Span:
 
 
 def _refuse_other_test(case: Case, test: BumpTest, record: Record) -> None:
-    """Raise an error where a record does not hold the test that the case describes.
-
-    That is a RecordError, or a CaseError for a table that does not cover it.
-    """
+    """Raise RecordError, or CaseError of a table, where a record does not hold its test."""
     path, steady = record.source, test.steady
     start, end = record.time[0], record.time[-1]
     if test.begin is not None:

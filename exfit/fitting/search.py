@@ -64,7 +64,24 @@ def fitted(
     problem = problem_of(residuals_of(case, setups, start))
     if program is not None:
         program.try_start(problem.residuals)
-    refuse_unfit(case, problem)
+    residuals = problem.residuals
+    samples, free = residuals.count, len(residuals.free)
+    if samples < free:
+        raise CaseError([f"{case.path}: record: {samples} samples for {free} free parameters"])
+    for channel in residuals.channels:
+        measured = channel.measured[channel.kept]
+        if np.all(measured == measured[0]):
+            level = f"{channel.signal} is {measured[0]:g} pu throughout"
+            raise CaseError([f"{case.path}: record: {level}: there is no step in it"])
+    with np.errstate(over="ignore"):
+        errors = problem.compressed(residuals.start)
+        square = float(errors @ errors)
+    if not np.isfinite(square):
+        largest = float(np.max(np.abs(errors)))
+        raise SimulationError(
+            f"{case.path}: the residuals at the start values are too large to be squared: "
+            f"up to {largest:.3g}; check scale, weight and start"
+        )
     return setups, problem
 
 
@@ -262,25 +279,3 @@ def searches_of(options: Estimate) -> estimate.Searches:
     else:
         lm = estimate.TrustRegion(armijo=options.armijo)
     return estimate.Searches(dgn=dgn, lm=lm)
-
-
-def refuse_unfit(case: Case, problem: FitProblem) -> None:
-    """Raise ExfitError where a record cannot be fitted: it is too short, flat, or out of scale."""
-    residuals = problem.residuals
-    samples, free = residuals.count, len(residuals.free)
-    if samples < free:
-        raise CaseError([f"{case.path}: record: {samples} samples for {free} free parameters"])
-    for channel in residuals.channels:
-        measured = channel.measured[channel.kept]
-        if np.all(measured == measured[0]):
-            level = f"{channel.signal} is {measured[0]:g} pu throughout"
-            raise CaseError([f"{case.path}: record: {level}: there is no step in it"])
-    with np.errstate(over="ignore"):
-        start = problem.compressed(residuals.start)
-        square = float(start @ start)
-    if not np.isfinite(square):
-        largest = float(np.max(np.abs(start)))
-        raise SimulationError(
-            f"{case.path}: the residuals at the start values are too large to be squared: "
-            f"up to {largest:.3g}; check scale, weight and start"
-        )

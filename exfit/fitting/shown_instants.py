@@ -134,10 +134,7 @@ def _beginnings(
 
 
 def _left_of(setup: ExperimentSetup, response: Array, beginnings: Sequence[Beginning]) -> float:
-    """Remainder of beginnings after a response (M, channels) of any size, and its integrals.
-
-    It is the sum of squares in units of the noise.
-    """
+    """Squares, in noise, left by a response (M, channels) of any size and its integrals."""
     total = 0.0
     for place, inside, samples, noise in beginnings:
         simulated = compared(setup.channels[place], response[:, place])[inside]

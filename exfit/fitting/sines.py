@@ -127,7 +127,7 @@ def _name(setup: ExperimentSetup, channel: Channel) -> str:
 def _refuse_unseen(name: str, setup: ExperimentSetup, *frequencies: float) -> None:
     """Raise RecordError for a frequency with no whole period, or fewer than two samples in one."""
     time = setup.record.time
-    low, high = 1.0 / float(time[-1] - time[0]), 0.5 / median_step(time)
+    low, high = 1.0 / float(np.ptp(time)), 0.5 / median_step(time)
     for frequency in frequencies:
         if not low <= frequency <= high:
             raise RecordError(
@@ -139,7 +139,7 @@ def _refuse_unseen(name: str, setup: ExperimentSetup, *frequencies: float) -> No
 def _near(setup: ExperimentSetup, name: str, frequency: float) -> FreeParameter:
     """Return a frequency with bounds between which no other line can be told from it."""
     time = setup.record.time
-    width = 1.0 / float(time[-1] - time[0])
+    width = 1.0 / float(np.ptp(time))
     bounds = max(frequency - width, 0.5 * width), frequency + width
     return FreeParameter(f"{name}.{FREQUENCY}", frequency, *bounds, logarithmic=False)
 
@@ -248,10 +248,7 @@ def _coloured(
 def _disturbed(
     setups: Sequence[ExperimentSetup], lines: Mapping[Place, Line]
 ) -> tuple[ExperimentSetup, ...]:
-    """Return the tests with lines of their errors, simulated less measured, in their channels.
-
-    None of them waits for residuals any more.
-    """
+    """Return the tests with lines of their errors, simulated less measured; none waits any more."""
     disturbed = {setup.name: replace(setup, automatic_sines={}) for setup in setups}
     for (record, signal), line in lines.items():
         setup = disturbed[record]

@@ -249,10 +249,7 @@ def linearisation(
 def _channels(
     residuals: Residuals, rows: Sequence[int], errors: Array, slopes: Array
 ) -> Iterator[ResidualBlock]:
-    """Yield the places of each channel's errors among those (M,) of all, and its rows.
-
-    ``slopes`` (R, N) are the derivatives of the errors, in as many rows or in fewer.
-    """
+    """Yield the block of each channel; ``slopes`` (R, N) may have fewer rows than errors."""
     several = len(residuals.experiments) > 1
     places = zip(slices(rows), slices(residuals.sizes), strict=True)
     for experiment in residuals.experiments:

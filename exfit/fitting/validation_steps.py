@@ -174,10 +174,7 @@ def _shown(
 def _lasting(
     record: Record, steps: tuple[RecordedStep, ...], given: GivenSteps
 ) -> tuple[RecordedStep, ...]:
-    """Return those steps that change vt for good, with their sizes; all where these are given.
-
-    Raises RecordError where there is none.
-    """
+    """Return the steps that change vt for good, all where they are given; RecordError for none."""
     if not steps:
         raise RecordError(f"{record.source}: no step found in its channels; {GIVE_STEP}")
     noises = {name: noise_of(y[np.isfinite(y)]) for name, y in record.signals.items()}
@@ -193,11 +190,7 @@ def _lasting(
 
 
 def _sizes(record: Record, steps: Sequence[RecordedStep], given: GivenSteps) -> tuple[float, ...]:
-    """Return the sizes of the steps: those given, else those of vt.
-
-    Raises CaseError where as many are not given as there are steps, RecordError where vt does not
-    show one.
-    """
+    """Return the sizes given, else those of vt; CaseError for another count, RecordError for none."""
     if given.sizes:
         if len(given.sizes) != len(steps):
             instants = ", ".join(f"{step.at:.4g}" for step in steps)
@@ -215,10 +208,7 @@ def _sizes(record: Record, steps: Sequence[RecordedStep], given: GivenSteps) -> 
 def _through_gain(
     record: Record, steps: Sequence[RecordedStep], sizes: Sequence[float], simulated: Array
 ) -> tuple[float, ...]:
-    """Return the sizes of steps that change vt (M,) by those of the record.
-
-    One stays where the simulation moves the other way, which no size mends.
-    """
+    """Divide sizes of steps by the gain of the simulated vt (M,), where that moves the same way."""
     through = []
     changes = with_sizes(steps, {"vt": simulated}, {}, record.time)
     for size, change in zip(sizes, changes, strict=True):

@@ -208,10 +208,7 @@ def partners_on_bounds(
 def _uncertainty(
     factors: Factors, k: int, share: float, t: float, data: str, hint: str
 ) -> Uncertainty:
-    """Return the uncertainty of parameter k, by its standard error: a share of 100 %.
-
-    ``t`` is half of its interval in standard errors.
-    """
+    """Return the uncertainty of a parameter: its error is a ``share`` of 100 %, ``t`` the quantile."""
     lin, why = factors.lin, _reason(factors, k, share, data, hint)
     if not isfinite(share):
         return Uncertainty(None, None, None, why)

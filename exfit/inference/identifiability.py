@@ -151,10 +151,7 @@ def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiabilit
 
 
 def _seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Array]:
-    """Return the singular values (K,) and right directions (K, K) of relative changes.
-
-    Those without any effect come last, with singular value 0.
-    """
+    """Singular values (K,) and right directions (K, K) of relative changes, unseen ones last."""
     lin, has_effect, count = factors.lin, factors.has_effect, len(factors.null)
     rounding = np.finfo(float).eps * np.max(np.abs(lin.relative), initial=0.0)
     spread = lin.by_row([np.fmax(channel_noise.spread, rounding) for channel_noise in noise])

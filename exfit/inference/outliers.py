@@ -153,10 +153,7 @@ def _centre_and_variance(estimates: Estimates) -> tuple[float, float]:
 
 
 def _weights(shifted: Array, own: Array) -> Array:
-    """Return the weights of a first estimate of tau that no outlier moves, of a mean of one.
-
-    It is that of the median absolute deviation, less the median of the errors.
-    """
+    """Weights, of mean one, of a first estimate of tau by the median absolute deviation."""
     deviation = float(np.median(np.abs(shifted - np.median(shifted)))) / NORMAL_MEDIAN
     tau2 = max(deviation**2 - float(np.median(own)), 0.0)
     weight = 1.0 / (own + tau2)

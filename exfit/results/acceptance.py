@@ -61,10 +61,7 @@ def _why_not(
     limit: float | None,
     given: bool,
 ) -> str:
-    """Give the reason to reject a signal of a validation, "" where it is accepted.
-
-    ``given``: the case sets the limit. An error that is not a number is not accepted.
-    """
+    """Word why a signal is rejected, "" if it is not; ``given``: the case sets the limit."""
     name, rmse = validation.name, validation.channels[signal].rmse
     of_signal = f" of {signal}" if len(validation.judging) > 1 else ""
     within = limit is None or rmse <= limit

@@ -34,7 +34,6 @@ SMALL = 1e-6  # of a move: the instant of a step is linear in what moves it
 
 def compare_with_record(
     setup: ExperimentSetup,
-    name: str,
     values: Values,
     start: Values | None = None,
     of_record: Values | None = None,
@@ -63,7 +62,7 @@ def compare_with_record(
     if moves is None:
         moves = [{parameter.name: 1.0} for parameter in setup.free]
     return Comparison(
-        name=name,
+        name=setup.name,
         record=setup.record.source.name,
         cost=0.5 * float(errors @ errors),
         accepted=True,
@@ -118,10 +117,7 @@ def _step_features(
     values: Values,
     moves: Sequence[Values],
 ) -> StepFeatures:
-    """Return the features of vt without its periodic disturbances, in the record and simulated.
-
-    ``samples`` (M, channels) are the simulated ones.
-    """
+    """Return the features of vt without its periodic disturbances; ``samples`` (M, channels)."""
     vt = overlays.get("vt")
     if vt is None:
         return StepFeatures(None, None)

@@ -122,10 +122,7 @@ def _change(match: Comparison, signal: str, measured: Features | None) -> float:
 
 
 def _limit(name: str, measured: Features, change: float, criteria: Criteria) -> float | None:
-    """Return the limit on a feature in its unit; None where the record does not show it.
-
-    A peak that is no more than the limit of the overshoot has no time.
-    """
+    """Return the limit on a feature in its unit; None where the record does not show it."""
     value = getattr(measured, name)
     if value is None or not isfinite(value):
         return None

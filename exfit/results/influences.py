@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
 from exfit.results.verdict import REJECTED, Cause
-from exfit.util.text import rounded_value
+from exfit.util.text import digits, listed, rounded_value
 
 WindowKind = Literal["step", "first half", "second half"]
 
@@ -33,8 +33,6 @@ def moved_parameters(typical: TypicalValue, fitted: Mapping[str, float]) -> str:
 
     A shift of the first order that exceeds the value itself says no more than that it is large.
     """
-    from exfit.util.text import digits
-
     moves = []
     for name in typical.matters_to:
         shift, value = abs(typical.shifts[name]), abs(fitted[name])
@@ -52,8 +50,6 @@ def by_weight(values: Mapping[str, TypicalValue]) -> dict[str, TypicalValue]:
 
 def first_of(names: Sequence[str]) -> str:
     """Return the first few names as "A, B and 3 more"."""
-    from exfit.util.text import listed
-
     others = len(names) - MOST_NAMED
     if others <= 1:  # one more is as short as its name
         return listed(names)
@@ -149,8 +145,6 @@ class RecorderAverages(NamedTuple):
         """What is in doubt."""
         over = f"over {1e3 * self.window:.3g} ms"
         if self.shown:
-            from exfit.util.text import digits
-
             chi_square = digits(self.chi_square)
             return f"the record shows averages {over}, not samples (chi-square {chi_square})"
         return f"whether the recorder averages {over} is unknown and matters"

@@ -263,7 +263,7 @@ def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
         first = int(np.argmax(held))
         value = next(float(each.bound[first]) for each in same if each.held[first])
         seconds = float(np.trapezoid(held.astype(np.float64), run.time))
-        at, share = float(run.time[first]), seconds / float(run.time[-1] - run.time[0])
+        at, share = float(run.time[first]), seconds / float(np.ptp(run.time))
         hits.append(LimitHit(limit, signal, value, seconds, at + simulator.delay, share))
     return tuple(sorted(hits, key=lambda hit: hit.first))
 

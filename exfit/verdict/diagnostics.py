@@ -62,8 +62,7 @@ def notes(
         vt = comparison.overlays.get("vt")
         yield from voltage_notes(case, comparison.time, None if vt is None else vt.simulated)
         for signal, change in simulator.step_errors(at, experiment.signals).items():
-            error = comparison.overlays[signal].error
-            rmse = float(np.sqrt(np.nanmean(error**2)))
+            rmse = comparison.overlays[signal].rmse
             if change > min(max(COARSE * rmse, INVISIBLE), LARGEST_STEP_ERROR):
                 yield (
                     f"halving the step of {case.simulation.step:g} s changes {signal} by "
@@ -242,7 +241,7 @@ def _beside_response(
     setup: ExperimentSetup, values: Values, steady: float, free_machine: bool
 ) -> Iterator[str]:
     """Warn of channels that rest or move unlike the response, or are not at rest."""
-    comparison = compare_with_record(setup, setup.name, values)
+    comparison = compare_with_record(setup, values)
     given = {
         signal: overlay
         for signal, overlay in comparison.overlays.items()

@@ -215,10 +215,7 @@ def _tests_of(
     scatter: Sequence[Scatter],
     instants: Sequence[float],
 ) -> ResidualTests:
-    """Return the tests of a channel, whose steps are at ``instants`` (s).
-
-    ``errors`` (M,) are as the loss counts them. A long deviation is no spike.
-    """
+    """Test a channel with steps at ``instants`` (s) by errors (M,) as the loss counts them."""
     name, signal = record.comparison.name, channel.signal
     overlay, largest = record.comparison.overlays[signal], max(each.std for each in scatter)
     if not rmse > LEAST_NOISE:

@@ -106,10 +106,7 @@ def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[Verdict
 
 
 def _no_match(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
-    """Find signals for which a constant would match as well as the response.
-
-    The signal that a record is judged by counts as it is; another where what is left can be seen.
-    """
+    """Word signals that a constant matches as well: the judged one, and others that are seen."""
     seen = {(test.record, test.signal) for test in tests if test.are_seen}
     for comparison in evidence.comparisons:
         judged = comparison.judged_by

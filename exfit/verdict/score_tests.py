@@ -129,10 +129,7 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
 def _score(
     held: Held, direction: Array, linear: LinearFit, spread: Array, shift: Array
 ) -> Contradiction | None:
-    """Return the test of a value; None where it does nothing, or only an unlikely change would.
-
-    ``shift`` (M,) was taken from the errors for the bias by the noise of what drives.
-    """
+    """Test a value, None if it does nothing or too much; ``shift`` (M,) was taken for the bias."""
     own = linear.beyond(direction)
     square = float(own @ own)
     if not square > (SAME**2) * float(direction @ direction):

@@ -191,7 +191,7 @@ def judge_of(
     def fitted(end: estimate.Result) -> tuple[Values, list[Comparison]]:
         values = residuals.values(end.x)
         fine = (setup.with_enough_substeps(values) for setup in setups)
-        return values, [compare_with_record(setup, setup.name, values) for setup in fine]
+        return values, [compare_with_record(setup, values) for setup in fine]
 
     def refusals(values: Values, matches: Sequence[Comparison]) -> Iterator[str]:
         for setup in unseen:

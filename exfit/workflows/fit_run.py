@@ -247,7 +247,7 @@ def _comparisons(
     moves = residuals.moves(scaled_values(residuals.free, values))
     return tuple(
         with_iteration_responses(
-            compare_with_record(setup, setup.name, values, start, moves=moves),
+            compare_with_record(setup, values, start, moves=moves),
             setup,
             residuals,
             history,
@@ -275,10 +275,7 @@ def _analysed(
     fitted: Sequence[Comparison],
     history: Sequence[Iteration],
 ) -> Analysis:
-    """Analyse the best point: its uncertainty, its response to unseen records, and more.
-
-    ``fine`` are the tests with sub-steps enough, ``fitted`` the comparisons with their records.
-    """
+    """Analyse the best point: ``fine`` tests have sub-steps enough, ``fitted`` are matches."""
     case, problem, best = state.case, state.problem, state.found.best
     uncertainty, unfinished = state.determined.uncertainty, state.determined.interrupted
     interrupted = unfinished or best.stop is estimate.Stop.INTERRUPTED
@@ -318,10 +315,7 @@ def _parameters(
     uncertainty: UncertaintyAnalysis | None,
     why: str,
 ) -> dict[str, FittedParameter]:
-    """Return the free parameters with their fitted values, in the parameters' own units.
-
-    ``why`` is the reason where there is no ``uncertainty``.
-    """
+    """Return the fitted parameters in their own units; ``why`` there is no ``uncertainty``."""
     rows, fitted = case.rows(), dict[str, FittedParameter]()
     of_records = residuals.of_records
     described = {name: (own.unit, own.meaning) for name, own in of_records.items()}

@@ -159,7 +159,7 @@ def profile(
     compared = []
     for recording, setup in zip(case.recordings, setups, strict=True):
         fine = setup.with_enough_substeps(values)
-        match = compare_with_record(fine, setup.name, values)
+        match = compare_with_record(fine, values)
         compared.append(FittedRecord(recording.test, fine, match))
     verdict = verdict_alone(Evidence(case, problem.residuals, best, compared, uncertainty))
     by_twin = program is not None and program.has_twin
@@ -235,10 +235,7 @@ def _notes(
 
 
 def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:
-    """Return the indices of the named parameters among the free ones, all if none is named.
-
-    Raises CaseError for a name that is not free.
-    """
+    """Return the indices of named free parameters, by default all; CaseError for others."""
     free = {parameter.name: index for index, parameter in enumerate(residuals.free)}
     wanted = tuple(names) or tuple(free)
     unknown = [name for name in wanted if name not in free]
@@ -254,10 +251,7 @@ def _profile(
     profiles: Sequence[estimate.CostProfile],
     verdict: Verdict,
 ) -> Profile:
-    """Return the profiles of a parameter about several minima in its own values.
-
-    It has no interval where the ``verdict`` leaves none.
-    """
+    """Return a parameter's profiles about several minima, without an interval beside a misfit."""
     first, *others = profiles
     parameter = residuals.free[first.index]
     low, high = (None if isinf(limit) else parameter.value(limit) for limit in limits_of(profiles))

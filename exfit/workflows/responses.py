@@ -100,7 +100,7 @@ def validation_of(
 ) -> Comparison:
     """Judge `aligned` values on a record that was not fitted, by the ``fitted`` ones."""
     of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
-    comparison = compare_with_record(setup, setup.name, values, of_record=of_record)
+    comparison = compare_with_record(setup, values, of_record=of_record)
     accept = None if case.accept is None else case.accept.rmse
     return judged(comparison, fitted, setup.channels, accept)
 
@@ -214,7 +214,7 @@ def phase_ends(
         values = residuals.completed(line.values)
         try:
             comparisons = tuple(
-                compare_with_record(setup.with_enough_substeps(values), setup.name, values, start)
+                compare_with_record(setup.with_enough_substeps(values), values, start)
                 for setup in setups
             )
         except SimulationError:
@@ -307,7 +307,8 @@ def as_found_of(
             test = setup if before is case else build_experiment(before, recording, at)
             if program is not None:
                 program.run(test, at)
-            match = compare_with_record(test.with_enough_substeps(at), setup.name, at)
+            match = compare_with_record(test.with_enough_substeps(at), at)
+            match = replace(match, name=setup.name)
             empty = replace(match, time=np.zeros(0), overlays={})
             comparisons.append(match if unit.is_stated else empty)
     except (CaseError, SimulationError) as fault:

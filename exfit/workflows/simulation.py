@@ -1,7 +1,7 @@
 """The response of a case, with the record beside it where there is one."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
@@ -37,7 +37,7 @@ def simulate(
         response = simulator.response(at)
         before = setup.record.notes
         if setup.channels:
-            comparison = compare_with_record(setup, "record", values)
+            comparison = replace(compare_with_record(setup, values), name="record")
             after = tuple(rest_notes(setup, comparison))
     else:
         simulator, levels = plain_simulator(case, values)

@@ -156,7 +156,7 @@ def _fitted(
         residuals = residuals_of(case, [setup])
         at = scaled_values(residuals.free, setup.with_start_values(values))
         moves = residuals.moves(at)
-    comparison = compare_with_record(setup, setup.name, values, moves=moves)
+    comparison = compare_with_record(setup, values, moves=moves)
     return ComparedTest(recording, setup, values, comparison)
 
 
@@ -231,7 +231,7 @@ def _steps(
     simulator, moved = (setup.experiment.with_inputs(each) for each in (values, best))
     least = None
     if instants_of(setup):
-        least = compare_with_record(setup, setup.name, best).rmse
+        least = compare_with_record(setup, best).rmse
     found = (*(() if given.instants else ("instant",)), *(() if given.sizes else ("size",)))
     for step, other in zip(simulator.inputs.steps, moved.inputs.steps, strict=True):
         at = step.at + simulator.delay

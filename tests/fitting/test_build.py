@@ -76,7 +76,7 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
     rng = np.random.default_rng(1)
     signals = {"vt": rng.normal(1.0, 0.01, 61), "efd": rng.normal(1.1, 0.5, 61)}
     case = load(changed(MACHINE_CASE, "record", channels=channels), **signals)
-    compared = compare_with_record(build_experiments(case)[0], "fit", values_of(case, {}))
+    compared = compare_with_record(build_experiments(case)[0], values_of(case, {}))
     assert compared.overlays.keys() == weights.keys()
     expected = sum(
         0.5 * np.sum((weights[name] * one.error) ** 2) for name, one in compared.overlays.items()

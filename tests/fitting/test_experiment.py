@@ -145,12 +145,12 @@ def test_what_is_drawn_is_what_is_compared(tmp_path):
     case, setup = averaged_case(tmp_path, lost=30)
     values = case.values()
     start = {**values, "KA": 0.5 * values["KA"]}
-    found = compare_with_record(setup, "up", values, start)
+    found = compare_with_record(setup, values, start)
     vt = found.overlays["vt"]
     errors = setup.channels[0].weight * (vt.simulated - vt.measured)
     assert 0.5 * np.nansum(errors**2) == pytest.approx(found.cost, rel=1e-12)
     assert np.isnan(errors).sum() == 30
-    first = compare_with_record(setup, "up", start).overlays["vt"].simulated
+    first = compare_with_record(setup, start).overlays["vt"].simulated
     assert np.array_equal(vt.start, first, equal_nan=True)
 
 

@@ -184,8 +184,8 @@ def test_a_delay_moves_the_features_of_both_signals_alike(tmp_path):
     prompt = build_experiments(case_of(one(TEST), tmp_path))[0]
     late = build_experiments(case_of(one(TEST, delay=0.5), tmp_path))[0]
     values = case_of(one(TEST), tmp_path).values()
-    peak = compare_with_record(prompt, "prompt", values).features.simulated.peak_time
-    assert compare_with_record(late, "late", values).features.simulated.peak_time == pytest.approx(
+    peak = compare_with_record(prompt, values).features.simulated.peak_time
+    assert compare_with_record(late, values).features.simulated.peak_time == pytest.approx(
         peak, abs=1e-3
     )
 

@@ -33,5 +33,5 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     setup = build_experiment(case, case.validations[0], found.values)
     pair = aligned(case, setup, found.values)
     assert validation_of(case, found.comparisons, *pair).rmse == after.rmse
-    unaligned = compare_with_record(setup.with_enough_substeps(found.values), "start", found.values)
+    unaligned = compare_with_record(setup.with_enough_substeps(found.values), found.values)
     assert unaligned.rmse > 10 * after.rmse

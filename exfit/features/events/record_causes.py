@@ -400,7 +400,7 @@ def _compared(case: Case, recording: Recording) -> Comparison | None:
     try:
         setup = build_experiment(case, recording, values)
         ready = setup.with_enough_substeps(setup.with_start_values(values))
-        return compare_with_record(ready, ready.name, values)
+        return compare_with_record(ready, values)
     except SimulationError:  # a fit reports it
         return None
 

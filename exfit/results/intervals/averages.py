@@ -93,10 +93,7 @@ def _is_beyond(value: float, interval: Interval | None) -> bool:
 
 
 def _unstated(case: Case, residuals: Residuals) -> Iterator[int]:
-    """Yield the records of which the case does not say whether they hold averages.
-
-    What drives a simulation, too, is averaged like what is compared.
-    """
+    """Yield the records of which neither the case nor what drives them says if they average."""
     if case.external is not None or case.kind.finds_rest:
         return
     pairs = zip(case.recordings, residuals.experiments, strict=True)
@@ -117,10 +114,7 @@ def _likeliest(
     slopes: Array,
     variance: float,
 ) -> Iterator[tuple[float, Residuals]]:
-    """Yield a window (s) and residuals with averages over it that matter, by linear theory.
-
-    Those over the time between samples, and those that match best, if clearly better.
-    """
+    """Yield windows (s) with averaged residuals: between samples, and the one that matches best."""
     low, high = residuals.bounds
     free = slopes[:, (theta > low) & (theta < high)]
     if not np.isfinite(free).all():

@@ -27,7 +27,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty, closed
 from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import DRIVING_SCALE, MACHINE
-from exfit.records.record import Record, read_only
+from exfit.records.record import read_only
 from exfit.results.influences import WindowEstimate, WindowKind, WindowSpread
 from exfit.util.arrays import Array
 
@@ -80,7 +80,8 @@ def spread_over_windows(
     for each in steps:
         ends += [each.value - NORMAL * each.std_error, each.value + NORMAL * each.std_error]
     # halves are tested apart from the windows that they are parts of: the smaller counts twice
-    tails = [_tail(steps), *_tail_of_halves(estimates)]
+    halves = [each for each in estimates if each.kind != "step"]
+    tails = [_tail(each) for each in (steps, halves) if len(each) >= FEWEST_STEPS]
     return WindowSpread(
         name=TPD0,
         unit=case.units()[TPD0],
@@ -131,12 +132,6 @@ def windows_of(setup: ExperimentSetup) -> Iterator[Window]:
         rest = min(REST_BEFORE_STEP, REST_SHARE * (early - before))
         yield Window(max(early - rest, float(record.time[0])), early, end)
         before = at
-
-
-def _tail_of_halves(estimates: Sequence[WindowEstimate]) -> Iterator[float]:
-    halves = [each for each in estimates if each.kind != "step"]
-    if len(halves) >= FEWEST_STEPS:
-        yield _tail(halves)
 
 
 def _tail(estimates: Sequence[WindowEstimate]) -> float:
@@ -193,10 +188,7 @@ def _estimates(
 
 
 def _of_part(fit: WindowFit, moved: Array, rows: NDArray[np.bool_]) -> tuple[float, Array]:
-    """Change of T'd0 by a part of the errors, and its errors by noise (K,).
-
-    The saturation is that of the whole window, with its own errors by the noise ``moved`` (K, N).
-    """
+    """Change of T'd0 by a part of the errors, and its errors by the noise ``moved`` (K, N)."""
     slopes, others = fit.slopes[rows, 0], fit.slopes[rows, 1:]
     along = slopes / (slopes @ slopes)
     with_others = fit.draws[:, rows] + moved[:, 1:] @ others.T
@@ -225,7 +217,17 @@ def window_setup(
             "test": recording.test.model_copy(update=of_test),
         }
     )
-    record = _record_in(setup, window, values)
+    record, experiment = setup.record, setup.experiment
+    rows = (record.time >= window.begin) & (record.time <= window.end)
+    driving = experiment.with_inputs(values).inputs.recorded
+    scale = experiment.parameters(values).get(DRIVING_SCALE, 1.0)
+    signals = {name: scale * driving[name].samples for name in driving}
+    signals |= {each.signal: experiment.measured(each, values) for each in setup.channels}
+    record = replace(
+        record,
+        time=read_only(record.time[rows]),
+        signals=MappingProxyType({name: read_only(s[rows]) for name, s in signals.items()}),
+    )
     alone = replace(case, given_records={recording.name: record})
     built = build_experiment(alone, own, values).with_enough_substeps(values)
     weights = {channel.signal: channel.weight for channel in setup.channels}
@@ -233,26 +235,8 @@ def window_setup(
     return replace(built, experiment=replace(built.experiment, channels=weighted))
 
 
-def _record_in(setup: ExperimentSetup, window: Window, values: Values) -> Record:
-    """Return the part of a record in a window, with the scales and levels that were fitted."""
-    record, experiment = setup.record, setup.experiment
-    rows = (record.time >= window.begin) & (record.time <= window.end)
-    driving = experiment.with_inputs(values).inputs.recorded
-    scale = experiment.parameters(values).get(DRIVING_SCALE, 1.0)
-    signals = {name: scale * driving[name].samples for name in driving}
-    signals |= {each.signal: experiment.measured(each, values) for each in setup.channels}
-    return replace(
-        record,
-        time=read_only(record.time[rows]),
-        signals=MappingProxyType({name: read_only(s[rows]) for name, s in signals.items()}),
-    )
-
-
 def _fitted(setup: ExperimentSetup, residuals: Residuals, values: Values) -> WindowFit | None:
-    """Return the fit of T'd0, and of the saturation as far as it is free, to a window.
-
-    None where it does not converge.
-    """
+    """Fit T'd0, and the saturation as far as it is free, to a window; None without convergence."""
     experiment = setup.experiment
     by_name = {parameter.name: parameter for parameter in residuals.free}
     free = [
@@ -284,10 +268,7 @@ def _fitted(setup: ExperimentSetup, residuals: Residuals, values: Values) -> Win
 
 
 def _draws(setup: ExperimentSetup, values: Values) -> Array | None:
-    """Draw errors (K, M) by noise as strong as that of the record.
-
-    None where the response to it diverges.
-    """
+    """Draw errors (K, M) by noise as strong as the record's; None where the response diverges."""
     experiment, generator = setup.experiment, np.random.default_rng(SEED)
     carried = propagated_noise(setup, values, REALISATIONS)
     if not carried:

@@ -81,10 +81,7 @@ def _of_events(plug: str, case: Case) -> Mapping[str, Recogniser]:
 def _credible(
     evidence: Evidence, found: Mapping[Recogniser, Sequence[Suspicion]]
 ) -> list[Suspicion]:
-    """List all suspicions; averages in a grid event only if they explain more than all others.
-
-    One device measures what drives the unit and what is compared, over the same windows.
-    """
+    """List all suspicions; averages in a grid event only if they explain more than all others."""
     if not evidence.case.kind.finds_rest:
         return [each for own in found.values() for each in own]
     from exfit.verdict.causes.recorder import averaging

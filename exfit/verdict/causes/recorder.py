@@ -100,7 +100,7 @@ def _line(own: ChannelErrors, errors: Array) -> float | None:
     even = np.interp(own.time[0] + step * np.arange(len(errors)), own.time, errors)
     power = np.abs(np.fft.rfft(even - np.mean(even), length)) ** 2
     frequencies = np.fft.rfftfreq(length, step)
-    slowest = FEWEST_PERIODS / (own.time[-1] - own.time[0])
+    slowest = FEWEST_PERIODS / np.ptp(own.time)
     power[frequencies < slowest] = 0.0
     return float(frequencies[np.argmax(power)])
 
@@ -114,7 +114,7 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
     if linear is None:
         return
     for own in errors_of_channels(evidence):
-        way = (own.time - own.time[0]) / (own.time[-1] - own.time[0])
+        way = (own.time - own.time[0]) / np.ptp(own.time)
         columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
         explained = linear.with_columns(columns)
         change = float(explained.coefficients[0])
@@ -144,7 +144,7 @@ def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change
     if np.count_nonzero(at_rest) < FEWEST_AT_REST:
         return True
     slope = np.polyfit(own.time[at_rest], -errors[at_rest] / own.channel.weight, 1)[0]
-    return bool(slope * (own.time[-1] - own.time[0]) / change > 0.5)
+    return bool(slope * np.ptp(own.time) / change > 0.5)
 
 
 def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
@@ -212,7 +212,7 @@ def _likeliest_window(
     step = median_step(time)
     found, costs = finds_instant(experiment), dict[float, float]()
     for window in sorted({step, *(window for window in WINDOWS if window > step)}):
-        if not window < 0.1 * (time[-1] - time[0]):
+        if not window < 0.1 * np.ptp(time):
             continue
         averaged = with_averages(experiment, window)
         values, moves = evidence.values, [*evidence.residuals.moves(evidence.solution.x)]
