@@ -144,7 +144,7 @@ def _driving(
     driving: Sequence[str],
     switchings: Sequence[Switching],
 ) -> dict[str, RecordedInput | SplinedInput]:
-    """Return recorded signals that drive a simulation; a found scale is divided out by its start."""
+    """Return recorded signals that drive a simulation; a found scale is divided by its start."""
     inputs: dict[str, RecordedInput | SplinedInput] = {}
     if case.kind.finds_rest:
         driving = [signal for signal in driving if signal in REFERENCES]

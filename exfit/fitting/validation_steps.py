@@ -190,7 +190,7 @@ def _lasting(
 
 
 def _sizes(record: Record, steps: Sequence[RecordedStep], given: GivenSteps) -> tuple[float, ...]:
-    """Return the sizes given, else those of vt; CaseError for another count, RecordError for none."""
+    """Sizes given, else those of vt; CaseError for another count, RecordError if none."""
     if given.sizes:
         if len(given.sizes) != len(steps):
             instants = ", ".join(f"{step.at:.4g}" for step in steps)

@@ -208,7 +208,7 @@ def partners_on_bounds(
 def _uncertainty(
     factors: Factors, k: int, share: float, t: float, data: str, hint: str
 ) -> Uncertainty:
-    """Return the uncertainty of a parameter: its error is a ``share`` of 100 %, ``t`` the quantile."""
+    """Return the uncertainty of a parameter, its error a ``share`` of 100 %, ``t`` the quantile."""
     lin, why = factors.lin, _reason(factors, k, share, data, hint)
     if not isfinite(share):
         return Uncertainty(None, None, None, why)
