@@ -5,7 +5,7 @@ from pathlib import Path
 
 from exfit.errors import ExfitError
 from exfit.output import fits, run_folder, terminal, validations
-from exfit.output.blocks import Table, columns, paragraph, row
+from exfit.output.blocks import Cell, Table, columns, paragraph, row
 from exfit.output.iterations import iterations
 from exfit.results.io import load_result, load_validation, result_file
 from exfit.results.model import FitResult
@@ -36,7 +36,7 @@ def show(
         programme = place / WHOLE_PROGRAMME if place.is_dir() else place
         if programme.name == WHOLE_PROGRAMME and programme.is_file():
             raise ExfitError(f"{place}: the result of a programme: use exfit report {result}")
-        validated = source if source.name == VALIDATION else source.with_name(VALIDATION)
+        validated = source.with_name(VALIDATION)
         if source == validated or (validated.is_file() and not source.exists()):
             if history:
                 text = "a validation has no iterations: give the result of a fit"
@@ -54,12 +54,16 @@ def show(
     if not everything:
         terminal.show_shortest(console, fits.briefs(fit, folder))
         return
-    figures = tuple(
+    if figures := _figures(fit, folder):
+        terminal.show(console, [Table(columns("figure", "shows"), figures)])
+        console.print()
+    terminal.show(console, fits.whole(fit, folder))
+
+
+def _figures(fit: FitResult, folder: Path | None) -> tuple[tuple[Cell, ...], ...]:
+    """List the figures of a fit that are in its folder, and what they show."""
+    return tuple(
         row(name, planned.shows)
         for name, planned in run_folder.figures_of_fit(fit).items()
         if folder is not None and (folder / name).is_file()
     )
-    if figures:
-        terminal.show(console, [Table(columns("figure", "shows"), figures)])
-        console.print()
-    terminal.show(console, fits.whole(fit, folder))

@@ -1,6 +1,6 @@
 """Responses beside each other, whatever programs they are from: their clocks, their differences."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
 from os import PathLike
@@ -140,7 +140,7 @@ def compare(
     """
     if len(sources) == 1 and record is None:
         raise RecordError(f"{sources[0]}: one curve alone can be compared only with a record")
-    choice = ColumnChoice({} if columns is None else columns, time)
+    choice = ColumnChoice(columns or {}, time)
     paths = dict(zip(_names(len(sources)), map(Path, sources), strict=True))
     named = paths if record is None else {**paths, RECORD: Path(record)}
     as_read = [read_curve(name, path, choice) for name, path in named.items()]
@@ -150,25 +150,14 @@ def compare(
     judged = judged_of(shared)
     clocks = compared_clocks(curves, judged, align)
     if align:
-        for curve in curves:
-            if clocks.steps.get(curve.name) is None:
-                raise RecordError(
-                    f"--align: {curve.name}, {curve.path}: no step is detected in it; "
-                    "--shift B=SECONDS shifts the time of one"
-                )
+        _refuse_without_step(curves, clocks)
         curves = shifted(curves, clocks.apart)
     results, unread = _results(paths)
-    detected = (clocks.steps.get(RECORD), *clocks.steps.values())
-    first_at = next((step.at for step in detected if step is not None), None)
-    at = first_at if step_at is None else step_at
+    if (at := step_at) is None:
+        detected = (clocks.steps.get(RECORD), *clocks.steps.values())
+        at = next((step.at for step in detected if step is not None), None)
     of_curves = {} if at is None else dict(_features_of(curves, judged, at))
-    notes = [
-        f"{curve.path}: {curve.repeated} repeated times: the last row of each is used"
-        for curve in curves
-        if curve.repeated
-    ]
-    notes += clocks.notes
-    notes += [
+    removed = [
         f"{name}: its features are read without {of_curve.removed}"
         for name, of_curve in of_curves.items()
         if of_curve.removed
@@ -180,8 +169,24 @@ def compare(
         judged,
         of_curves,
         results,
-        (*notes, *unread),
+        (*_repetitions(curves), *clocks.notes, *removed, *unread),
     )
+
+
+def _repetitions(curves: Iterable[Curve]) -> Iterator[str]:
+    for curve in curves:
+        if curve.repeated:
+            yield f"{curve.path}: {curve.repeated} repeated times: the last row of each is used"
+
+
+def _refuse_without_step(curves: Iterable[Curve], clocks: "ComparedClocks") -> None:
+    """Raise RecordError for a curve that cannot be aligned."""
+    for curve in curves:
+        if clocks.steps.get(curve.name) is None:
+            raise RecordError(
+                f"--align: {curve.name}, {curve.path}: no step is detected in it; "
+                "--shift B=SECONDS shifts the time of one"
+            )
 
 
 def _names(count: int) -> list[str]:

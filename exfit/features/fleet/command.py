@@ -140,19 +140,8 @@ def batch(
     from exfit.features.start.tables import is_table
 
     tables = [path for path in cases if is_table(path) and not path.is_dir()]
-    shown: AbstractContextManager[BatchObserver | None] = nullcontext()
-    if not (quiet or as_json):
-        from exfit.features.fleet import terminal
-        from exfit.output.terminal import console
-
-        if progress == "auto":
-            shown = terminal.BatchProgress(console()).running()
-    if events is not None:
-        from exfit.features.fleet.terminal import BatchEvents
-
-        events.folder = output
-        shown = nullcontext(BatchEvents(events))
-    with shown as observer:
+    lively = progress == "auto" and not (quiet or as_json)
+    with _observer(output, lively, events) as observer:
         fleet = fit_all(
             [path for path in cases if path not in tables],
             output,
@@ -174,8 +163,24 @@ def batch(
     if as_json:
         print_json(fleet.to_dict())
     elif not quiet:
-        terminal.batch(console(), fleet)
+        from exfit.features.fleet.terminal import batch as show_batch
+        from exfit.output.terminal import console
+
+        show_batch(console(), fleet)
     _exit(fleet)
+
+
+def _observer(
+    output: Path, lively: bool, events: "Events | None"
+) -> "AbstractContextManager[BatchObserver | None]":
+    """Show the cases of a batch as they end: as events, or in a live table."""
+    from exfit.features.fleet.terminal import BatchEvents, BatchProgress
+    from exfit.output.terminal import console
+
+    if events is not None:
+        events.folder = output
+        return nullcontext(BatchEvents(events))
+    return BatchProgress(console()).running() if lively else nullcontext()
 
 
 def _cases_of(tables: Sequence[Path], folder: Path) -> "dict[Path, CaseMaking]":

@@ -109,29 +109,22 @@ def export(
         result = _translated(result, translation)
     of_fit = [*_of_fit(result, files.program)]
     content, warnings = content_of(result.case_text, result.case), list[str]()
-    given = (result, content, files.program)
-    exciter = _exciter(*given, model)
-    written = [*_added(*given, "machine", warnings)]
-    if exciter is not None:
-        written.append(exciter)
-        record = exciter.definition.record
-        if _times_speed(content) and not record.times_speed and SPEED_FLAG not in record.cons:
-            text = f"fitted with efd_times_speed; {record.name} does not multiply efd by the speed"
-            of_fit.append(text)
-    for kind in ("stabiliser", "governor"):
-        written += _added(*given, kind, warnings)
-    written += _limiters(*given, () if exciter is None else exciter.values, warnings)
+    exciter = _exciter(result, content, files.program, model)
+    if exciter is not None and _loses_speed(content, exciter.definition.record):
+        name = exciter.definition.record.name
+        of_fit.append(f"fitted with efd_times_speed; {name} does not multiply efd by the speed")
+    written = [*_parts(result, content, files.program, exciter, warnings)]
     if not written:
         raise ExfitError(f"{result.model} has no {files.program} record")
     comments += [f"{text}." for text in of_fit]
+    lines = list[str]()
     for own in written:
         warnings += _warnings(own)
         comments += _comments(own)
-    lines = [line for text in comments for line in comment_lines(text, files)]
-    lines += [
-        files.record_text(own.definition, {**own.values, **own.unused}, bus, machine_id)
-        for own in written
-    ]
+        lines.append(
+            files.record_text(own.definition, {**own.values, **own.unused}, bus, machine_id)
+        )
+    lines = [*(line for text in comments for line in comment_lines(text, files)), *lines]
     return Exported("\n".join(lines) + "\n", (*of_fit, *warnings))
 
 
@@ -149,6 +142,28 @@ def _comments(entry: Written) -> Iterator[str]:
         if source != TYPICAL:
             yield f"{entry.definition.record.name}: {source}: {' '.join(symbols)}."
     yield from (f"{warning}." for warning in _warnings(entry))
+
+
+def _loses_speed(content: Content, record: DynamicsRecord) -> bool:
+    """Whether the speed multiplies the efd of a fit, but not that of a record."""
+    return _times_speed(content) and not (record.times_speed or SPEED_FLAG in record.cons)
+
+
+def _parts(
+    result: FitResult,
+    content: Content,
+    program: str,
+    exciter: Written | None,
+    warnings: list[str],
+) -> Iterator[Written]:
+    """Yield the records of a fit in their order; add what is lost."""
+    given = (result, content, program)
+    yield from _added(*given, "machine", warnings)
+    if exciter is not None:
+        yield exciter
+    for kind in ("stabiliser", "governor"):
+        yield from _added(*given, kind, warnings)
+    yield from _limiters(*given, () if exciter is None else exciter.values, warnings)
 
 
 def place_of(result: FitResult) -> tuple[int, str]:

@@ -12,7 +12,7 @@ from exfit.case.suggestion import Base, RecordSettings, bases_of, relative
 from exfit.errors import DynamicsError, ExfitError
 from exfit.features.planner.fields import located
 from exfit.features.planner.import_case import imported_case, unit_data, units_of_file
-from exfit.features.planner.units import DynamicsUnits, Unit
+from exfit.features.planner.units import DynamicsUnits, RefusedUnit, Unit
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
 from exfit.features.start.starting_case import (
     MadeCase,
@@ -162,10 +162,8 @@ def import_units(
     )
     folder = Path(folder)
     plan = plan_import(Path(dyr), None if records is None else Path(records))
-    names = () if force else (*plan.names, UNITS)
-    if existing := [str(folder / name) for name in names if (folder / name).exists()]:
-        listed = "\n".join(first_texts(existing))
-        raise ExfitError(f"{listed}\nexist already; --force writes over them")
+    if not force:
+        _refuse_existing(folder / name for name in (*plan.names, UNITS))
     rows, texts, doubts, used = list[ImportedUnit](), dict[str, str](), list[str](), set[str]()
     file = relative(plan.dyr, folder)
     for unit in plan.units.units:
@@ -182,31 +180,47 @@ def import_units(
             texts[name] = made.draft.text
             doubts += made.doubts
             used.update(made.sizes)
-        added = {part.definition.kind: part.definition.record.name for part in unit.added}
-        row = ImportedUnit(
-            bus=unit.bus,
-            id=unit.id,
-            line=unit.machine.line,
-            machine=unit.machine.definition.record.name,
-            exciter=unit.exciter.definition.record.name,
-            stabiliser=added.get("stabiliser", ""),
-            governor=added.get("governor", ""),
-            status=status,
-            case=name,
-            records="; ".join(str(path) for path in files),
-            notes="; ".join(notes),
-        )
-        rows.append(row)
-    for refused in plan.units.refused:
-        status = REFUSED if refused.modelled else NO_MODEL
-        text = "; ".join(f"line {fault.line}: {fault.text}" for fault in refused.faults)
-        place = (refused.bus, refused.id, refused.line)
-        rows.append(ImportedUnit(*place, "", "", "", "", status, "", "", text))
-    if unused := [size for size in steps if size not in used]:
-        raise ExfitError(f"--step {unused[0]}: no test of that name in any record")
+        rows.append(_row(unit, status, name, files, notes))
+    rows += map(_refused, plan.units.refused)
+    for size in steps:
+        if size not in used:
+            raise ExfitError(f"--step {size}: no test of that name in any record")
     rows.sort(key=lambda row: row.line)
     write_each(folder, {**texts, UNITS: units_table(rows)})
     return ImportedUnits(tuple(rows), texts, tuple(doubts), plan)
+
+
+def _refuse_existing(files: Iterable[Path]) -> None:
+    """Raise ExfitError with the files that exist."""
+    if existing := [str(file) for file in files if file.exists()]:
+        listed = "\n".join(first_texts(existing))
+        raise ExfitError(f"{listed}\nexist already; --force writes over them")
+
+
+def _row(
+    unit: Unit, status: str, case: str, records: Iterable[Path], notes: Iterable[str]
+) -> ImportedUnit:
+    added = {part.definition.kind: part.definition.record.name for part in unit.added}
+    return ImportedUnit(
+        bus=unit.bus,
+        id=unit.id,
+        line=unit.machine.line,
+        machine=unit.machine.definition.record.name,
+        exciter=unit.exciter.definition.record.name,
+        stabiliser=added.get("stabiliser", ""),
+        governor=added.get("governor", ""),
+        status=status,
+        case=case,
+        records="; ".join(map(str, records)),
+        notes="; ".join(notes),
+    )
+
+
+def _refused(unit: RefusedUnit) -> ImportedUnit:
+    """Make the row of a unit that has no case."""
+    status = REFUSED if unit.modelled else NO_MODEL
+    text = "; ".join(f"line {fault.line}: {fault.text}" for fault in unit.faults)
+    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", "", status, "", "", text)
 
 
 def _made(
