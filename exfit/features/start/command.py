@@ -141,8 +141,9 @@ def new(
 ) -> None:
     """Make a commented case from a record: its tests, the data of the unit, what is free.
 
-    On a terminal it asks what no option and no file of answers says: what the question means, where
-    the answer is found, and a proposal. Ctrl-C keeps the answers.
+    On a terminal it asks for what it needs, unless --record (or --tests) and --model (or --dyr) are
+    given: then only for what the case cannot do without. Each question says where the answer is
+    found, and most propose one. Ctrl-C keeps the answers.
 
     The file of a phasor measurement unit is a grid event, which is played back into the unit.
     Of several tests in a record, each is a record of the case with a window; the first is fitted,
@@ -165,8 +166,10 @@ def new(
     if "output" in given:
         refuse_existing(Path(given["output"]), force)
     asks = is_terminal()
+    enough = {"record", "tests"} & given.keys() and {"model", "dyr"} & given.keys()
+    converses = asks and (answers_file is not None or not enough)
     if asks:
-        complete(given, read, "new", introduced=answers_file is None)
+        complete(given, read, "new", answers_file is None, converses)
     elif answers_file is not None:
         refuse_missing(given, read, answers_file)
     elif not {"record", "tests"} & given.keys():
@@ -179,7 +182,7 @@ def new(
     write_text(made.draft.text, output, ())
     if output is None:
         return
-    if asks and answers_file is None and "record" in given:
+    if converses and answers_file is None and "record" in given:
         finish(given, read, made, output)
         return
     echo(f"written to {output}; next: exfit check {output}")
@@ -245,18 +248,28 @@ def facts_by_name(texts: tuple[str, ...]) -> dict[str, str]:
     return facts
 
 
-def complete(given: "Given", read: "Inspections", command: str, introduced: bool) -> None:
-    """Ask what is not given; raises Interruption at Ctrl-C, when the answers are in a file."""
-    from exfit.features.start.conversation import converse
+def complete(
+    given: "Given", read: "Inspections", command: str, introduced: bool, converses: bool = True
+) -> None:
+    """Ask what is not given, or only what the case cannot do without.
+
+    Raises Interruption at Ctrl-C, when the answers are in a file.
+    """
+    from exfit.features.start.conversation import converse, fill_in
 
     try:
-        converse(given, read, introduced, command == "new" and names_case(given))
+        if converses:
+            converse(given, read, introduced, command == "new" and names_case(given))
+        else:
+            fill_in(given, read)
     except (click.Abort, KeyboardInterrupt):
         if not given:
             raise Interruption("nothing was answered") from None
         stem = Path(str(given.get("record") or "exfit")).stem
         path = keep(given, Path(stem + ENDING))
         resume = f"exfit {command} --answers {path}"
+        if "output" in given:
+            resume += f" -o {given['output']}"
         raise Interruption(f"the answers are kept; to go on:\n{resume}") from None
 
 

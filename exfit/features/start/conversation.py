@@ -63,6 +63,11 @@ CHOICES = {"connection": ("phase-to-ground", "phase-to-phase"), "angle_unit": ("
 FACTS = ("Plant", "Unit", "Tested by")
 
 
+def fill_in(given: Given, read: Inspections) -> None:
+    """Ask only what the case cannot do without; raises click.Abort at Ctrl-C and Ctrl-D."""
+    _fill_in(Conversation(given, read), of_unit=True)
+
+
 def converse(given: Given, read: Inspections, introduced: bool, names_case: bool) -> None:
     """Ask what is not given, and add the answers to ``given`` one by one.
 

@@ -29,6 +29,7 @@ from exfit.util.text import dotted, listed, near
 from exfit.util.vocabulary import TYPICAL
 
 ON_LOAD = "on load"  # in the meaning of a parameter that acts there alone
+HINTS = {"mva": "rated power of the unit"}  # of what has no hint in the case
 TITLES = {"machine": "generator", "exciter": "exciter"}
 ANY_MODEL = "SEXS"  # where that of the unit is not known yet
 
@@ -203,5 +204,6 @@ def missing_in(answers: Answers, folder: Path, read: Inspections) -> dict[str, s
     if "record" not in missing:
         case = new_case(answers, folder, read)
         for value in case.open:
-            missing.setdefault(key_of(value, answers, case.tests), value.hint)
+            key = key_of(value, answers, case.tests)
+            missing.setdefault(key, value.hint or HINTS.get(key, "the record does not show it"))
     return missing

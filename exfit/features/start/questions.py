@@ -95,9 +95,10 @@ def ask(
 def number(text: str) -> float:
     """Read a number; raises ExfitError."""
     try:
-        return float(text.replace(",", "."))
+        return float(text)
     except ValueError:
-        raise ExfitError(f"{text!r} is not a number") from None
+        with_point = "; decimals have a point" if "," in text else ""
+        raise ExfitError(f"{text!r} is not a number{with_point}") from None
 
 
 def one_of(words: Sequence[str], numbered: bool = False) -> Callable[[str], str]:

@@ -99,6 +99,8 @@ def _ask_model() -> str:
         for kind, words in zip(FAMILIES, KINDS.values(), strict=True):
             if text.upper() in (kind, str(FAMILIES.index(kind) + 1), words[:6].upper()):
                 return kind
+        if not text:
+            raise ExfitError("A type or a model is needed; ? explains")
         return by_name(text)
 
     list_rows({str(k): KINDS[kind] for k, kind in enumerate(FAMILIES, 1)})

@@ -123,7 +123,6 @@ def verify(
     pages = write_report(folder, place, force)
     if show.shown:
         echo(f"report: {', '.join(map(str, pages))}")
-        echo(f"verdict: {result.verdict.verdict}")
     if not result.holds:
         raise SystemExit(NOT_CONVERGED)
 

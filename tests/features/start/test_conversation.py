@@ -127,16 +127,18 @@ def test_what_was_answered_before_an_interruption_is_not_asked_again(folder, tal
 def test_with_a_planners_file_only_the_size_of_the_step_and_facts_are_asked(folder, talk):
     for name in ("unit.dyr", "ac1a_channels.csv"):
         copy(SAMPLES / name, folder)
-    options = ("--record", "ac1a_channels.csv", "--dyr", "unit.dyr", "--bus", "101")
-    ran = talk("new", *options, lines=["", "", "", "", ""])
+    options = ("--dyr", "unit.dyr", "--bus", "101")
+    ran = talk("new", *options, lines=["", "", "", "", "", ""])
     assert ran.exit_code == 0, ran.output
     asked = [line for line in ran.output.splitlines() if line.rstrip().endswith((":", "]:"))]
     assert [text.split(",")[0].split("[")[0].strip(" :") for text in asked] == [
-        "Size of the 2 steps", "Plant", "Unit", "Tested by", "File for the case"
+        "Record of the test: its number", "Size of the 2 steps", "Plant", "Unit", "Tested by",
+        "File for the case",
     ]  # fmt: skip
     assert "typical" not in ran.output
     assert load_case(folder / "ac1a_channels.yaml").as_found.bus == 101
-    ran = talk("new", *options, "--step", "0.05", "-o", "other.yaml", lines=["", "", ""])
+    options = ("--record", "ac1a_channels.csv", *options, "--step", "0.05", "-o", "other.yaml")
+    ran = talk("new", *options, lines=[])  # whose record and unit are given: nothing is asked
     assert ran.exit_code == 0, ran.output
     assert load_case(folder / "other.yaml").values() == (
         load_case(folder / "ac1a_channels.yaml").values()

@@ -13,6 +13,7 @@ import exfit
 from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
+from exfit.features.start.answers import Answers
 
 ANSWERS = SAMPLES / "field_answers.yaml"
 TRUTH = {
@@ -42,7 +43,9 @@ def test_one_command_leads_from_a_record_to_a_report_whose_intervals_hold_the_tr
     """No file is edited, and each value is given once."""
     ran = run("verify", SAMPLES / "field_record.csv", "--answers", ANSWERS, "-o", "report.html")
     assert ran.code == 0, ran.err
-    assert ran.out.splitlines()[-1] == "verdict: good"
+    *_, verdict, last = ran.out.splitlines()
+    assert verdict.startswith("verdict: good: ")
+    assert last == "report: report.html"
     parameters = result_in(empty_folder / "runs" / "field_record-fit")["parameters"]
     missed = [
         symbol
@@ -54,11 +57,13 @@ def test_one_command_leads_from_a_record_to_a_report_whose_intervals_hold_the_tr
     assert "N. N." in page
 
 
-def test_verify_writes_case_fit_and_report_and_ends_with_the_verdict(empty_folder, run, locally):
+def test_verify_writes_case_fit_and_report_and_ends_with_the_verdict_and_its_page(
+    empty_folder, run, locally
+):
     ran = run("verify", SAMPLES / "field_record.csv", "--answers", ANSWERS, "-o", "out/r.html")
     assert ran.code in (0, 3), ran.err
-    assert ran.out.splitlines()[-1].startswith("verdict: ")
-    assert "report: out/r.html" in ran.out
+    assert "\nverdict: " in ran.out
+    assert ran.out.splitlines()[-1] == "report: out/r.html"
     assert (empty_folder / "out" / "r.html").is_file()
     case = load_case(empty_folder / "out" / "field_record.yaml")
     assert {case.sources()[f"machine.{name}"] for name in ("Tpd0", "S12")} == {"maker"}
@@ -92,6 +97,13 @@ def test_a_grid_event_is_verified_with_a_planners_file(empty_folder, run, monkey
     assert "as far as this test goes" in ran.err
     (case,) = fitted
     assert case.plant.type == "grid-playback"
+
+
+def test_each_answer_that_is_missing_has_its_meaning(run):
+    ran = run("verify", SAMPLES / "grid_event.csv", "--dyr", SAMPLES / "unit.dyr")
+    missing = [line.partition(": missing: ") for line in ran.err.splitlines() if "missing" in line]
+    assert {"kv", "mva"} <= {key.split()[-1] for key, _, _ in missing}
+    assert all(meaning.strip() for _, _, meaning in missing)
 
 
 def test_all_that_is_missing_is_named_at_once_by_its_key(empty_folder, run):
@@ -199,3 +211,9 @@ def test_the_case_of_python_is_that_of_the_command(empty_folder, run):
     text = exfit.new(SAMPLES / "field_record.csv", "AC1A", step={"up": 0.05}, kv=15.75,
                      about={"Unit": "3"})  # fmt: skip
     assert ran.out == text
+
+
+def test_the_page_names_every_key_of_the_answers():
+    page = (SAMPLES.parent / "docs" / "own_record.md").read_text(encoding="utf-8")
+    keys = {field.alias or name for name, field in Answers.model_fields.items()}
+    assert {key for key in keys if f"`{key}`" not in page} == set()
