@@ -166,18 +166,15 @@ def new(
     if "output" in given:
         refuse_existing(Path(given["output"]), force)
     asks = is_terminal()
-    enough = {"record", "tests"} & given.keys() and {"model", "dyr"} & given.keys()
-    converses = asks and (answers_file is not None or not enough)
+    converses = asks and (answers_file is not None or bool(lacking(given)))
     if asks:
         complete(given, read, "new", answers_file is None, converses)
     elif answers_file is not None:
         refuse_missing(given, read, answers_file)
-    elif not {"record", "tests"} & given.keys():
-        raise click.UsageError("Missing option '--record', or '--tests'.")
-    elif not {"model", "dyr"} & given.keys():
-        raise click.UsageError("Missing option '--model', or '--dyr'.")
+    elif lacking(given):
+        raise click.UsageError(f"Missing option {lacking(given)}.")
     output = Path(given["output"]) if "output" in given else None
-    made = new_case(checked(given), Path() if output is None else output.parent, read)
+    made = new_case(checked(given), (output or Path()).parent, read)
     warn(made.doubts)
     write_text(made.draft.text, output, ())
     if output is None:
@@ -189,6 +186,13 @@ def new(
     for value in made.open:
         hint = f" ({value.hint})" if value.hint else ""
         echo(f"to be filled in: {dotted(value.place)}{hint}, line {value.line}")
+
+
+def lacking(given: "Given") -> str:
+    """Name the options without which there is no record, or no unit."""
+    if not {"record", "tests"} & given.keys():
+        return "'--record', or '--tests'"
+    return "" if {"model", "dyr"} & given.keys() else "'--model', or '--dyr'"
 
 
 def is_terminal() -> bool:
