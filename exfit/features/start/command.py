@@ -181,7 +181,12 @@ def new(
         return
     if converses and answers_file is None and "record" in given:
         finish(given, read, made, output)
-        return
+    else:
+        list_open(made, output)
+
+
+def list_open(made: "NewCase", output: Path) -> None:
+    """Say where a case was written, and what is open in it."""
     echo(f"written to {output}; next: exfit check {output}")
     for value in made.open:
         hint = f" ({value.hint})" if value.hint else ""
