@@ -198,9 +198,7 @@ def levels_at_rest(
     return float(np.mean(overlay.measured[before])), float(np.mean(overlay.simulated[before]))
 
 
-def unsteady_signals(
-    record: Record, steady: float, channels: Sequence[Channel] = ()
-) -> Iterator[Cause]:
+def unsteady_signals(record: Record, steady: float, channels: Sequence[Channel]) -> Iterator[Cause]:
     """Yield the signals of a record that drift before the instant ``steady`` (s)."""
     smooth = {
         channel.signal: channel.filtering.smooth_over for channel in channels if channel.filtering

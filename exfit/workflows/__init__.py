@@ -236,17 +236,15 @@ def validation_result(
     fitted then. ``sources`` says where values come from that are given by name.
     """
     from exfit.fitting.program import program_of
-    from exfit.results.description import versions
     from exfit.results.model import FitResult
     from exfit.workflows import validation
-    from exfit.workflows.validation import validation_result
 
     if isinstance(values, FitResult):
         sources = values.sources
     case = loaded(case, values)
     with program_of(case) as program:  # it runs the model as found, too
         compared = validation.validate(case, values, record, step, at, program)
-        return validation_result(compared, versions(), sources or {}, program)
+        return validation.validation_result(compared, sources or {}, program)
 
 
 def profile(

@@ -210,19 +210,13 @@ def judge_of(
                 yield f"the error, {rmse:.3e} pu, exceeded good_enough, {good_enough.rmse:g} pu"
         yield from refusals(values, matches)
 
-    def refused(end: estimate.Result) -> str:
+    def first(objections: Callable[[estimate.Result], Iterator[str]], end: estimate.Result) -> str:
         try:
-            return next(filter(None, refusals(*fitted(end))), "")
+            return next(filter(None, objections(end)), "")
         except SimulationError as fault:
             return str(fault)
 
-    def doubt(end: estimate.Result) -> str:
-        try:
-            return next(filter(None, doubts(end)), "")
-        except SimulationError as fault:
-            return str(fault)
-
-    return Judge(refused, doubt)
+    return Judge(partial(first, lambda end: refusals(*fitted(end))), partial(first, doubts))
 
 
 def _beyond_noise(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:

@@ -254,7 +254,7 @@ def behaviour_of(
     return Behaviour(tuple(flat_runs), tuple(map(_small_signal, alike.values())), tuple(limits))
 
 
-def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
+def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str]) -> float:
     """Measure the stray of signals from their start (pu) in FLAT_SECONDS without any change.
 
     ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
@@ -278,9 +278,7 @@ def _small_signal(alike: Sequence[TestWithValues]) -> SmallSignalView:
         return SmallSignalView(names, None, str(fault))
 
 
-def as_found_of(
-    case: Case, tests: Sequence[TestWithValues], program: Program | None = None
-) -> AsFound:
+def as_found_of(case: Case, tests: Sequence[TestWithValues], program: Program | None) -> AsFound:
     """Return the model before the test, which the case states or starts from, and its responses.
 
     ``tests`` are all tests with what was found about their records among the values: step

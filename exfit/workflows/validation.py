@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from exfit.fitting.validation_steps import GivenSteps, SetupOfRecord, with_steps
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
-from exfit.results.description import OtherProgram, RecordedTest
+from exfit.results.description import OtherProgram, RecordedTest, versions
 from exfit.results.validation_result import ValidationResult
 from exfit.util.file_names import folded
 from exfit.util.vocabulary import NOT_STATED, Criteria
@@ -287,9 +286,8 @@ AS_FOUND = "the model as found, before any fit"
 
 def validation_result(
     validation: Validation,
-    versions: Mapping[str, str],
-    sources: Mapping[str, str] = MappingProxyType({}),
-    program: Program | None = None,
+    sources: Mapping[str, str],
+    program: Program | None,
 ) -> ValidationResult:
     """Return a validation with all that a report shows of it.
 
@@ -309,7 +307,7 @@ def validation_result(
         sources=_sources(validation, sources),
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
         matches=tuple(validation.comparisons),
-        versions=versions,
+        versions=versions(),
         inputs=hashes,
         parts=tuple(parts_of(case)),
         tests=tuple(_described(validation, setups)),

@@ -77,7 +77,7 @@ def test_a_run_without_a_step_stays_flat(first_order):
 def test_the_drift_of_a_flat_run_can_be_computed_alone(first_order):
     (setup,) = build_experiments(first_order)
     one, values = setup.experiment, {"k": 4.0, "a": 2.0} | first_order.values()
-    assert flat_drift(one.with_inputs(values), one.parameters(values)) < 1e-12
+    assert flat_drift(*one.at(values), ["vt"]) < 1e-12
 
 
 def test_a_run_that_drifts_is_found(first_order, monkeypatch):

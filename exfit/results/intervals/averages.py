@@ -11,7 +11,6 @@ Source: Cox 1962, Further results on tests of separate families of hypotheses.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,18 +32,6 @@ LONGEST = 0.1  # of the record: a longer window hides the response
 MATTERS = 0.5  # standard errors
 MOST_SAMPLES = 100_000  # of all records: so many are no low rate
 UNSEEN = 1e-9  # of the largest singular value: rounding
-
-
-class AveragesTried(NamedTuple):
-    """Residuals with averages over a window (s), and what they gain in chi-square by linear theory.
-
-    ``of_rate``: over the time between samples, about each of them.
-    """
-
-    gain: float
-    window: float
-    of_rate: bool
-    averaged: Residuals
 
 
 def recorder_averages(
@@ -122,7 +109,7 @@ def _likeliest(
     left, singular, _ = np.linalg.svd(free, full_matrices=False)
     # what the parameters can do, orthonormal
     basis = np.asarray(left[:, singular > UNSEEN * np.max(singular, initial=0.0)])
-    candidates = list[AveragesTried]()
+    gains, candidates = list[float](), list[tuple[float, bool, Residuals]]()
     for window, of_rate, averaged in _averaged(residuals, numbers):
         # the errors alone: to differentiate them takes three times as long
         off = replace(averaged, robust=None)(theta)[: averaged.count]
@@ -135,11 +122,11 @@ def _likeliest(
         matters = float(np.linalg.norm(basis.T @ change)) > MATTERS * np.sqrt(variance)
         visible = float(np.max(np.abs(change))) > LEAST_NOISE
         if matters and visible and (of_rate or gain > STRONG):
-            candidates.append(AveragesTried(gain, window, of_rate, averaged))
-    best = max(candidates, key=lambda each: each.gain, default=None)
-    for each in candidates:
-        if each.of_rate or each is best:
-            yield each.window, each.averaged
+            gains.append(gain)
+            candidates.append((window, of_rate, averaged))
+    for k, (window, of_rate, averaged) in enumerate(candidates):
+        if of_rate or k == np.argmax(gains):
+            yield window, averaged
 
 
 def _averaged(
