@@ -88,10 +88,6 @@ class UncertaintyAnalysis:
     by_few_samples: Mapping[str, str] = field(default_factory=dict)
     given_errors: Mapping[str, GivenError] = field(default_factory=dict)
 
-    def variance_given(self, name: str) -> float:
-        """Variance of a parameter by the errors of given values."""
-        return sum(error.shifts[name] ** 2 for error in self.given_errors.values())
-
     def with_parameters(self, parameters: Mapping[str, Uncertainty]) -> "UncertaintyAnalysis":
         """Return it with what is known of each parameter in place of its own."""
         return replace(self, confidence=replace(self.confidence, parameters=parameters))

@@ -176,8 +176,9 @@ def quantiles_of(factors: Factors, noise: tuple[Noise, ...], dof: float) -> Arra
 
 def _variance_ratios(factors: Factors, noise: tuple[Noise, ...]) -> Array:
     """Return the variances (N,) over those by the cost alone, nan where there are none."""
+    by_cost = factors.of_all(factors.spread)  # the inverse of its second derivatives
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.diag(factors.covariance(noise)) / np.diag(factors.inverse)
+        return np.diag(factors.covariance(noise)) / np.diag(by_cost)
 
 
 def partners_on_bounds(

@@ -305,11 +305,6 @@ class Factors:
         variance = np.diag(self.covariance(noise)) - np.sum(amplitudes**2, axis=1)
         return np.sqrt(np.maximum(variance, 0.0)), amplitudes
 
-    @property
-    def inverse(self) -> Array:
-        """The inverse of A: of the second derivatives that the cost has, (N, N)."""
-        return self.of_all(self.spread)
-
     def of_all(self, root: Array) -> Array:
         """Return root root' (k, k) for all parameters (N, N), nan where nothing is determined."""
         count = len(self.lin.names)

@@ -64,10 +64,6 @@ class Whitening(NamedTuple):
     deviations: Array
     shift: Array
 
-    def shifted(self, shift: Array) -> "Whitening":
-        """Return the same with another shift (M,)."""
-        return self._replace(shift=shift)
-
     def errors(self, errors: Array) -> Array:
         """Return errors (K, M) as white ones."""
         return self.slopes(errors.T).T - self.shift

@@ -108,7 +108,7 @@ def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[Verdict
 def _no_match(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
     """Word signals that a constant matches as well: the judged one, and others that are seen."""
     seen = {(test.record, test.signal) for test in tests if test.are_seen}
-    for comparison in evidence.comparisons:
+    for _, _, comparison in evidence.records:
         judged = comparison.judged_by
         signals = [judged, *(signal for signal in comparison.channels if signal != judged)]
         for signal in signals:

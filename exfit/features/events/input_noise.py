@@ -335,7 +335,7 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     bias = -roots @ (roots.T @ gradient)
     shifts = np.split(-jacobian @ bias, np.cumsum([sum(e.sizes) for e in residuals.experiments]))
     experiments = [
-        replace(experiment, whitening=experiment.whitening.shifted(shift))
+        replace(experiment, whitening=experiment.whitening._replace(shift=shift))
         for experiment, shift in zip(residuals.experiments, shifts, strict=False)
         if experiment.whitening is not None
     ]

@@ -349,7 +349,6 @@ class FreeInstant(NamedTuple):
 
     place: int
     name: str
-    test: int
     experiment: Experiment
 
     @property
@@ -363,11 +362,11 @@ class FreeInstant(NamedTuple):
 def free_instants(problem: FitProblem) -> Iterator[FreeInstant]:
     """Yield the instants that are free where a channel jumps with the step."""
     places = {parameter.name: k for k, parameter in enumerate(problem.residuals.free)}
-    for test, experiment in enumerate(problem.residuals.experiments):
+    for experiment in problem.residuals.experiments:
         if any(SIGNALS[signal].jumps for signal in experiment.signals):
             for nuisance in experiment.nuisances:
                 if nuisance.kind == "at" and nuisance.name in places:
-                    yield FreeInstant(places[nuisance.name], nuisance.name, test, experiment)
+                    yield FreeInstant(places[nuisance.name], nuisance.name, experiment)
 
 
 def minima_between_samples(problem: FitProblem, x: Array) -> list[FoundMinimum]:

@@ -124,11 +124,11 @@ def given_error_notes(
     given, parameters = uncertainty.given_errors, uncertainty.confidence.parameters
     if not given:
         return
-    ratios = {
-        name: own.std_error / sqrt(max(own.std_error**2 - uncertainty.variance_given(name), TINY))
-        for name, own in parameters.items()
-        if own.std_error and name not in of_record
-    }
+    ratios = {}
+    for name, own in parameters.items():
+        if own.std_error and name not in of_record:
+            by_given = sum(error.shifts[name] ** 2 for error in given.values())
+            ratios[name] = own.std_error / sqrt(max(own.std_error**2 - by_given, TINY))
     text = f"the intervals include the errors of {listed([*given])} (given)"
     if ratios:
         widest = max(ratios, key=lambda name: ratios[name])

@@ -147,11 +147,6 @@ class Evidence:
         return any(each.whitening is not None for each in self.residuals.experiments)
 
     @property
-    def comparisons(self) -> tuple[Comparison, ...]:
-        """The matches with the records of the fit."""
-        return tuple(record.comparison for record in self.records)
-
-    @property
     def cost(self) -> float:
         """Cost of the fit, where it ended."""
         return self.solution.cost
