@@ -10,10 +10,10 @@ class ExfitError(Exception):
 
 
 class FileError(ExfitError):
-    """Faults of a file, or of several, together: the message has the first, ``faults`` all."""
+    """A fault of a file, or several together: the message has the first, ``faults`` all."""
 
-    def __init__(self, faults: Iterable[str]) -> None:
-        self.faults = tuple(faults)
+    def __init__(self, faults: str | Iterable[str]) -> None:
+        self.faults = (faults,) if isinstance(faults, str) else tuple(faults)
         super().__init__("\n".join(first_texts(self.faults)))
 
 

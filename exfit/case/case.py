@@ -151,7 +151,7 @@ class Case:
         }
         if name not in sections:
             hint = near(name, sections) if sections else "it has none: give it to Case.from_dict"
-            raise CaseError([f"{self.path}: {name}: not a record of the case; {hint}"])
+            raise CaseError(f"{self.path}: {name}: not a record of the case; {hint}")
         missing = [signal for signal in sections[name].channels if signal not in record.signals]
         if missing:
             raise CaseError(

@@ -220,9 +220,7 @@ def refuse_changed_program(case: Case, sha256: str) -> None:
             own = hashlib.file_digest(opened, "sha256").hexdigest()
         if own != sha256:
             raise CaseError(
-                [
-                    f"{file}: not run: the file has changed since the fit: its SHA-256 begins with "
-                    f"{own[:HASH_DIGITS]}, that of the fitted program was {sha256[:HASH_DIGITS]}; "
-                    "fit again"
-                ]
+                f"{file}: not run: the file has changed since the fit: its SHA-256 begins with "
+                f"{own[:HASH_DIGITS]}, that of the fitted program was {sha256[:HASH_DIGITS]}; "
+                "fit again"
             )

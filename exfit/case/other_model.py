@@ -85,7 +85,7 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
     Raises CaseError where it has no exciter, or where another part follows that.
     """
     if case.parts.exciter is None:
-        raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to replace"])
+        raise CaseError(f"{case.path}: plant {case.plant.type} has no exciter to replace")
     symbols = (row.symbol for row in case.parts.exciter.sheet)
     own = {*symbols, *case.parameters.free, *case.parameters.fixed}  # with helpers of its ties
     _refuse_followers(case, own)

@@ -65,7 +65,7 @@ def read_text(path: Path) -> str:
     try:
         return utf8(read_limited(path, LARGEST_FILE), path)
     except ExfitError as error:
-        raise CaseError([str(error)]) from None
+        raise CaseError(str(error)) from None
 
 
 def decoded(data: bytes, path: Path) -> str:
@@ -73,7 +73,7 @@ def decoded(data: bytes, path: Path) -> str:
     try:
         return utf8(data, path)
     except ExfitError as error:
-        raise CaseError([str(error)]) from None
+        raise CaseError(str(error)) from None
 
 
 def read_yaml(text: str, path: Path) -> tuple[YamlNode, list[Fault]]:
@@ -85,20 +85,20 @@ def read_yaml(text: str, path: Path) -> tuple[YamlNode, list[Fault]]:
     try:
         top = reader.document()
     except _NoYaml as error:
-        raise CaseError([f"{path}:{error.line}: {error}"]) from None
+        raise CaseError(f"{path}:{error.line}: {error}") from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = ", ".join(part for part in (error.problem, error.context) if part)
-        raise CaseError([f"{path}:{mark.line + 1 if mark else 1}: not YAML: {what}"]) from None
+        raise CaseError(f"{path}:{mark.line + 1 if mark else 1}: not YAML: {what}") from None
     except yaml.YAMLError as error:
         line = text.count("\n", 0, getattr(error, "position", 0)) + 1
         what = str(error).partition("\n")[0]
-        raise CaseError([f"{path}:{line}: not YAML: {what}"]) from None
+        raise CaseError(f"{path}:{line}: not YAML: {what}") from None
     if top is None:
-        raise CaseError([f"{path}: the file is empty"])
+        raise CaseError(f"{path}: the file is empty")
     if not isinstance(top.value, dict):
         what = "a list" if isinstance(top.value, list) else repr(top.value)
-        raise CaseError([f"{path}:{top.line}: {what}, not a mapping (key: value) at the top"])
+        raise CaseError(f"{path}:{top.line}: {what}, not a mapping (key: value) at the top")
     return top, reader.faults
 
 

@@ -218,7 +218,7 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
         return case, parameters
     if source is None:
         text = f"this case was not fitted yet: run exfit fit, or give {OTHER_VALUES}"
-        raise CaseError([f"{path}: {text}"])
+        raise CaseError(f"{path}: {text}")
     return case, source
 
 

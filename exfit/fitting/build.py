@@ -40,7 +40,7 @@ def build_experiments(case: Case, start: Values | None = None) -> tuple[Experime
     ``start`` are the case's values, where they are at hand.
     """
     if not case.recordings:
-        raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
+        raise CaseError(f"{case.path}: record: missing; a fit needs a record")
     values = case.values() if start is None else start
     return tuple(build_experiment(case, recording, values) for recording in case.recordings)
 
@@ -204,7 +204,7 @@ def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:
         if given is not None and not own.low <= given.value <= own.high:
             limits = f"{own.low:g} ... {own.high:g}"
             text = f"{own.name}: {given.value:g} lies outside its bounds {limits} in {case.path}"
-            raise CaseError([f"{given.source}: {text}"])
+            raise CaseError(f"{given.source}: {text}")
         free.append(own if given is None else replace(own, start=given.value))
     return replace(setup, free=tuple(free))
 
@@ -246,7 +246,7 @@ def _network_steps(case: Case, test: BumpTest, values: Values) -> Iterator[Input
                 now[name] = None if level is None else level + step
         if now["E"] is not None and now["E"] <= 0.0:
             text = f"at {event.at:g} s the source falls to {now['E']:g} pu; it must stay above 0"
-            raise CaseError([f"{case.path}: test: {text}"])
+            raise CaseError(f"{case.path}: test: {text}")
 
 
 def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
@@ -265,10 +265,8 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
     count = max(1.0, duration / case.simulation.output_step)
     if count > MOST_STEPS:
         raise CaseError(
-            [
-                f"{case.path}: simulation.output_step: {case.simulation.output_step:g} s divides "
-                f"the duration of {duration:g} s into more than {MOST_STEPS:.0e} samples"
-            ]
+            f"{case.path}: simulation.output_step: {case.simulation.output_step:g} s divides "
+            f"the duration of {duration:g} s into more than {MOST_STEPS:.0e} samples"
         )
     times = np.linspace(0.0, duration, round(count) + 1)
     recorded: Mapping[str, RecordedInput] = {}

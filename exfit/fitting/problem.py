@@ -50,7 +50,7 @@ def residuals_of(
     """
     free = free_parameters(case, setups)
     if not free:
-        raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
+        raise CaseError(f"{case.path}: parameters.free: empty; a fit needs a free parameter")
     fixed = {**(case.values() if start is None else start)}
     for parameter in free:
         fixed.pop(parameter.name, None)

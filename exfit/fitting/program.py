@@ -98,7 +98,7 @@ def program_of(case: Case) -> AbstractContextManager[Program | None]:
     opener = parts("PROGRAMS").get(case.external.type)
     if opener is None:
         raise CaseError(
-            [f"{case.path}: plant.type: {case.external.type}: its feature is not installed"]
+            f"{case.path}: plant.type: {case.external.type}: its feature is not installed"
         )
     return cast(AbstractContextManager[Program | None], opener.load()(case))
 

@@ -69,7 +69,7 @@ def with_detected_steps(place: str, test: BumpTest, file: RecordFile, record: Re
         for k, (before, at) in enumerate(pairwise(instants), 1):
             if at <= before:
                 text = f"{at:g} s is not after {before:.4g} s, where the record shows the step"
-                raise CaseError([f"{place}.vref[{k}].at: {text} before"])
+                raise CaseError(f"{place}.vref[{k}].at: {text} before")
         test = test.model_copy(update={"vref": steps})
     if test.breaker is not None:
         opens = test.breaker.opens
@@ -167,7 +167,7 @@ def _with_bounds(place: str, given: Unknown, start: float, low: float, high: flo
     high = high if given.max is None else given.max
     if not low <= start <= high:
         text = f"the record shows {start:.4g}, outside {low:g} ... {high:g}"
-        raise CaseError([f"{place}: {text}"])
+        raise CaseError(f"{place}: {text}")
     return Unknown(start=start, min=low, max=high)
 
 

@@ -163,7 +163,7 @@ def _refuse_short_tables(case: Case, test: BumpTest, covered: Span, path: Path) 
         if not first <= covered[0] <= covered[1] <= last:
             rows, whole = (f"{show(a)} ... {show(b)} s" for a, b in ((first, last), covered))
             text = f"{rows} does not cover the test, {whole} of {path}: add a row"
-            raise CaseError([f"{case.path}: test.{signal}.table: {text}"])
+            raise CaseError(f"{case.path}: test.{signal}.table: {text}")
 
 
 # ---- sections as the reader takes them

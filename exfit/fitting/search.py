@@ -67,12 +67,12 @@ def fitted(
     residuals = problem.residuals
     samples, free = residuals.count, len(residuals.free)
     if samples < free:
-        raise CaseError([f"{case.path}: record: {samples} samples for {free} free parameters"])
+        raise CaseError(f"{case.path}: record: {samples} samples for {free} free parameters")
     for channel in residuals.channels:
         measured = channel.measured[channel.kept]
         if np.all(measured == measured[0]):
             level = f"{channel.signal} is {measured[0]:g} pu throughout"
-            raise CaseError([f"{case.path}: record: {level}: there is no step in it"])
+            raise CaseError(f"{case.path}: record: {level}: there is no step in it")
     with np.errstate(over="ignore"):
         errors = problem.compressed(residuals.start)
         square = float(errors @ errors)
@@ -93,14 +93,14 @@ def names_of_records(setups: Iterable[ExperimentSetup]) -> tuple[str, ...]:
 def checked_strategy(strategy: str) -> str:
     """Return a strategy, or raise CaseError where there is none of this name."""
     if strategy not in STRATEGIES:
-        raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])
+        raise CaseError(f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}")
     return strategy
 
 
 def checked_search(search: str) -> str:
     """Check the name of a search, or raise CaseError where there is none of this name."""
     if search not in SEARCHES:
-        raise CaseError([f"search: {search!r} is unknown; {near(search, SEARCHES)}"])
+        raise CaseError(f"search: {search!r} is unknown; {near(search, SEARCHES)}")
     return search
 
 
@@ -114,7 +114,7 @@ def search_options(case: Case, search: str | None) -> Estimate:
     if case.external is not None and search != "local":
         kind = case.external.type
         text = f"not allowed with plant {kind}, whose runs take long; must be local"
-        raise CaseError([f"{case.path}: search: {search}: {text}"])
+        raise CaseError(f"{case.path}: search: {search}: {text}")
     return case.estimate.model_copy(update={"search": checked_search(search)})
 
 

@@ -36,7 +36,7 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
     """
     kind, parts = case.kind, case.parts
     if kind.has_exciter and parts.exciter is None:
-        raise CaseError([f"{case.path}: model: missing"])
+        raise CaseError(f"{case.path}: model: missing")
     if parts.exciter is not None:
         _refuse_missing_gates(case, parts.exciter)
     stabiliser = None
@@ -117,7 +117,7 @@ def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationFo
         for signal, model in required.items():
             if signal not in file.channels:
                 text = f"channels.{signal}: missing; it drives {model.name}"
-                raise CaseError([f"{case.path}: {place}: {text}"])
+                raise CaseError(f"{case.path}: {place}: {text}")
 
 
 def _refuse_missing_gates(case: Case, exciter: Model) -> None:

@@ -84,7 +84,7 @@ def with_steps_of_record(
     if case.kind.finds_rest:  # it has a rest, no steps
         if any(given):
             text = f"step and at: not allowed with plant {case.kind.name}: the record drives it"
-            raise CaseError([f"{case.path}: {text}"])
+            raise CaseError(f"{case.path}: {text}")
         return built(recording, {**anew, "vref": (), "vs": ()})
     signal = _stepped(case, recording.test)
     inspection = None if given_record else _inspected(file, case.folder)
@@ -124,7 +124,7 @@ def _stepped(case: Case, test: BumpTest) -> str | None:
             "changes the network or opens the breaker: the steps of a record by hand are those of "
             "vref, vs or pref"
         )
-        raise CaseError([f"{case.path}: test: {text}; give the record under validate"])
+        raise CaseError(f"{case.path}: test: {text}; give the record under validate")
     if not case.kind.events:
         return None
     return next((signal for signal in REFERENCES if test.reference(signal)), "vref")
@@ -160,11 +160,11 @@ def _shown(
         for at in given.instants:
             if not first <= at < last:
                 span = f"{record.source}, {show(first)} ... {show(last)} s"
-                raise CaseError([f"at: {show(at)} s lies outside {span}"])
+                raise CaseError(f"at: {show(at)} s lies outside {span}")
         for before, at in pairwise(given.instants):
             if at <= before:
                 text = f"{show(at)} s is not after {show(before)} s, the step before"
-                raise CaseError([f"at: {text}"])
+                raise CaseError(f"at: {text}")
         return tuple(RecordedStep(at, 0.0, (), {}, False) for at in given.instants)
     if inspection is not None:
         return inspection.steps
@@ -196,7 +196,7 @@ def _sizes(record: Record, steps: Sequence[RecordedStep], given: GivenSteps) -> 
             instants = ", ".join(f"{step.at:.4g}" for step in steps)
             number = f"{len(steps)} step{'s' if len(steps) > 1 else ''}"
             text = f"{len(given.sizes)} given for {number}, at {instants} s: give one for each"
-            raise CaseError([f"step: {text}"])
+            raise CaseError(f"step: {text}")
         return given.sizes
     for step in steps:
         if "vt" not in step.sizes:

@@ -47,7 +47,7 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
         try:
             values = values_of(case, given)
         except TieError as tied:
-            raise CaseError([f"{place}: {tied}"]) from None
+            raise CaseError(f"{place}: {tied}") from None
         following = {name: values[name] for name in case.ties.by_name if name not in given}
         faults += _outside(rows, following)
         faults += _contradictions(case, values)
@@ -112,11 +112,11 @@ def fitted_code(path: Path) -> CodeHashes:
 def _content(path: Path) -> tuple[dict[str, Any], list[str]]:
     """Read the content of a file of parameters, and the faults of its text."""
     if path.is_dir() or path.name == WHOLE_FIT:  # a large one is more than YAML is read of
-        raise CaseError([f"{path}: {OF_A_RESULT}"])
+        raise CaseError(f"{path}: {OF_A_RESULT}")
     top, faults = read_yaml(read_text(path), path)
     content = top.value if isinstance(top.value, dict) else {}
     if "inputs" in content:
-        raise CaseError([f"{path}: {OF_A_RESULT}"])
+        raise CaseError(f"{path}: {OF_A_RESULT}")
     texts = [fault.text for fault in faults]
     parameters = content.get("parameters")
     if not isinstance(parameters, dict) or not parameters:
@@ -206,7 +206,7 @@ def with_values(case: Case, values: "ValuesOrResult | None") -> Case:
     if not isinstance(values, FitResult):  # as a Series of pandas
         return with_given_values(case, values, "values")
     if values.model != case.subject:
-        raise CaseError([f"values: model: {values.model}, but {case.path} has {case.subject}"])
+        raise CaseError(f"values: model: {values.model}, but {case.path} has {case.subject}")
     taken = taken_over(case, values.own_values, values.of_records, "values")
     return with_given_values(case, taken, "values", values.sources)
 

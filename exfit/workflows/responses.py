@@ -326,7 +326,7 @@ def model_as_found(case: Case) -> tuple[Case, Values]:
         if case.parts.exciter is None or model.name != case.parts.exciter.name:
             if case.external is not None:
                 text = f"the program simulates {case.subject} only"
-                raise CaseError([f"{case.path}: as_found.model: {model.name}: {text}"])
+                raise CaseError(f"{case.path}: as_found.model: {model.name}: {text}")
             from exfit.case.other_model import (
                 with_exciter,  # what `new` needs, a fit mostly does not
             )

@@ -112,7 +112,7 @@ def validate(
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError(
-            [f"{case.path}: step and at need a record with them: --record (record in Python)"]
+            f"{case.path}: step and at need a record with them: --record (record in Python)"
         )
     saw: tuple[Recording, ...] = ()
     if values is None:
@@ -131,7 +131,7 @@ def validate(
     else:
         recordings = (*(() if saw else case.recordings), *case.validations)
         if not recordings:
-            raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
+            raise CaseError(f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}")
         setups = [
             by_program(program, build_experiment(case, each, own), own) for each in recordings
         ]
@@ -201,7 +201,7 @@ def _validated_by_hand(
     recordings = (*case.validations, *case.recordings)
     if not recordings:
         text = "record: missing; its columns are needed to read a record"
-        raise CaseError([f"{case.path}: {text}"])
+        raise CaseError(f"{case.path}: {text}")
     file = record.source if isinstance(record, Record) else Path(record)
     update = {"file": str(file.absolute()), "window": None, "mask": ()}
     section = recordings[0].record.model_copy(update=update)

@@ -54,6 +54,6 @@ def test_a_shift_is_taken_from_the_errors_and_not_from_their_derivatives(noise):
     white = whitening(noise, ORDER, 1.0)
     shift = np.arange(2.0 * COUNT)
     errors = np.ones((1, 2 * COUNT))
-    shifted = white.shifted(shift)
+    shifted = white._replace(shift=shift)
     assert white.errors(errors) - shifted.errors(errors) == pytest.approx(shift[None])
     assert np.array_equal(shifted.slopes(errors.T), white.slopes(errors.T))

@@ -41,9 +41,9 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("vt", "vref"):
             if not getattr(self, name) > 0.0:
-                raise CaseError([f"limit {name}: {getattr(self, name):g}: must be above 0"])
+                raise CaseError(f"limit {name}: {getattr(self, name):g}: must be above 0")
         if not self.efd_min < self.efd:
-            raise CaseError([f"limit efd_min: {self.efd_min:g}: must be below {self.efd:g}"])
+            raise CaseError(f"limit efd_min: {self.efd_min:g}: must be below {self.efd:g}")
 
     @staticmethod
     def of(values: Mapping[str, float]) -> "Limits":

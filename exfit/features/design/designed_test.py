@@ -162,7 +162,7 @@ def design_test(
     shortest = REST + LAST_DWELL
     if not shortest < duration <= LONGEST:
         limits_of_it = f"must exceed {shortest:g} s and be at most {LONGEST:g} s"
-        raise CaseError([f"duration: {duration:g} s: {limits_of_it}"])
+        raise CaseError(f"duration: {duration:g} s: {limits_of_it}")
     stages = [*_stages(bench, duration)]
     moves, best = stages[-1]
     single = best_single_step(partial(bench.cost, signals=best.channels, duration=duration))
@@ -232,7 +232,7 @@ def _refuse(case: Case, of: Sequence[str], channels: Sequence[str], criterion: s
     """Raise CaseError for a plant without a reference, and for names that do not exist."""
     if not case.kind.closed_loop:
         text = "no test can be designed: the plant has no reference whose steps are simulated"
-        raise CaseError([f"{case.path}: plant {case.kind.name}: {text}"])
+        raise CaseError(f"{case.path}: plant {case.kind.name}: {text}")
     names = [*case.free()]
     faults = [
         f"{key}: {name}: must be one of {', '.join(known)}; {near(name, known)}"
@@ -265,7 +265,7 @@ def _stages(bench: Bench, duration: float) -> Iterator[tuple[Moves, Stage]]:
         reach = f"a single step of the reference of up to {bench.limits.of_vref:g} pu"
         sought = ", ".join(bench.names)
         text = f"{reach} within the limits determines {sought} from {', '.join(signals)}"
-        raise CaseError([f"no design: not even {text}"])
+        raise CaseError(f"no design: not even {text}")
     for more in _further_channels(bench, moves, signals, duration):
         signals = more
         yield moves, bench.stage(f"+ {signals[-1]}", moves, signals, duration)

@@ -93,12 +93,12 @@ def identify(case: Case | str | PathLike[str], noise: Mapping[str, float] | None
     case = loaded(case)
     if case.has_no_equations:
         text = "plant.twin: missing; identify needs the equations of a plant of exfit"
-        raise CaseError([f"{case.path}: {text}"])
+        raise CaseError(f"{case.path}: {text}")
     given = noise or {}
     setups = build_experiments(case) if case.recordings else ()
     free = free_parameters(case, setups)
     if not free:
-        raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
+        raise CaseError(f"{case.path}: parameters.free: empty: there is nothing to identify")
     refuse_noise(given)
     own = [setup.experiment for setup in setups] or [planned(case)]
     levels = [noise_levels(experiment, given) for experiment in own]

@@ -216,7 +216,7 @@ def opened(case: Case) -> Iterator["CaseProgram | None"]:
                 yield of_fmu
         except FmuError as fault:
             text = f"{case.path}: plant.file: {section.simulator} {fault}"
-            raise CaseError([text]) from None
+            raise CaseError(text) from None
     elif section is not None:
         folder = case.folder.absolute()
         program = ExternalProgram(section.command, folder, section.parallel, section.time_limit)
@@ -232,7 +232,7 @@ def _opened_fmu(case: Case, section: FmuPlant) -> Iterator["CaseProgram"]:
     interface = section.interface or description.interfaces[0]
     if interface not in description.interfaces:
         text = f"{section.simulator} has {' and '.join(description.interfaces)} only"
-        raise CaseError([f"{case.path}: plant.interface: {interface}: {text}"])
+        raise CaseError(f"{case.path}: plant.interface: {interface}: {text}")
     with laid_out(file) as folder:
         settings = {
             "folder": str(folder),
@@ -291,7 +291,7 @@ class CaseProgram:
         recorded = dict.fromkeys(signal for twin, _ in tests for signal in twin.inputs.recorded)
         if recorded:
             text = f"only steps and ramps are allowed with plant {self.section.type}"
-            raise CaseError([f"{self.case.path}: test: {', '.join(recorded)}: {text}"])
+            raise CaseError(f"{self.case.path}: test: {', '.join(recorded)}: {text}")
         faults = dict.fromkeys(self._variable_faults(tests))
         if faults:
             raise CaseError([f"{self.case.path}: {fault}" for fault in faults])

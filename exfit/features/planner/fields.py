@@ -45,7 +45,7 @@ def text_of(data: bytes, file: str) -> str:
     text = data.decode(encoding_of(data))
     if "\0" in text:
         line = len(END_OF_LINE.findall(text, 0, text.index("\0"))) + 1
-        raise DynamicsError([f"{file}:{line}: not a text file: it holds a byte 0x00"])
+        raise DynamicsError(f"{file}:{line}: not a text file: it holds a byte 0x00")
     return text
 
 

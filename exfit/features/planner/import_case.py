@@ -38,7 +38,7 @@ def read_file(path: Path) -> bytes:
     try:
         return read_limited(path, LARGEST_FILE)
     except ExfitError as error:
-        raise DynamicsError([str(error)]) from None
+        raise DynamicsError(str(error)) from None
 
 
 def imported_case(unit: Unit, file: str) -> CaseDraft:

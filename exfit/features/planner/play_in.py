@@ -53,7 +53,7 @@ def played_in(case: Case) -> dict[str, PlayIn]:
     plant, ExfitError for a record that cannot be used.
     """
     if not case.kind.finds_rest:
-        raise CaseError([f"{case.path}: plant {case.kind.name} is not driven by a grid event"])
+        raise CaseError(f"{case.path}: plant {case.kind.name} is not driven by a grid event")
     f0 = case.plant.given["f0"]
     inputs: dict[str, PlayIn] = {}
     for recording in case.recordings:

@@ -138,7 +138,7 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
     if faults:
         raise DynamicsError(located(faults, file))
     if not heads:
-        raise DynamicsError([f"{file}: has no record of a unit: {files.begins}"])
+        raise DynamicsError(f"{file}: has no record of a unit: {files.begins}")
     chosen = _chosen(_by_unit(heads), file, bus, machine_id)
     unit, faults = _unit_of(chosen)
     if unit is None:

@@ -127,7 +127,7 @@ def _measurement(signal: str, column: PointColumn, measured: Array, ifd: Array) 
         return FieldMeasurement(measured, unit, _given_base(column), column.noise)
     start = float(ifd @ measured / (ifd @ ifd)) if base.start == "auto" else base.start
     if not (isfinite(start) and start > 0.0):
-        raise CaseError([f"columns.{signal}.base: {start:g} {unit} fits best, which is not a base"])
+        raise CaseError(f"columns.{signal}.base: {start:g} {unit} fits best, which is not a base")
     low = start / FARTHEST_BASE if base.min is None else base.min
     high = start * FARTHEST_BASE if base.max is None else base.max
     free = FreeParameter(base_of(signal), min(max(start, low), high), low, high, logarithmic=True)

@@ -94,15 +94,15 @@ def planned_models(
     """Return the fit of each model; raises CaseError or ModelError where one cannot be planned."""
     own = case.parts.exciter
     if own is None or own.name == ALONE:
-        raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to rank"])
+        raise CaseError(f"{case.path}: plant {case.plant.type} has no exciter to rank")
     if case.external is not None:
         text = f"{case.external.type}: not allowed with rank: the program has one exciter"
-        raise CaseError([f"{case.path}: plant.type: {text}"])
+        raise CaseError(f"{case.path}: plant.type: {text}")
     cases: dict[str, Case] = {}
     for given in _names(own.name, [models] if isinstance(models, str) else [*models]):
         model = own if given == own.name else find(given, case.folder)
         if model.name in cases:
-            raise CaseError([f"models: {given}: given more than once"])
+            raise CaseError(f"models: {given}: given more than once")
         same = model.name == own.name
         cases[model.name] = case if same else with_exciter(case, given, model)
     return tuple(

@@ -124,7 +124,7 @@ def machine_of_case(path: Path) -> PartData:
     case = load_case(path)
     machine = case.parts.machine
     if machine is None:
-        raise CaseError([f"{path}: plant {case.plant.type} has no machine"])
+        raise CaseError(f"{path}: plant {case.plant.type} has no machine")
     values, sources = case.values(), case.sources()
     names = {row.symbol: MACHINE + row.symbol for row in machine.sheet}
     return PartData(
