@@ -107,12 +107,7 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
         linear, directions, shift = _linearised(evidence)
     except SimulationError:
         return []
-    noises = evidence.uncertainty.confidence.noise if evidence.uncertainty else ()
-    spreads = [
-        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
-        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
-    ]
-    spread = np.repeat(spreads, evidence.residuals.sizes)
+    spread = _spread(evidence)
     scores = [
         score
         for held, direction in directions
@@ -124,6 +119,16 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
     largest = max((each.chi_square for each in rejected), default=0.0)
     rejected = [each for each in rejected if each.chi_square > LEAST_SHARE * largest]
     return sorted(rejected, key=lambda each: -each.likelihood)
+
+
+def _spread(evidence: Evidence) -> Array:
+    """Standard deviation (M,) of the weighted errors, widened if they are not white."""
+    noises = evidence.uncertainty.confidence.noise if evidence.uncertainty else ()
+    spreads = [
+        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
+        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
+    ]
+    return np.repeat(spreads, evidence.residuals.sizes)
 
 
 def _score(
