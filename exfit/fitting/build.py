@@ -35,10 +35,7 @@ from exfit.simulation.simulator import Simulator
 
 
 def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:
-    """Build the tests of a case with the records that it is fitted to; CaseError without any.
-
-    ``start`` are the case's values, where they are at hand.
-    """
+    """Build the tests of a case with the records that it is fitted to; CaseError without any."""
     if not case.recordings:
         raise CaseError(f"{case.path}: record: missing; a fit needs a record")
     values = case.values() if start is None else start

@@ -338,10 +338,7 @@ class Experiment:
         return np.asarray(self.compared(samples[None], [values])[0]), parts
 
     def errors_of_many(self, sets: Sequence[Values]) -> tuple[Array, Counts]:
-        """Return the weighted errors (K, errors) of several sets of values, and their sub-steps.
-
-        Of a set without a start at rest they are no numbers; see ``Simulator.samples_of_many``.
-        """
+        """Return the weighted errors (K, errors) of several sets, as `samples_of_many` has them."""
         samples, parts = self.samples_of_many(sets)
         return self.compared(samples, sets), parts
 

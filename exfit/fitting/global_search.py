@@ -166,10 +166,7 @@ def global_search(
 def continued(
     searches: "CaseSearches", found: SearchResult, point: Array, announce: Announce, phase: str
 ) -> SearchResult:
-    """Return a search that goes on from a point (N,) with a lower cost than its best.
-
-    ``phase`` says in its history how that point was found.
-    """
+    """Return a search that goes on from a point (N,) below its best, which a ``phase`` led to."""
     path, last = _refined(searches, found.history, found.best._replace(x=point), announce, phase)
     if found.minima is None:
         return found._replace(best=last, history=path)

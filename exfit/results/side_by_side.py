@@ -69,10 +69,7 @@ def parameters_beside(
 
 
 def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
-    """Return results as CSV, a line for each; by the name of the run: its case and its result.
-
-    What a run does not have is blank.
-    """
+    """Return results as CSV, a line for each run by its name, blank where it has no such value."""
     fits = [fit for _, fit in results.values()]
     parameters = parameters_beside(fits)
     validations = dict.fromkeys(match.name for fit in fits for match in fit.validation)

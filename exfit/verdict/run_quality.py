@@ -142,10 +142,7 @@ def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str
 def simulation_notes(
     case: Case, simulator: Simulator, values: Mapping[str, float], response: Response
 ) -> Iterator[str]:
-    """Note all that bears on a simulated response: its values, and its validity.
-
-    ``values`` are those of the case, and of what the test has of its own.
-    """
+    """Note all that bears on a simulated response, by ``values`` of the case and of its test."""
     yield from typical_notes(case, values)
     yield from unphysical_notes(case, values)
     yield from speed_notes(simulator.inputs, values)

@@ -117,10 +117,7 @@ def determination(
 def uncertainty_of_solution(
     problem: FitProblem, theta: Array, of_record: tuple[str, ...]
 ) -> UncertaintyAnalysis | None:
-    """Analyse the uncertainty of the solution theta (N,), in scaled parameters.
-
-    None where the derivatives there are not finite. ``of_record`` names what belongs to a record.
-    """
+    """Analyse the uncertainty of a solution theta (N,); None where derivatives are not finite."""
     try:
         uncertainty = uncertainty_at(problem, theta, of_record)
     except SimulationError:

@@ -86,10 +86,7 @@ def minima_notes(
     minima: Minima | None,
     uncertainty: UncertaintyAnalysis | None,
 ) -> Iterator[str]:
-    """Note other minima beside the result of a search.
-
-    Those within the intervals of the ``uncertainty`` are no news.
-    """
+    """Note other minima beside the result of a search that lie outside its intervals."""
     if search.minima is None:
         return
     if search.minima.interrupted:

@@ -34,10 +34,7 @@ class ErrorsOfValues(NamedTuple):
 
 
 def errors_of_values(case: Case, problem: FitProblem, theta: Array) -> ErrorsOfValues:
-    """Estimate the effect of the standard errors of given values at the minimum theta (N,).
-
-    Values that move nothing are left out.
-    """
+    """Estimate what standard errors of given values move at the minimum theta (N,)."""
     residuals = problem.compressed
     std_errors = case.std_errors()
     std_errors = {name: std_errors[name] for name in std_errors if name in residuals.fixed}
@@ -117,10 +114,7 @@ def allowing_for_bias(
 def given_error_notes(
     uncertainty: UncertaintyAnalysis, of_record: Collection[str]
 ) -> Iterator[str]:
-    """Yield for which errors of given values the intervals allow, and what these widen most.
-
-    What belongs to a record, ``of_record``, is not named.
-    """
+    """Yield which errors of values the intervals include, and what of the unit these widen most."""
     given, parameters = uncertainty.given_errors, uncertainty.confidence.parameters
     if not given:
         return

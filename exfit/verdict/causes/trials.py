@@ -151,10 +151,7 @@ class LinearFit(NamedTuple):
 
 
 def linear_fit(evidence: Evidence) -> LinearFit | None:
-    """Return the linear model at the solution, None where it has no finite derivatives.
-
-    A parameter on a bound does not move.
-    """
+    """Return the linear model at the solution off its bounds, None without finite derivatives."""
     try:
         errors, slopes = evidence.residuals.errors(evidence.solution.x)
     except SimulationError:
