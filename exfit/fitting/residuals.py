@@ -246,8 +246,13 @@ class Residuals:
         points = [*np.where(moved, down, theta), *np.where(moved, up, theta)]
         residuals = self._of_many(points)
         for point, of_point in zip(points, residuals, strict=True):
-            if of_point is None:
-                self._refuse(point)
+            if of_point is None:  # say why
+                try:
+                    values = self.values(point)
+                except TieError as fault:
+                    raise SimulationError(str(fault)) from fault
+                for experiment in self.experiments:
+                    experiment.with_inputs(values).substeps(experiment.parameters(values))
         columns = np.stack([of_point for of_point in residuals if of_point is not None], axis=1)
         count = len(theta)
         return np.asarray((columns[:, count:] - columns[:, :count]) / (up - down))
@@ -324,15 +329,6 @@ class Residuals:
                     slopes = _stacked([slopes[row] for _, slopes, _ in runs])
                     jacobians[k] = self._jacobian(errors[row], slopes, points[k])
         return jacobians
-
-    def _refuse(self, theta: Array) -> None:
-        """Raise SimulationError where a point has no response."""
-        try:
-            values = self.values(theta)
-        except TieError as fault:
-            raise SimulationError(str(fault)) from fault
-        for experiment in self.experiments:
-            experiment.with_inputs(values).substeps(experiment.parameters(values))
 
     def _count(self, simulations: int, substeps: int = 1) -> None:
         if self.counter is not None:
