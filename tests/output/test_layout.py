@@ -85,7 +85,7 @@ def test_no_text_leaves_its_figure_or_lies_on_another(result, noted):
 
 
 def test_texts_that_lie_on_each_other_or_leave_their_figure_are_found(noted):
-    figure = plots.style.new_figure(2.0, 3.0)
+    figure = plots.style.new_figure(2.0, width=3.0)
     for place in (0.5, 0.52, 0.98):
         figure.text(place, 0.5, f"at {place}")
     figure.set_layout_engine(None)

@@ -15,9 +15,9 @@ from exfit.output.figures.style import (
     SIMULATED,
     START,
     STYLES,
-    new_figure,
-    panels,
+    stacked,
     tidy,
+    zero_line,
 )
 from exfit.signals import label_of
 
@@ -46,9 +46,8 @@ def agreement(compared: "Agreement") -> Figure:
         color, style = lines[k % len(lines)]
         width = WIDTHS[-1] if two else WIDTHS[min(k, len(WIDTHS) - 1)]
         looks[curve.name] = {"color": color, "linestyle": style, "linewidth": width}
-    figure = new_figure(1.0 + 4.2 * len(signals))
-    ratios = [3.0, 1.3] * len(signals)
-    axes = panels(figure, 2 * len(signals), sharex=True, height_ratios=ratios)[:, 0]
+    height, ratios = 1.0 + 4.2 * len(signals), [3.0, 1.3] * len(signals)
+    figure, axes = stacked(height, len(ratios), sharex=True, height_ratios=ratios)
     for k, signal in enumerate(signals):
         _curves(axes[2 * k], compared, signal, looks)
         drawn = compared.differences if two else compared.from_reference
@@ -91,7 +90,7 @@ def _curves(
 def _differences(
     axes: Axes, differences: "list[Difference]", looks: dict[str, dict[str, Any]]
 ) -> None:
-    axes.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(axes)
     of_records = any(difference.first == RECORD for difference in differences)
     for difference in differences:
         between = (of_records and difference.first != RECORD) or len(differences) == 1

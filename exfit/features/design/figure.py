@@ -6,14 +6,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.features.design.designed_test import DesignedTest
-from exfit.output.figures.style import LIMIT, MEASURED, SIMULATED, new_figure, panels, tidy
+from exfit.output.figures.style import LIMIT, MEASURED, SIMULATED, stacked, tidy
 from exfit.signals import label_of
 
 
 def designed_test(design: DesignedTest) -> Figure:
     """Return the reference, vt and efd of a designed test over time."""
-    figure = new_figure(6.6)
-    above, middle, below = panels(figure, 3)[:, 0]
+    title = f"{design.name}: the designed test, limits dashed"
+    figure, (above, middle, below) = stacked(6.6, 3, title)
     run, limits = design.run, design.limits
     above.plot(run.time, run.inputs["vref"], color=MEASURED, linewidth=1.4)
     above.set_ylabel("reference vref\nfrom its start (pu)")
@@ -30,7 +30,6 @@ def designed_test(design: DesignedTest) -> Figure:
         axes.tick_params(labelbottom=axes is below)
         tidy(axes)
     below.set_xlabel("time (s)")
-    figure.suptitle(f"{design.name}: the designed test, limits dashed", fontsize=11)
     return figure
 
 

@@ -4,8 +4,6 @@ A unit is verified where its fit holds: it matches its records, and the records 
 are accepted.
 """
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isclose
@@ -26,6 +24,7 @@ from exfit.features.planner.records import (
 from exfit.features.planner.units import DynamicsUnits, Unit, read_units
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
+from exfit.results.tables import csv_text
 from exfit.util.text import show
 from exfit.util.vocabulary import TYPICAL
 
@@ -127,11 +126,7 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
 
 def changes_table(changes: Iterable[ChangedValue]) -> str:
     """Make a table of all changes as CSV."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(ChangedValue._fields)
-    writer.writerows(changes)
-    return out.getvalue()
+    return csv_text([ChangedValue._fields, *changes])
 
 
 def number_text(value: float) -> str:

@@ -1,7 +1,5 @@
 """Cases of many units of dynamics files: of all of one file, or of a table of records."""
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -22,6 +20,7 @@ from exfit.features.start.starting_case import (
     unit_with,
 )
 from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
+from exfit.results.tables import csv_text
 from exfit.util.files import write, write_each
 from exfit.util.text import dotted, first_texts
 
@@ -238,11 +237,7 @@ def _made(
 
 def units_table(units: Iterable[ImportedUnit]) -> str:
     """Return all units of a file as CSV."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(ImportedUnit._fields)
-    writer.writerows(units)
-    return out.getvalue()
+    return csv_text([ImportedUnit._fields, *units])
 
 
 def key_of(unit: Unit) -> UnitKey:

@@ -11,9 +11,9 @@ from exfit.output.figures.style import (
     LIMIT,
     SIMULATED,
     START,
-    new_figure,
-    panels,
+    stacked,
     tidy,
+    zero_line,
 )
 from exfit.util.arrays import Array
 
@@ -26,11 +26,11 @@ ROOM = 0.06  # of an axis, beyond what it holds
 
 def saturation(result: SaturationResult, title: str) -> Figure:
     """Return terminal voltage over field current, and how far the points are beside the curve."""
-    figure = new_figure(8.2)
-    above, below = panels(figure, 2, height_ratios=[3.0, 1.2])[:, 0]
+    figure, (above, below) = stacked(
+        8.2, 2, f"{title}: open-circuit saturation, {result.form}", height_ratios=[3.0, 1.2]
+    )
     _curve(above, result)
     _beside(below, result)
-    figure.suptitle(f"{title}: open-circuit saturation, {result.form}", fontsize=11)
     return figure
 
 
@@ -88,7 +88,7 @@ def _beside(axes: Axes, result: SaturationResult) -> None:
     loop = fitted.hysteresis
     half = 0.0 if loop is None else 0.5 * loop.value
     _points(axes, result, result.vt, 100.0 * (result.residuals + half * result.direction))
-    axes.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(axes)
     if loop is not None:
         for direction, _, _, color in BRANCHES:
             axes.axhline(100.0 * half * direction, color=color, linewidth=0.9, linestyle="--")
@@ -102,11 +102,11 @@ def _beside(axes: Axes, result: SaturationResult) -> None:
 
 def v_curve(result: VCurve, title: str) -> Figure:
     """Return the V-curves of all powers, and how far the points are beside the model's field."""
-    figure = new_figure(8.2)
-    above, below = panels(figure, 2, height_ratios=[3.0, 1.2])[:, 0]
+    figure, (above, below) = stacked(
+        8.2, 2, f"{title}: V-curves, {result.machine}", height_ratios=[3.0, 1.2]
+    )
     _curves(above, result)
     _residuals(below, result)
-    figure.suptitle(f"{title}: V-curves, {result.machine}", fontsize=11)
     return figure
 
 
@@ -145,7 +145,7 @@ def _residuals(axes: Axes, result: VCurve) -> None:
             axes.plot(result.q[rows], differences, MARKERS[signal], color=color, markersize=5)
         for at in (-limit, limit):
             axes.axhline(at, color=LIMIT, linewidth=0.9, linestyle=":")
-    axes.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(axes)
     axes.set_xlabel("reactive power q (pu)")
     axes.set_ylabel(f"{', '.join(result.readings)}: simulated\nless measured (% of 1 pu)")
     axes.set_title(", ".join(words), fontsize=9, loc="right")

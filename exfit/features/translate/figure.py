@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.sampling import envelope
-from exfit.output.figures.style import SIMULATED, START, new_figure, panels, tidy
+from exfit.output.figures.style import SIMULATED, START, new_figure, panels, tidy, zero_line
 from exfit.signals import label_of
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def translation(result: "Translation", title: str) -> Figure:
     Each plant has a column.
     """
     plants = list(dict.fromkeys(step.plant for step in result.steps))
-    figure = new_figure(8.5)
+    figure = new_figure(8.5, title)
     grid = panels(figure, 3, len(plants), sharex=True, height_ratios=[2.0, 1.6, 1.2])
     for column, plant in enumerate(plants):
         steps = [step for step in result.steps if step.plant == plant]
@@ -37,12 +37,11 @@ def translation(result: "Translation", title: str) -> Figure:
         grid[0, column].set_title(plant, fontsize=10)
     below = grid[1, 0]
     below.legend(below.lines[:2], [result.source, result.target], loc="upper right", frameon=False)
-    figure.suptitle(title, fontsize=11)
     return figure
 
 
 def _errors(axes: Axes, result: "Translation", steps: "list[StepComparison]") -> None:
-    axes.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(axes)
     for step in steps:
         error = PERCENT * (step.target["vt"] - step.source["vt"]) / abs(step.step)
         axes.plot(*envelope(result.time, error), linewidth=1.1, label=f"{PERCENT * step.step:+g} %")

@@ -19,9 +19,10 @@ from exfit.output.figures.style import (
     STYLES,
     logarithmic,
     new_figure,
-    panels,
     short,
+    stacked,
     tidy,
+    zero_line,
 )
 from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.signals import label_of, unit_of_signal
@@ -61,9 +62,8 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
     """
     driving = {} if comparison.played is None else comparison.played.driving
     count, above = len(comparison.overlays), len(driving)
-    figure = new_figure(1.0 + 4.2 * count + 1.5 * above)
-    ratios = [1.5] * above + [3.0, 1.0] * count
-    axes = panels(figure, above + 2 * count, sharex=True, height_ratios=ratios)[:, 0]
+    height, ratios = 1.0 + 4.2 * count + 1.5 * above, [1.5] * above + [3.0, 1.0] * count
+    figure, axes = stacked(height, len(ratios), title, sharex=True, height_ratios=ratios)
     for own, (name, signal) in zip(axes[:above], driving.items(), strict=True):
         own.plot(*envelope(comparison.time, signal.samples), "-", color=START, linewidth=1.1)
         own.set_ylabel(f"{name} ({signal.unit})")
@@ -75,7 +75,6 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
         _signal(upper, lower, comparison, name, label)
     _limiters([*axes[above::2]], comparison)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(title, fontsize=11)
     return figure
 
 
@@ -84,15 +83,14 @@ def overlays(comparisons: Sequence[Comparison], title: str) -> Figure:
 
     Below it is their difference; the other signals are in the figure of each record.
     """
-    figure = new_figure(1.0 + 3.4 * len(comparisons))
-    axes = panels(figure, 2 * len(comparisons), height_ratios=[3.0, 1.0] * len(comparisons))[:, 0]
+    height, ratios = 1.0 + 3.4 * len(comparisons), [3.0, 1.0] * len(comparisons)
+    figure, axes = stacked(height, len(ratios), title, height_ratios=ratios)
     for comparison, signal, error in zip(comparisons, axes[::2], axes[1::2], strict=True):
         _signal(signal, error, comparison, comparison.judged_by, "")
         signal.set_title(short(comparison.name, LONGEST), fontsize=10, loc="left")
         error.set_xlim(signal.get_xlim())
         _limiters([signal], comparison)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(title, fontsize=11)
     return figure
 
 
@@ -120,7 +118,7 @@ def _signal(axes: Axes, below: Axes, comparison: Comparison, signal: str, label:
     text = f"rmse {match.rmse:.3g} pu, fit {percentage(match.fit_percent)} %"
     axes.set_title(text, fontsize=9, loc="right")
     tidy(axes)
-    below.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(below)
     below.plot(*envelope(time, MILLI * samples.error), color=SIMULATED, linewidth=0.7)
     below.set_ylabel(ERROR)
     tidy(below)
@@ -144,7 +142,7 @@ def response(simulated: Response, title: str) -> Figure:
     changing = [name for name in names if ranges[name] > 0.0][:MOST_SIGNALS]
     columns = 2 if len(changing) > 2 else 1
     rows = -(-len(changing) // columns)
-    figure = new_figure(2.6 + 1.6 * rows)
+    figure = new_figure(2.6 + 1.6 * rows, title)
     grid = figure.add_gridspec(1 + rows, columns, height_ratios=[1.6, *[1.0] * rows])
     first = figure.add_subplot(grid[0, :])
     _voltages(first, simulated)
@@ -160,7 +158,6 @@ def response(simulated: Response, title: str) -> Figure:
     still = ", ".join(name for name in names if ranges[name] == 0.0)
     rest = f"   (unused or at rest: {still})" if still else ""
     figure.supxlabel(f"time (s){rest}", fontsize=10)
-    figure.suptitle(title, fontsize=11)
     return figure
 
 
@@ -178,8 +175,7 @@ def _voltages(axes: Axes, simulated: Response) -> None:
 def overview(title: str, simulated: Response) -> Figure:
     """Draw the voltages of a model with its typical data."""
     signals = [name for name in ("vt", "efd") if name in simulated.signals]
-    figure = new_figure(0.6 + 2.2 * len(signals))
-    rows = panels(figure, len(signals))[:, 0]
+    figure, rows = stacked(0.6 + 2.2 * len(signals), len(signals))
     for axes, name in zip(rows, signals, strict=True):
         axes.sharex(rows[-1])
         axes.tick_params(labelbottom=axes is rows[-1])
@@ -198,8 +194,7 @@ def inspection(inspected: "Inspection", title: str) -> Figure:
     named.
     """
     drawn, others = inspected.foremost[:MOST_CHANNELS], inspected.foremost[MOST_CHANNELS:]
-    figure = new_figure(1.2 + 1.5 * len(drawn))
-    column = panels(figure, len(drawn), sharex=True)[:, 0]
+    figure, column = stacked(1.2 + 1.5 * len(drawn), len(drawn), title, sharex=True)
     for axes, channel in zip(column, drawn, strict=True):
         _channel(axes, inspected, channel)
     for step in inspected.steps:
@@ -220,7 +215,6 @@ def inspection(inspected: "Inspection", title: str) -> Figure:
         names = ", ".join(short(channel.name) for channel in others[:MOST_NAMES])
         missing = f"\nnot drawn: {names}{f' and {more} more' if more > 0 else ''}"
     column[-1].set_xlabel(f"time (s){missing}")
-    figure.suptitle(title, fontsize=11)
     return figure
 
 
@@ -292,7 +286,7 @@ def responses_beside(upper: Axes, errors: Axes, comparisons: Mapping[str, Compar
     signal = first.judged_by
     measured = envelope(first.time, first.overlays[signal].measured)
     upper.plot(*measured, ".", color=MEASURED, markersize=4, label="measured")
-    errors.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(errors)
     for k, (name, match) in enumerate(comparisons.items()):
         line, look = match.overlays[signal], _look(k, len(comparisons))
         label = f"{name}, rmse {match.rmse:.2e} pu"

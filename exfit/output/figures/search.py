@@ -24,7 +24,9 @@ from exfit.output.figures.style import (
     new_figure,
     panels,
     short,
+    stacked,
     tidy,
+    zero_line,
 )
 from exfit.output.iterations import COST, DAMPINGS, GRADIENT
 from exfit.results.comparisons import IterationResponses
@@ -59,8 +61,9 @@ ERROR = "simulated\n- measured\n(1e-3 pu)"
 
 def convergence(result: FitResult) -> Figure:
     """Return cost, gradient and damping over the iterations."""
-    figure = new_figure(7.0)
-    axes = panels(figure, 3, sharex=True)[:, 0]
+    figure, axes = stacked(
+        7.0, 3, f"{result.name}: {result.strategy}; {result.message}", sharex=True
+    )
     rows = (
         ("cost", f"{COST} (pu²)", "o"),
         ("gradient_norm", GRADIENT, "o"),
@@ -77,7 +80,6 @@ def convergence(result: FitResult) -> Figure:
     axes[0].legend(loc="upper right", frameon=False)
     axes[-1].set_xlabel("iteration")
     axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.suptitle(f"{result.name}: {result.strategy}; {result.message}", fontsize=11)
     return figure
 
 
@@ -102,7 +104,7 @@ def trajectories(result: FitResult) -> Figure:
     names = list(result.parameters)
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
-    figure = new_figure(1.0 + 2.0 * rows)
+    figure = new_figure(1.0 + 2.0 * rows, f"{result.name}: the parameters after each iteration")
     grid = figure.add_gridspec(rows, columns)
     ax = None
     for k, name in enumerate(names):
@@ -126,7 +128,6 @@ def trajectories(result: FitResult) -> Figure:
     if len(phases) > 1:
         handles = figure.axes[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
-    figure.suptitle(f"{result.name}: the parameters after each iteration", fontsize=11)
     return figure
 
 
@@ -135,7 +136,7 @@ def waterfall(search: Minima, title: str) -> Figure:
 
     Those ends are refuted whose minimum, the one at or next below them, is.
     """
-    figure = new_figure(4.2)
+    figure = new_figure(4.2, f"{title}: where {search.starts} runs ended")
     axes = panels(figure, 1)[0, 0]
     ended = np.flatnonzero(np.isfinite(search.end_costs))
     order = ended[np.argsort(search.end_costs[ended], kind="stable")]
@@ -160,7 +161,6 @@ def waterfall(search: Minima, title: str) -> Figure:
     lowest = f"{search.minima[0].starts} of {search.starts} runs converged to the lowest minimum"
     axes.set_title(lowest, fontsize=9, loc="right")
     tidy(axes)
-    figure.suptitle(f"{title}: where {search.starts} runs ended", fontsize=11)
     return figure
 
 
@@ -176,8 +176,9 @@ def iterations(result: FitResult) -> Figure:
         if comparison.iteration_responses is not None
     ]
     count = len(recorded)
-    figure = new_figure(1.0 + 4.4 * max(count, 1))
-    figure.suptitle(f"{result.name}: the response after each iteration", fontsize=11)
+    figure = new_figure(
+        1.0 + 4.4 * max(count, 1), f"{result.name}: the response after each iteration"
+    )
     if not recorded:
         return figure
     widths, heights = [1.0, BAR_OF_ITERATIONS], [3.0, 1.2] * count
@@ -215,7 +216,7 @@ def _after_each(upper: Axes, lower: Axes, responses: IterationResponses) -> None
     """Draw the responses after some iterations, and their errors."""
     time, measured, last = responses.time, responses.measured, len(responses.numbers) - 1
     upper.plot(time, measured, ".", color=MEASURED, markersize=3, label="measured")
-    lower.axhline(0.0, color="black", linewidth=0.6)
+    zero_line(lower)
     labels = {0: "start" if responses.numbers[0] == 0 else f"iteration {responses.numbers[0]}"}
     labels[last] = f"iteration {responses.numbers[last]}" if last else labels[0]
     colours = _colours(responses.numbers)
@@ -237,8 +238,8 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     """
     responses = analysis.sensitivity
     labels = {effect.parameter: effect.label for effect in analysis.effects}
-    figure = new_figure(1.2 + 3.0 * len(responses))
-    column = panels(figure, len(responses))[:, 0]
+    title = f"{title}: effect of each parameter on the response"
+    figure, column = stacked(1.2 + 3.0 * len(responses), len(responses), title)
     for axes, response in zip(column, responses, strict=True):
         for place, (name, change) in enumerate(response.moved.items()):
             axes.plot(
@@ -248,13 +249,12 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
                 linewidth=1.3,
                 label=labels.get(name, name),
             )
-        axes.axhline(0.0, color="black", linewidth=0.6)
+        zero_line(axes)
         axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
         tidy(axes)
     column[-1].set_xlabel("time (s)")
     handles, texts = column[0].get_legend_handles_labels()
     figure.legend(handles, texts, loc="outside right upper", frameon=False)
-    figure.suptitle(f"{title}: effect of each parameter on the response", fontsize=11)
     return figure
 
 
@@ -262,7 +262,8 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     """Return the correlations of the estimates as a map; what has none is left blank."""
     names, values = analysis.confidence.names, analysis.confidence.correlation.matrix
     side = max(4.2, 1.6 + 0.62 * len(names))
-    figure = new_figure(side, side + 0.8)
+    title = f"{title}: correlation of the parameters"
+    figure = new_figure(side + 0.8, title, side)
     axes, bar = panels(figure, 1, 2, width_ratios=[1.0, BAR])[0]
     axes.imshow(values, cmap=COLOUR_MAP, vmin=-1.0, vmax=1.0, aspect="auto")
     places = range(len(names))
@@ -281,7 +282,6 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     bar.imshow(shades, cmap=COLOUR_MAP, aspect="auto", extent=(0.0, 1.0, -1.0, 1.0), origin="lower")
     bar.set_xticks([])
     bar.set_ylabel("correlation of the estimates")
-    figure.suptitle(f"{title}: correlation of the parameters", fontsize=11)
     return figure
 
 

@@ -27,14 +27,25 @@ COLORS = ("#1f4e9c", "#c1272d", GREEN, "#b7791f", "#6b46c1", "#0e7490", "#4a5568
 STYLES = ("-", "--", ":")
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
+def new_figure(height: float, title: str = "", width: float = WIDTH) -> Figure:
     """Make an empty figure of a size in inches, which gives its axes the room that labels leave."""
-    return Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD))
+    figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD))
+    if title:
+        figure.suptitle(title, fontsize=11)
+    return figure
 
 
 def panels(figure: Figure, rows: int, columns: int = 1, **grid: Any) -> NDArray[np.object_]:
     """Make axes of a figure in rows and columns; see Figure.subplots."""
     return np.asarray(figure.subplots(rows, columns, squeeze=False, **grid))
+
+
+def stacked(
+    height: float, rows: int, title: str = "", **grid: Any
+) -> tuple[Figure, NDArray[np.object_]]:
+    """Make a figure of a height in inches, with axes below each other; see Figure.subplots."""
+    figure = new_figure(height, title)
+    return figure, panels(figure, rows, **grid)[:, 0]
 
 
 def short(name: str, most: int = LONGEST_NAME) -> str:
@@ -107,6 +118,11 @@ class PowersOfTen(LogFormatter):
         factor, exponent = f"{x:.3e}".split("e")
         power = f"10{str(int(exponent)).translate(RAISED)}"
         return power if float(factor) == 1.0 else f"{float(factor):g}×{power}"
+
+
+def zero_line(axes: Axes) -> None:
+    """Draw the line of zero."""
+    axes.axhline(0.0, color="black", linewidth=0.6)
 
 
 def logarithmic(axes: Axes) -> None:
