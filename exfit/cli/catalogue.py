@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli import completion
-from exfit.cli.options import print_json
+from exfit.cli.options import ANY_PATH, print_json
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot",
     "folder",
-    type=click.Path(path_type=Path),
+    type=ANY_PATH,
     metavar="DIR",
     help="Write a page with the block diagram and a figure of NAME, or of every model.",
 )

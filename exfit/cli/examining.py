@@ -102,10 +102,8 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
 
     loaded = load(case)
     folder = output.folder_of(loaded, "profile", run_folder.OF_PROFILES)
-    if output.events is not None:
-        watch = partial(output.events, case.stem)
-        profiles = workflows.profile(loaded, parameters, watch)
-    elif output.live:
+    watch = [] if output.events is None else [partial(output.events, case.stem)]
+    if output.live:
         from exfit.output import live, terminal
 
         console = terminal.console()
@@ -113,7 +111,7 @@ def profile(case: Path, parameters: tuple[str, ...], output: Output) -> None:
             profiles = workflows.profile(loaded, parameters, progress)
         console.print()
     else:
-        profiles = workflows.profile(loaded, parameters)
+        profiles = workflows.profile(loaded, parameters, *watch)
     figures = run_folder.write_profiles(profiles, folder)
     output.show(profiles.as_json(), fits.profiles(profiles), folder, figures)
     if profiles.interrupted:

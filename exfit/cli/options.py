@@ -43,14 +43,13 @@ set_option = click.option(
     help="Value of a parameter.",
     shell_complete=completion.assigned_parameters,
 )
-file_option = click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="File to write; default: the terminal.",
-)
+ANY_PATH = click.Path(path_type=Path)
+
+
+output_option = partial(click.option, "-o", "--output", type=ANY_PATH, metavar="FILE")
+file_option = output_option(help="File to write; default: the terminal.")
 force_option = click.option("--force", is_flag=True, help="Overwrite an existing file.")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 
 
 class Output(NamedTuple):
@@ -142,15 +141,9 @@ class Output(NamedTuple):
 def file_options(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command an ``output`` of -o, --plots and -q."""
 
-    @click.option(
-        "-o",
-        "--output",
-        type=click.Path(path_type=Path),
-        metavar="DIR",
-        help="Folder for the files.",
-    )
+    @output_option(metavar="DIR", help="Folder for the files.")
     @click.option("--plots/--no-plots", default=True, help="Draw figures (default: yes).")
-    @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+    @quiet_option
     @wraps(command)
     def with_output(
         output: Path | None,

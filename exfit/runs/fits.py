@@ -15,7 +15,7 @@ from exfit.fitting.build import build_experiment
 from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import outcome_of
-from exfit.runs.runner import distinct_names, numbered, run_in_turn
+from exfit.runs.runner import Runs, distinct_names, numbered, run_in_turn
 from exfit.util.typed import plain
 
 Progress = Iteration | estimate.Progress
@@ -61,17 +61,8 @@ class FitRun:
 
 
 @dataclass(frozen=True, eq=False)
-class FitSeries:
-    """The fits of several cases with several strategies, in the order of the cases.
-
-    ``failed`` holds the error of each fit that could not be run or written, by its name;
-    ``not_run`` names those that an interruption left out.
-    """
-
-    runs: tuple[FitRun, ...]
-    failed: dict[str, str]
-    not_run: tuple[str, ...]
-    interrupted: bool
+class FitSeries(Runs[FitRun]):
+    """The fits of several cases with several strategies, in the order of the cases."""
 
     @property
     def results(self) -> dict[str, FitResult]:
@@ -197,7 +188,7 @@ def run_all(
         result = workflows.fit(fit.case, fit.strategy, shown, shown, search=fit.search)
         return FitRun(fit.name, fit.case_name, result)
 
-    return FitSeries(*run_in_turn(plan, run, finished))
+    return FitSeries(**vars(run_in_turn(plan, run, finished)))
 
 
 def _faults(check: Callable[[Any], object], subjects: Iterable[object]) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
@@ -38,7 +39,8 @@ PlannedT = TypeVar("PlannedT", bound=Planned)
 RunT = TypeVar("RunT", bound=EndedRun)
 
 
-class Runs(NamedTuple, Generic[RunT]):
+@dataclass(frozen=True, eq=False)
+class Runs(Generic[RunT]):
     """The runs of a plan, in its order.
 
     ``failed`` holds the error of each that could not be run or written, by its name; ``not_run``

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli.options import (
+    ANY_PATH,
     NOT_CONVERGED,
     Interruption,
+    output_option,
     print_json,
     progress_option,
+    quiet_option,
 )
 from exfit.errors import ExfitError
 from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
@@ -38,14 +41,9 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
 
 
 @click.command(short_help="Fit many cases, and make a table of all.")
-@click.argument("cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASES")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    default=Path("fleet"),
-    metavar="DIR",
-    help="Folder for the results (default: fleet).",
+@click.argument("cases", type=ANY_PATH, nargs=-1, required=True, metavar="CASES")
+@output_option(
+    default=Path("fleet"), metavar="DIR", help="Folder for the results (default: fleet)."
 )
 @click.option(
     "--workers",
@@ -92,7 +90,7 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     type=click.Choice([*SEARCHES]),
     help=f"Search, instead of that of the cases. {SEARCHES_EXPLAINED}.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@quiet_option
 @click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON and nothing else.")
 @progress_option
 def batch(

@@ -12,7 +12,7 @@ import pickle
 import re
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -347,8 +347,14 @@ class Dispatch:
 
     def _send(self) -> None:
         """Send cases to the workers that need some: one to each before any has a second."""
-        if not self.waiting:
-            self._relieve()
+        if not self.waiting:  # what waits behind long cases goes where nothing is to be done
+            had = Counter(sent.worker for sent in self.sent.values())
+            idle = sum(max(0, threads - had[worker]) for worker, threads in self.threads.items())
+            for key, sent in reversed([*self.sent.items()]):
+                if idle > 0 and had[sent.worker] > self.threads[sent.worker]:
+                    had[sent.worker] -= 1
+                    idle -= 1
+                    self._take_back(key, begun=False)
         for places in range(1, AHEAD + 1):
             for worker, threads in self.threads.items():
                 while self.waiting and self._has_room(worker, places * threads):
@@ -358,16 +364,6 @@ class Dispatch:
                     if case.entry.case in self.begun or self.begin(case):
                         self.begun.add(case.entry.case)
                         self._submit(case, worker)
-
-    def _relieve(self) -> None:
-        """Take back what waits behind long cases where other workers have nothing to do."""
-        had = Counter(sent.worker for sent in self.sent.values())
-        idle = sum(max(0, threads - had[worker]) for worker, threads in self.threads.items())
-        for key, sent in reversed([*self.sent.items()]):
-            if idle > 0 and had[sent.worker] > self.threads[sent.worker]:
-                had[sent.worker] -= 1
-                idle -= 1
-                self._take_back(key, begun=False)
 
     def _has_room(self, worker: str, places: int) -> bool:
         under_way = sum(sent.size for sent in self.sent.values())
@@ -382,10 +378,15 @@ class Dispatch:
             return
         payload = pickle.dumps(RemoteCase(bundled, self.batch, self.time_limit))
         key = f"exfit-{uuid4().hex}"
+
+        # inside, so that it is pickled with its code: the scheduler unpacks it without exfit
+        def run(payload: bytes) -> Any:
+            from exfit.features.fleet.remote import run_packed
+
+            return run_packed(payload)
+
         try:
-            future = self.client.submit(
-                _in_worker(), payload, key=key, workers=[worker], pure=False
-            )
+            future = self.client.submit(run, payload, key=key, workers=[worker], pure=False)
         except Exception as fault:  # of many kinds, by where it has noticed
             raise lost(self.client, fault) from None
         self.sent[future.key] = Sent(case, worker, len(payload), future)
@@ -431,18 +432,3 @@ class Dispatch:
             self.waiting.add(case)
         else:
             self._fail(case, "crashed", f"{reply.death}, {MOST_DEATHS} times")
-
-
-def _in_worker() -> Callable[[bytes], Any]:
-    """Return the function that a worker runs.
-
-    The scheduler unpacks it, which need not have exfit: it is defined inside, so that it is pickled
-    with its code and not by its name.
-    """
-
-    def run(payload: bytes) -> Any:
-        from exfit.features.fleet.remote import run_packed
-
-        return run_packed(payload)
-
-    return run

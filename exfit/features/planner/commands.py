@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
+from exfit.cli.options import (
+    ANY_PATH,
+    file_option,
+    force_option,
+    output_option,
+    refuse_existing,
+    warn,
+    write_text,
+)
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
@@ -40,13 +48,7 @@ BUSES = click.IntRange(1, MOST_BUSES)
 @time_option
 @unit_option
 @sheet_option
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="File to write, with --all a folder; without it, to the terminal.",
-)
+@output_option(help="File to write, with --all a folder; without it, to the terminal.")
 @force_option
 def import_(
     dyr: Path,
@@ -177,7 +179,7 @@ def _machine_id(_context: object, _option: object, value: str | None) -> str | N
 )
 @click.option(
     "--plb",
-    type=click.Path(path_type=Path),
+    type=ANY_PATH,
     metavar="FILE",
     help="Of a fit of grid events: write the played-in signals as a file of PSS/E instead.",
 )

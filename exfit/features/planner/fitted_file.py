@@ -95,7 +95,11 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
     verified: dict[tuple[int | None, str], list[FittedUnit]] = {}
     for fit in fits:
         if fit.result.holds:
-            verified.setdefault(_place(fit.result), []).append(fit)
+            found = fit.result.as_found
+            unit_of_fit = (
+                (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
+            )
+            verified.setdefault(unit_of_fit, []).append(fit)
         else:
             result = fit.result
             why = f"not verified: {outcome_of(result)}: {explanation_of(result)}"
@@ -133,12 +137,6 @@ def number_text(value: float) -> str:
     """Return a constant as a dynamics file has it: a few digits, always with a point."""
     mantissa, exponent, power = f"{value:.{DIGITS}g}".upper().partition("E")
     return f"{mantissa}{'' if '.' in mantissa else '.0'}{exponent}{power}"
-
-
-def _place(result: FitResult) -> tuple[int | None, str]:
-    """Return the bus and the machine id, in capitals, that a fit is of."""
-    found = result.as_found
-    return (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
 
 
 def _unit_of(place: tuple[int | None, str], units: DynamicsUnits, file: str) -> Unit:

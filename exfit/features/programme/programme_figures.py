@@ -29,34 +29,28 @@ def saturation(result: SaturationResult, title: str) -> Figure:
     figure, (above, below) = stacked(
         8.2, 2, f"{title}: open-circuit saturation, {result.form}", height_ratios=[3.0, 1.2]
     )
-    _curve(above, result)
-    _beside(below, result)
-    return figure
-
-
-def _curve(axes: Axes, result: SaturationResult) -> None:
     fitted, no_interval = result.curve, result.verdict.in_place_of_interval
     base = fitted.ifd_base.value
     low, high, mean = (base * ifd for ifd in (fitted.low, fitted.high, fitted.ifd))
     measured = (fitted.vt <= result.highest) | (1.2 not in fitted.extrapolated)
     label = f"air-gap line, {base:.4g} {result.unit} per pu"
     line = base * (fitted.vt + fitted.offset.value)
-    axes.plot(line, fitted.vt, "--", color=LIMIT, linewidth=1.1, label=label)
+    above.plot(line, fitted.vt, "--", color=LIMIT, linewidth=1.1, label=label)
     if not no_interval:
-        axes.fill_betweenx(
+        above.fill_betweenx(
             fitted.vt, low, high, color=SIMULATED, alpha=0.18, linewidth=0.0, label="95 % band"
         )
     beyond = fitted.vt >= fitted.vt[measured][-1]
     parts = [(measured, "-", "curve"), (beyond, ":", "extrapolated")]
     for part, style, label in parts[: 1 if measured.all() else 2]:
-        axes.plot(mean[part], fitted.vt[part], style, color=SIMULATED, linewidth=1.4, label=label)
-    _points(axes, result, result.ifd, result.vt)
+        above.plot(mean[part], fitted.vt[part], style, color=SIMULATED, linewidth=1.4, label=label)
+    _points(above, result, result.ifd, result.vt)
     for level, value in ((1.0, fitted.S10), (1.2, fitted.S12)):
         begin = base * (level + fitted.offset.value)
         end = begin + base * level * value.value
-        axes.plot([begin, end], [level, level], "|-", color="black", linewidth=0.9, markersize=9)
+        above.plot([begin, end], [level, level], "|-", color="black", linewidth=0.9, markersize=9)
         limits = " ... ".join("?" if end is None else f"{end:.3g}" for end in value.interval)
-        axes.annotate(
+        above.annotate(
             f"S({level:.1f}) = {value.value:.3g} ({no_interval or limits})",
             (begin, level),
             xytext=(-8.0, 0.0),
@@ -66,13 +60,28 @@ def _curve(axes: Axes, result: SaturationResult) -> None:
             fontsize=9,
         )
     farthest = max(float(np.interp(1.2, fitted.vt, mean)), float(result.ifd.max()))
-    axes.set_xlim(-MARGIN * farthest, (1.0 + 2.0 * MARGIN) * farthest)
-    axes.set_ylim(-MARGIN, fitted.vt[-1] * (1.0 + 2.0 * MARGIN))
+    above.set_xlim(-MARGIN * farthest, (1.0 + 2.0 * MARGIN) * farthest)
+    above.set_ylim(-MARGIN, fitted.vt[-1] * (1.0 + 2.0 * MARGIN))
     name = "exciter field current" if result.exciter else "field current ifd"
-    axes.set_xlabel(f"{name} ({result.unit})")
-    axes.set_ylabel("terminal voltage vt (pu)")
-    axes.legend(loc="lower right", frameon=False)
-    tidy(axes)
+    above.set_xlabel(f"{name} ({result.unit})")
+    above.set_ylabel("terminal voltage vt (pu)")
+    above.legend(loc="lower right", frameon=False)
+    tidy(above)
+    fitted = result.curve
+    loop = fitted.hysteresis
+    half = 0.0 if loop is None else 0.5 * loop.value
+    _points(below, result, result.vt, 100.0 * (result.residuals + half * result.direction))
+    zero_line(below)
+    if loop is not None:
+        for direction, _, _, color in BRANCHES:
+            below.axhline(100.0 * half * direction, color=color, linewidth=0.9, linestyle="--")
+    below.set_xlabel("terminal voltage vt (pu)")
+    below.set_ylabel("ifd beside the\nmean curve (% of base)")
+    below.set_xlim(-MARGIN, fitted.vt[-1] * (1.0 + 2.0 * MARGIN))
+    text = "" if loop is None else f"hysteresis {100.0 * loop.value:.2g} %, "
+    below.set_title(f"{text}rms {100.0 * fitted.rms:.2g} %", fontsize=9, loc="right")
+    tidy(below)
+    return figure
 
 
 def _points(axes: Axes, result: SaturationResult, x: Array, y: Array) -> None:
@@ -82,59 +91,31 @@ def _points(axes: Axes, result: SaturationResult, x: Array, y: Array) -> None:
             axes.plot(x[branch], y[branch], marker, color=color, markersize=5, label=name)
 
 
-def _beside(axes: Axes, result: SaturationResult) -> None:
-    """Draw how far the points are beside the mean curve, and the loop that fits them."""
-    fitted = result.curve
-    loop = fitted.hysteresis
-    half = 0.0 if loop is None else 0.5 * loop.value
-    _points(axes, result, result.vt, 100.0 * (result.residuals + half * result.direction))
-    zero_line(axes)
-    if loop is not None:
-        for direction, _, _, color in BRANCHES:
-            axes.axhline(100.0 * half * direction, color=color, linewidth=0.9, linestyle="--")
-    axes.set_xlabel("terminal voltage vt (pu)")
-    axes.set_ylabel("ifd beside the\nmean curve (% of base)")
-    axes.set_xlim(-MARGIN, fitted.vt[-1] * (1.0 + 2.0 * MARGIN))
-    text = "" if loop is None else f"hysteresis {100.0 * loop.value:.2g} %, "
-    axes.set_title(f"{text}rms {100.0 * fitted.rms:.2g} %", fontsize=9, loc="right")
-    tidy(axes)
-
-
 def v_curve(result: VCurve, title: str) -> Figure:
     """Return the V-curves of all powers, and how far the points are beside the model's field."""
     figure, (above, below) = stacked(
         8.2, 2, f"{title}: V-curves, {result.machine}", height_ratios=[3.0, 1.2]
     )
-    _curves(above, result)
-    _residuals(below, result)
-    return figure
-
-
-def _curves(axes: Axes, result: VCurve) -> None:
     reading = next(iter(result.readings.values()))
     marker, it = MARKERS[reading.signal], result.it
     unity = []  # field and stator current where the power factor is one
     for k, level in enumerate(result.levels):
         rows, color = list(level.points), COLORS[k % len(COLORS)]
         label = f"P = {level.p:.2f} pu"
-        axes.plot(level.ifd, level.it, color=color, linewidth=1.4)
-        axes.plot(reading.measured[rows], it[rows], marker, color=color, markersize=5, label=label)
+        above.plot(level.ifd, level.it, color=color, linewidth=1.4)
+        above.plot(reading.measured[rows], it[rows], marker, color=color, markersize=5, label=label)
         if level.q[0] <= 0.0 <= level.q[-1]:
             unity.append([np.interp(0.0, level.q, signal) for signal in (level.ifd, level.it)])
     line = np.reshape(unity, (-1, 2)).T
-    axes.plot(*line, "--", color=LIMIT, linewidth=1.1, label="power factor 1")
-    axes.plot([], [], marker, color="black", markersize=5, label="measured")
-    axes.plot([], [], color="black", linewidth=1.4, label="simulated")
+    above.plot(*line, "--", color=LIMIT, linewidth=1.1, label="power factor 1")
+    above.plot([], [], marker, color="black", markersize=5, label="measured")
+    above.plot([], [], color="black", linewidth=1.4, label="simulated")
     scale = "" if reading.unit == "pu" else f"; 1 pu is {reading.base:.4g} {reading.unit}"
-    axes.set_xlabel(f"{FIELD_NAMES[reading.signal]} (pu{scale})")
-    axes.set_ylabel("stator current it (pu)")
-    axes.set_ylim(0.0, (1.0 + ROOM) * max(float(level.it.max()) for level in result.levels))
-    axes.legend(frameon=False, loc="lower right")
-    tidy(axes)
-
-
-def _residuals(axes: Axes, result: VCurve) -> None:
-    """Draw by how much the model differs from each point, over its reactive power."""
+    above.set_xlabel(f"{FIELD_NAMES[reading.signal]} (pu{scale})")
+    above.set_ylabel("stator current it (pu)")
+    above.set_ylim(0.0, (1.0 + ROOM) * max(float(level.it.max()) for level in result.levels))
+    above.legend(frameon=False, loc="lower right")
+    tidy(above)
     words = []
     for signal, reading in result.readings.items():
         rms, limit = 100.0 * reading.rms, 100.0 * reading.limit
@@ -142,12 +123,13 @@ def _residuals(axes: Axes, result: VCurve) -> None:
         for k, level in enumerate(result.levels):
             rows, color = list(level.points), COLORS[k % len(COLORS)]
             differences = 100.0 * reading.residuals[rows]
-            axes.plot(result.q[rows], differences, MARKERS[signal], color=color, markersize=5)
+            below.plot(result.q[rows], differences, MARKERS[signal], color=color, markersize=5)
         for at in (-limit, limit):
-            axes.axhline(at, color=LIMIT, linewidth=0.9, linestyle=":")
-    zero_line(axes)
-    axes.set_xlabel("reactive power q (pu)")
-    axes.set_ylabel(f"{', '.join(result.readings)}: simulated\nless measured (% of 1 pu)")
-    axes.set_title(", ".join(words), fontsize=9, loc="right")
-    tidy(axes)
-    axes.margins(x=ROOM)
+            below.axhline(at, color=LIMIT, linewidth=0.9, linestyle=":")
+    zero_line(below)
+    below.set_xlabel("reactive power q (pu)")
+    below.set_ylabel(f"{', '.join(result.readings)}: simulated\nless measured (% of 1 pu)")
+    below.set_title(", ".join(words), fontsize=9, loc="right")
+    tidy(below)
+    below.margins(x=ROOM)
+    return figure

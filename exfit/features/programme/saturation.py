@@ -531,7 +531,14 @@ def _notes(result: SaturationResult) -> Iterator[str]:
     elif others:
         yield f"the points do not distinguish {used.form} from {listed(others)}"
     if len(vt) >= FEWEST_POINTS_FOR_OUTLIER:
-        yield from _outlier(result)
+        residuals = result.residuals
+        farthest = int(np.nanargmax(np.abs(residuals)))
+        if abs(residuals[farthest]) > FAR_FROM_CURVE * result.curve.rms:
+            yield (
+                f"point {farthest + 1} ({result.vt[farthest]:.3g} pu, {result.ifd[farthest]:.4g} "
+                f"{result.unit}) lies {abs(residuals[farthest]):.2g} pu of field current off the "
+                "curve: check the reading"
+            )
 
 
 def _of_range(curve: FittedCurve, highest: float) -> Iterator[str]:
@@ -546,14 +553,3 @@ def _of_range(curve: FittedCurve, highest: float) -> Iterator[str]:
             )
     if not curve.ifd_base.determined:
         yield "the air-gap line is not determined by the points"
-
-
-def _outlier(result: SaturationResult) -> Iterator[str]:
-    residuals = result.residuals
-    farthest = int(np.nanargmax(np.abs(residuals)))
-    if abs(residuals[farthest]) > FAR_FROM_CURVE * result.curve.rms:
-        yield (
-            f"point {farthest + 1} ({result.vt[farthest]:.3g} pu, {result.ifd[farthest]:.4g} "
-            f"{result.unit}) lies {abs(residuals[farthest]):.2g} pu of field current off the "
-            "curve: check the reading"
-        )

@@ -79,9 +79,7 @@ class Answers(Section):
     exciter: Values = NONE  # data of the exciter that are not typical
     sources: Annotated[Frozen[Source], BeforeValidator(_of_all)] = NONE  # of these data
     open: Frozen[Number | Text] = NONE  # other values by their place, {plant.network.X: 0.2}
-    validations: Annotated[tuple[Text, ...], BeforeValidator(_as_list)] = Field(
-        (), alias="validate"
-    )
+    validations: List = Field((), alias="validate")
     about: Texts = NONE
     output: Text | None = None  # file of the case, or of the report
 
@@ -127,14 +125,17 @@ def checked(given: Mapping[str, Any]) -> Answers:
 
 
 def _checked(content: Mapping[str, Any], faults: list[Fault]) -> Answers | None:
-    closed = {
-        key: {name: entry for name, entry in value.items() if entry != QUESTION}
-        if isinstance(value, Mapping)
-        else value
-        for key, value in content.items()
-        if value != QUESTION
-    }
+    closed = _without(content, QUESTION)
     return validated(closed, faults, Answers, schema=Answers.model_json_schema)
+
+
+def _without(given: Mapping[str, Any], gap: Any) -> Given:
+    """Leave out the entries that are a gap, at the top and one level below."""
+    return {
+        key: _without(value, gap) if isinstance(value, Mapping) else value
+        for key, value in given.items()
+        if value != gap
+    }
 
 
 def still_open(given: Mapping[str, Any]) -> list[str]:
@@ -144,13 +145,8 @@ def still_open(given: Mapping[str, Any]) -> list[str]:
 
 def answers_text(given: Mapping[str, Any], path: Path) -> str:
     """Write answers as a file at a path, from where its paths are relative."""
-    kept = {
-        key: {name: entry for name, entry in value.items() if entry is not None}
-        if isinstance(value, Mapping)
-        else value
-        for key, value in given.items()
-        if key != "output"
-    }
+    kept = _without(given, None)
+    kept.pop("output", None)
     if isinstance(kept.get("step"), dict) and kept["step"].keys() == {ALL_TESTS}:
         kept["step"] = kept["step"][ALL_TESTS]
     sections = _with_paths(kept, lambda file: relative(Path(file), path.parent))

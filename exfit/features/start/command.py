@@ -10,6 +10,7 @@ import click
 from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import (
+    ANY_PATH,
     Interruption,
     Output,
     file_option,
@@ -66,7 +67,7 @@ id_option = click.option(
 answers_option = click.option(
     "--answers",
     "answers_file",
-    type=click.Path(path_type=Path),
+    type=ANY_PATH,
     metavar="FILE",
     help="Answers to all questions, in YAML; options count more.",
 )
@@ -91,7 +92,7 @@ answers_option = click.option(
 @click.option(
     "--tests",
     "table",
-    type=click.Path(path_type=Path),
+    type=ANY_PATH,
     metavar="CSV",
     help="Table of tests: file, at, step, base, validates.",
 )

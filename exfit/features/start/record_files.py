@@ -52,7 +52,7 @@ def records_in(folder: Path, units: Iterable[UnitKey]) -> JoinedRecords:
     records: dict[UnitKey, list[Path]] = {}
     faults, others = list[str](), list[Path]()
     for entry in _entries(folder):
-        files = _records_of(entry)
+        files = [*records_among(_entries(entry) if entry.is_dir() else [entry])]
         if not files:
             continue
         parts = NAME.fullmatch(entry.name if entry.is_dir() else entry.stem)
@@ -93,11 +93,6 @@ def _entries(folder: Path) -> list[Path]:
         return sorted(entry for entry in folder.iterdir() if not entry.name.startswith("."))
     except OSError as fault:
         raise ExfitError(f"{folder}: cannot be read: {fault.strerror}") from None
-
-
-def _records_of(entry: Path) -> list[Path]:
-    """Return a record, or those in a folder; a file of data beside its .cfg counts once."""
-    return [*records_among(_entries(entry) if entry.is_dir() else [entry])]
 
 
 def records_among(files: Iterable[Path]) -> Iterator[Path]:

@@ -12,7 +12,9 @@ from exfit.cli.options import (
     Output,
     force_option,
     load,
+    output_option,
     progress_option,
+    quiet_option,
     write_text,
 )
 from exfit.cli.records import bases_option, steps_option
@@ -47,15 +49,9 @@ DIGITS = 12  # of a SHA-256
 @kv_option
 @mva_option
 @answers_option
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Report, .html or .pdf (default: RECORD-report.html).",
-)
+@output_option(help="Report, .html or .pdf (default: RECORD-report.html).")
 @force_option
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@quiet_option
 @progress_option
 def verify(
     record: Path | None,
