@@ -60,7 +60,7 @@ def test_a_column_that_is_no_signal_moves_no_step(seed):
 
 
 def sizes(inspection, size):
-    return [test.sizes for test in starting_tests([inspection], [f"{size:g}"])]
+    return [test.sizes for test in starting_tests([inspection], {"all": size})]
 
 
 def test_a_step_of_which_the_field_contradicts_the_voltage_has_no_sign_and_is_asked_for():

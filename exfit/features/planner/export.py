@@ -35,7 +35,6 @@ from exfit.features.planner.units import FORMATS
 from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
-from exfit.models.sheet import DynamicsRecord
 from exfit.results.influences import by_weight, first_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
@@ -326,7 +325,11 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
     if missing:
         raise ExfitError(f"{record.name}: no value of {', '.join(missing)} in the result")
     faults = [*outside(sheet, values)] or [*contradictions(definition.model, values)]
-    faults = faults or [*_not_whole(record, values)]
+    faults = faults or [
+        (symbol, f"{show(values[symbol])} is not a whole number")
+        for symbol, _ in record.icons
+        if not float(values.get(symbol, 0.0)).is_integer()
+    ]
     if faults:
         raise FileError(f"{record.name}: {prefix}{symbol}: {text}" for symbol, text in faults)
     sources = {
@@ -344,13 +347,6 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
         if prefix + symbol in of_file and values.get(symbol, 0.0) == 0.0
     }
     return Written(definition, values, by_source(definition.symbols, sources), unused)
-
-
-def _not_whole(record: DynamicsRecord, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Yield (symbol, fault) for each integer of a record whose value is none."""
-    for symbol, _ in record.icons:
-        if not float(values.get(symbol, 0.0)).is_integer():
-            yield symbol, f"{show(values[symbol])} is not a whole number"
 
 
 def not_of_catalogue(result: FitResult, program: str) -> str:

@@ -1,6 +1,6 @@
 """Cases of many units of dynamics files: of all of one file, or of a table of records."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -19,6 +19,7 @@ from exfit.features.start.starting_case import (
     case_of_records,
     unit_with,
 )
+from exfit.features.start.starting_tests import sizes_of
 from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
 from exfit.results.tables import csv_text
 from exfit.util.files import write, write_each
@@ -59,7 +60,7 @@ class ImportPlan:
 class RecordOptions:
     """What is common to all records: sizes of steps, bases by signal, how they are read."""
 
-    sizes: Sequence[str] = ()
+    sizes: Mapping[str, float] = field(default_factory=dict)
     bases: Mapping[str, Base] = field(default_factory=dict)
     settings: RecordSettings = field(default_factory=RecordSettings)
 
@@ -157,7 +158,7 @@ def import_units(
     if any((steps, time, time_unit, sheet)) and not (records and Path(records).is_dir()):
         raise ExfitError("steps, time, time_unit and sheet: only with a folder of records")
     options = RecordOptions(
-        steps, bases_of(tuple(bases)), RecordSettings(tuple(time), time_unit, sheet)
+        sizes_of(steps), bases_of(tuple(bases)), RecordSettings(tuple(time), time_unit, sheet)
     )
     folder = Path(folder)
     plan = plan_import(Path(dyr), None if records is None else Path(records))
@@ -182,10 +183,10 @@ def import_units(
         rows.append(_row(unit, status, name, files, notes))
     rows += map(_refused, plan.units.refused)
     for size in steps:
-        if size not in used:
+        if used.isdisjoint(sizes_of([size])):
             raise ExfitError(f"--step {size}: no test of that name in any record")
     rows.sort(key=lambda row: row.line)
-    write_each(folder, {**texts, UNITS: units_table(rows)})
+    write_each(folder, {**texts, UNITS: csv_text([ImportedUnit._fields, *rows])})
     return ImportedUnits(tuple(rows), texts, tuple(doubts), plan)
 
 
@@ -233,11 +234,6 @@ def _made(
         return MadeCase(imported_case(unit, file), ())
     inspections = [options.settings.inspect(path) for path in plan.files[key]]
     return case_of_records(inspections, unit_data(unit, file), folder, options.sizes, bases)
-
-
-def units_table(units: Iterable[ImportedUnit]) -> str:
-    """Return all units of a file as CSV."""
-    return csv_text([ImportedUnit._fields, *units])
 
 
 def key_of(unit: Unit) -> UnitKey:

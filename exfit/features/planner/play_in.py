@@ -2,17 +2,14 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from exfit.case.case import Case
 from exfit.cli.options import refuse_existing
 from exfit.cli.streams import echo
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
 from exfit.simulation.inputs import SplinedInput
-from exfit.util.arrays import Array
 
 DIGITS = 9  # significant, of every number
 TURN = 2.0 * np.pi
@@ -34,37 +31,6 @@ def play_in_record(bus: int, machine_id: str, name: str, f0: float) -> str:
     return f"{head} 1 1 '{name}' 1.0 {f0:g} 0.0 0.0 /"
 
 
-class PlayIn(NamedTuple):
-    """What drives a unit in a grid event: voltage (M,), pu, and frequency (M,), Hz, at times, s.
-
-    ``f0`` is the rated frequency.
-    """
-
-    time: Array
-    vt: Array
-    frequency: Array
-    f0: float
-
-
-def played_in(case: Case) -> dict[str, PlayIn]:
-    """Collect the inputs of the unit in each grid event of a case, by the record's name.
-
-    The rest before an event is at the rated frequency. Raises CaseError for a case of another
-    plant, ExfitError for a record that cannot be used.
-    """
-    if not case.kind.finds_rest:
-        raise CaseError(f"{case.path}: plant {case.kind.name} is not driven by a grid event")
-    f0 = case.plant.given["f0"]
-    inputs: dict[str, PlayIn] = {}
-    for recording in case.recordings:
-        setup = build_experiment(case, recording, case.values())
-        time, angle = setup.record.time, setup.experiment.simulator.inputs.recorded["angle"]
-        assert isinstance(angle, SplinedInput)
-        vt, frequency = setup.record.signals["vt"], f0 + angle.slope(time) / TURN
-        inputs[setup.name] = PlayIn(time - time[0], vt, frequency, f0)
-    return inputs
-
-
 def export_play_in(source: Path, output: Path, force: bool) -> None:
     """Write what the records of a fit of grid events played into the unit, a file for each."""
     from exfit.results.io import load_result, result_file
@@ -73,17 +39,27 @@ def export_play_in(source: Path, output: Path, force: bool) -> None:
 
     if output.suffix.lower() != ".plb":
         raise ExfitError(f"{output}: the name of a play-in file ends with .plb")
-    records = played_in(load_case(load_result(result_file(source)).case))
+    case = load_case(load_result(result_file(source)).case)
+    if not case.kind.finds_rest:
+        raise CaseError(f"{case.path}: plant {case.kind.name} is not driven by a grid event")
+    f0 = case.plant.given["f0"]
+    texts: dict[str, str] = {}
+    for recording in case.recordings:
+        setup = build_experiment(case, recording, case.values())
+        time, angle = setup.record.time, setup.experiment.simulator.inputs.recorded["angle"]
+        assert isinstance(angle, SplinedInput)
+        vt, frequency = setup.record.signals["vt"], f0 + angle.slope(time) / TURN
+        # the rest before the event is at the rated frequency
+        rows = zip((time - time[0]).tolist(), vt.tolist(), frequency.tolist(), strict=True)
+        texts[setup.name] = play_in_text(rows)
     files = {
-        name: output if len(records) == 1 else output.with_stem(f"{output.stem}-{name}")
-        for name in records
+        name: output if len(texts) == 1 else output.with_stem(f"{output.stem}-{name}")
+        for name in texts
     }
     for file in files.values():
         refuse_existing(file, force)
     for name, file in files.items():
-        own = records[name]
-        rows = zip(own.time.tolist(), own.vt.tolist(), own.frequency.tolist(), strict=True)
-        write(file, play_in_text(rows))
-        record = play_in_record(BUS, MACHINE_ID, file.stem, own.f0)
+        write(file, texts[name])
+        record = play_in_record(BUS, MACHINE_ID, file.stem, f0)
         echo(f"written to {file}; voltage in pu, frequency in Hz")
         echo(f"record of PSS/E, in the order of public files; replace bus and id: {record}")

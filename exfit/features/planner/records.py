@@ -209,8 +209,19 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     remarks = [
         *_unmodelled(definition, given),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
-        *((row.symbol, _says_nothing(row)) for row in idle),
-        *_lacking(definition),
+        *(
+            (
+                row.symbol,
+                f"0 has no effect, since {row.search and row.search.needs} is 0; the typical value "
+                f"{show(row.typical)} is taken",
+            )
+            for row in idle
+        ),
+        *(
+            (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
+            for row in rows
+            if row.symbol in definition.absent
+        ),
     ]
     codes = [(given.get(name, icons[name]), icons[name]) for name in definition.codes]
     inputs = tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
@@ -320,19 +331,6 @@ def _without_effect(
             f"{show(rating)} MW, but the machine's base is not in the file: enter {SHARE} in the "
         )
         yield RATING, f"{text}case, {show(rating)} over that base (1 is taken)"
-
-
-def _says_nothing(row: Parameter) -> str:
-    gain = "" if row.search is None else row.search.needs
-    return f"0 has no effect, since {gain} is 0; the typical value {show(row.typical)} is taken"
-
-
-def _lacking(definition: Definition) -> Texts:
-    """Yield (symbol, warning) for what the model has and the record has not."""
-    for row in definition.model.sheet:
-        if row.symbol in definition.absent:
-            text = f"not in the record; the typical value {show(row.typical)} is taken"
-            yield row.symbol, text
 
 
 def with_exchanged(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:

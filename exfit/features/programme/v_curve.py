@@ -345,7 +345,9 @@ def causes_of(fields: FieldsOnLoad, values: Values, problem: PointProblem) -> tu
     saturation = [("S10", "S12")] if problem.given["S10"] > 0.0 else []
     bases = [(base_of(signal),) for signal in fields.points.measurements]
     fitted = {each.name for each in problem.free}
-    trials = [_reversed(fields, problem)]
+    turned = replace(fields, points=fields.points._replace(q=-fields.points.q))
+    reverse = _minimum(replace(problem, errors=turned.errors))
+    trials = [TrialOfPoints(inf if reverse is None else turned.cost(reverse))]
     for names in (("Xd",), ("Xq",), *saturation, *bases):
         if not fitted & {*names}:
             trials.append(_trial(fields, problem, names))
@@ -359,12 +361,6 @@ class TrialOfPoints(NamedTuple):
 
     cost: float
     cause: Cause = REVERSED
-
-
-def _reversed(fields: FieldsOnLoad, problem: PointProblem) -> TrialOfPoints:
-    fields = replace(fields, points=fields.points._replace(q=-fields.points.q))
-    better = _minimum(replace(problem, errors=fields.errors))
-    return TrialOfPoints(inf if better is None else fields.cost(better))
 
 
 def _trial(fields: FieldsOnLoad, problem: PointProblem, names: Sequence[str]) -> TrialOfPoints:

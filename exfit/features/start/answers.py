@@ -22,10 +22,10 @@ from exfit.case.schema.values import (
 from exfit.case.suggestion import relative
 from exfit.case.yaml import QUESTION, Fault, open_places, read_text, read_yaml
 from exfit.errors import FileError
+from exfit.features.start.starting_tests import ALL_TESTS
 from exfit.util.text import dotted
 
 HEADING = "Answers to the questions of exfit new and exfit verify"  # begins a file of answers
-ALL_TESTS = "all"  # in place of the name of a test
 FILES = ("record", "tests", "dyr", "machine_from", "validate", "model", "output")
 
 
@@ -82,14 +82,6 @@ class Answers(Section):
     validations: List = Field((), alias="validate")
     about: Texts = NONE
     output: Text | None = None  # file of the case, or of the report
-
-    @property
-    def sizes(self) -> tuple[str, ...]:
-        """The sizes of the steps, as texts 0.05 or up=0.05."""
-        return tuple(
-            f"{value!r}" if name == ALL_TESTS else f"{name}={value!r}"
-            for name, value in self.step.items()
-        )
 
     def source_of(self, symbol: str) -> str:
         """Find the source of a value, "" where it is not stated."""

@@ -154,6 +154,7 @@ def new(
     """
     from exfit.features.start.answers import checked, contradictions
     from exfit.features.start.making import new_case
+    from exfit.features.start.starting_tests import sizes_of
 
     options = {
         "model": model, "machine_model": machine, "record": file, "step": sizes_of(sizes),
@@ -223,20 +224,6 @@ def merged(answers_file: Path | None, options: Mapping[str, Any]) -> "Given":
         if value not in (None, (), {}):
             given[key] = str(value) if isinstance(value, Path) else value
     return given
-
-
-def sizes_of(texts: tuple[str, ...]) -> dict[str, float]:
-    """Return the sizes of steps by the words of their tests; raises ExfitError."""
-    from exfit.features.start.answers import ALL_TESTS
-
-    sizes = {}
-    for text in texts:
-        words, _, number = text.rpartition("=")
-        try:
-            sizes[words or ALL_TESTS] = float(number)
-        except ValueError:
-            raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
-    return sizes
 
 
 def bases_by_signal(texts: tuple[str, ...]) -> dict[str, str]:

@@ -12,7 +12,7 @@ from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import refuse_existing
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
-from exfit.features.start.answers import ALL_TESTS, Given
+from exfit.features.start.answers import Given
 from exfit.features.start.making import Inspections, inspected, key_of
 from exfit.features.start.questions import (
     MOST_LISTED,
@@ -25,7 +25,7 @@ from exfit.features.start.questions import (
     say,
 )
 from exfit.features.start.record_files import records_among
-from exfit.features.start.starting_tests import doubtful_bases, refuse_other_size
+from exfit.features.start.starting_tests import ALL_TESTS, doubtful_bases, refuse_other_size
 from exfit.features.start.unit_questions import (
     ask_data,
     ask_models,

@@ -61,7 +61,26 @@ def new_case(answers: Answers, folder: Path, read: Inspections) -> NewCase:
     for text in contradictions(answers):
         raise ExfitError(text)
     tests = tests_of_answers(answers, read)
-    unit, warnings = unit_of_answers(answers, folder)
+    planner, warnings = None, tuple[str, ...]()
+    if answers.dyr is not None:
+        imported = import_unit(Path(answers.dyr), answers.bus, answers.id)
+        warnings = tuple(located(imported.warnings, answers.dyr))
+        planner = unit_data(imported, relative(Path(answers.dyr), folder))
+    model = answers.model or (None if planner else ANY_MODEL)
+    unit = unit_with(model, answers.machine_model, planner, folder)
+    machine, exciter = unit.machine, unit.exciter
+    if answers.machine_from is not None:
+        machine = machine_of_case(Path(answers.machine_from))
+    faults = list[str]()
+    machine = _with_values("machine", machine, answers.machine, answers, faults)
+    exciter = _with_values("exciter", exciter, answers.exciter, answers, faults)
+    known = {row.symbol for part in (machine, exciter) for row in part.model.sheet} | {"all"}
+    for name in answers.sources:
+        if name not in known:
+            faults.append(f"sources: {name}: no parameter of this unit; {near(name, known)}")
+    if faults:
+        raise FileError(faults)
+    unit = replace(unit, machine=machine, exciter=exciter)
     draft = starting_case(unit, tests, folder, answers.about)
     places = {dotted(value.place): value for value in draft.open_values()}
     for place in answers.open:
@@ -103,37 +122,13 @@ def tests_of_answers(answers: Answers, read: Inspections) -> tuple[StartingTest,
         if file is None:
             raise ExfitError("record: missing")
         further = [inspected(answers, Path(other), read) for other in answers.validations]
-        return starting_tests([inspected(answers, file, read)], answers.sizes, bases, further)
+        return starting_tests([inspected(answers, file, read)], answers.step, bases, further)
     rows = [row._replace(file=row.file or file) for row in read_test_table(Path(answers.tests))]
     for row in rows:
         if row.file is None:
             raise ExfitError(f"{row.place}: file: missing, and no --record is given")
     files = dict.fromkeys(row.file for row in rows if row.file is not None)
     return tests_of_table(rows, {path: inspected(answers, path, read) for path in files}, bases)
-
-
-def unit_of_answers(answers: Answers, folder: Path) -> tuple[UnitData, tuple[str, ...]]:
-    """Return the data of the unit: typical, a planner's, those answered; and warnings."""
-    planner, warnings = None, tuple[str, ...]()
-    if answers.dyr is not None:
-        unit = import_unit(Path(answers.dyr), answers.bus, answers.id)
-        warnings = tuple(located(unit.warnings, answers.dyr))
-        planner = unit_data(unit, relative(Path(answers.dyr), folder))
-    model = answers.model or (None if planner else ANY_MODEL)
-    data = unit_with(model, answers.machine_model, planner, folder)
-    machine, exciter = data.machine, data.exciter
-    if answers.machine_from is not None:
-        machine = machine_of_case(Path(answers.machine_from))
-    faults = list[str]()
-    machine = _with_values("machine", machine, answers.machine, answers, faults)
-    exciter = _with_values("exciter", exciter, answers.exciter, answers, faults)
-    known = {row.symbol for part in (machine, exciter) for row in part.model.sheet} | {"all"}
-    for name in answers.sources:
-        if name not in known:
-            faults.append(f"sources: {name}: no parameter of this unit; {near(name, known)}")
-    if faults:
-        raise FileError(faults)
-    return replace(data, machine=machine, exciter=exciter), warnings
 
 
 def _with_values(

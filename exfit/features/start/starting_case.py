@@ -328,13 +328,13 @@ def case_of_records(
     inspections: Sequence[Inspection],
     unit: UnitData,
     folder: Path,
-    sizes: Sequence[str],
+    sizes: Mapping[str, float],
     bases: Mapping[str, Base],
 ) -> MadeCase:
     """Return the case of a unit with all tests of its records, to be written into a folder.
 
-    Of ``sizes``, texts as 0.05 or up=0.05, those are used that are of one of its tests. Raises
-    ExfitError where a record contradicts them.
+    Of ``sizes`` those are used that are of one of its tests. Raises ExfitError where a record
+    contradicts them.
     """
     own = sizes_in_use(sizes, inspections)
     tests = starting_tests(inspections, own, bases)
@@ -353,7 +353,7 @@ def case_of_plan(
     first, only = case.tests[0], next(iter(inspections.values()))
     if len(case.tests) == 1 and not tests_of(only) and first.at is None and first.step is None:
         own = {} if first.base is None else {"vt": first.base}
-        tests = starting_tests([only], (), {**bases, **own})
+        tests = starting_tests([only], {}, {**bases, **own})
     else:
         tests = tests_of_table([*_of_each_test(case.tests, inspections)], inspections, bases)
     draft = starting_case(unit, tests, folder, case.about)

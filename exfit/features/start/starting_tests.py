@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign
+from types import MappingProxyType
 
 from exfit.case.schema import SINGLE
 from exfit.case.suggestion import Base
@@ -14,6 +15,7 @@ from exfit.records.rejection import REMEDY, BreakerOpening
 from exfit.records.steps import RecordedStep
 
 AT_REST = (0.9, 1.1)  # pu: a voltage at rest is within the limits of a machine
+ALL_TESTS = "all"  # in place of the name of a test
 LIKE = (0.9, 1.25)  # of what vt changes by: the step of a reference, as the regulator's gain is
 
 
@@ -35,26 +37,33 @@ class StartingTest:
 
 def starting_tests(
     inspections: Sequence[Inspection],
-    sizes: Sequence[str] = (),
+    sizes: Mapping[str, float] = MappingProxyType({}),
     bases: Mapping[str, Base] | None = None,
     validating: Sequence[Inspection] = (),
 ) -> tuple[StartingTest, ...]:
     """Return the tests of records: every other one, from the second on, validates.
 
-    All tests of the ``validating`` records validate. ``sizes`` (pu) are texts as 0.05 for all tests
-    or up=0.05 for those whose names have that word; they are amounts,
-    or have the sign of the step. Of a single record without steps it is one test.
+    All tests of the ``validating`` records validate. ``sizes`` (pu) are by a word in the names of
+    their tests, such as up, or all; they are amounts, or have the sign of the step. Of a single
+    record without steps it is one test.
 
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
     for a record in which the breaker opens, for one of several that shows no step, and for a
     play-in file.
     """
     every = [*inspections, *validating]
-    _refuse_play_in(every)
-    if any(inspection.is_event for inspection in every):
-        return _events(every, len(inspections), sizes, bases or {})
-    _refuse_rejections(every)
     given = bases or {}
+    for inspection in every:
+        if inspection.plays_in:  # it has nothing that a fit could be compared with
+            raise ExfitError(
+                f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
+                "sections of a case that exfit simulate takes"
+            )
+    if any(inspection.is_event for inspection in every):
+        return _events(every, len(inspections), sizes, given)
+    for inspection in every:
+        if inspection.opening is not None:
+            raise _rejection(inspection, inspection.opening)
     if len(every) == 1 and not tests_of(inspections[0]):
         _refuse_unused(sizes, [])
         return (StartingTest("fit", inspections[0], (), bases=given),)
@@ -96,25 +105,10 @@ def _bases_for(inspection: Inspection, bases: Mapping[str, Base]) -> dict[str, B
     return {s: base for s, base in bases.items() if s not in per_unit or base.unit == "pu"}
 
 
-def _refuse_play_in(inspections: Sequence[Inspection]) -> None:
-    for inspection in inspections:
-        if inspection.plays_in:  # it has nothing that a fit could be compared with
-            raise ExfitError(
-                f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
-                "sections of a case that exfit simulate takes"
-            )
-
-
-def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
-    for inspection in inspections:
-        if inspection.opening is not None:
-            raise _rejection(inspection, inspection.opening)
-
-
 def _events(
     inspections: Sequence[Inspection],
     alternate: int,
-    sizes: Sequence[str],
+    sizes: Mapping[str, float],
     bases: Mapping[str, Base],
 ) -> tuple[StartingTest, ...]:
     """Return the grid events that phasor measurement units recorded, one a record.
@@ -144,33 +138,39 @@ def _events(
 
 
 def _amounts(
-    recorded: Sequence[tuple[Inspection, DetectedTest]], sizes: Sequence[str]
+    recorded: Sequence[tuple[Inspection, DetectedTest]], sizes: Mapping[str, float]
 ) -> list[float | None]:
     """Return the size (pu) of each test, None where it is not given; raises ExfitError."""
     tests = [test for _, test in recorded]
     names = unique_names([test.name() for test in tests], tests)
-    of_all, own, unused = dict[str, float](), dict[str, float](), list[str]()
-    for text in sizes:
-        number = text.rpartition("=")[2]
+    of_all, own = sizes.get(ALL_TESTS), dict[str, float]()
+    for word, amount in sizes.items():
+        if word != ALL_TESTS:
+            own |= dict.fromkeys(_named(word, names), amount)
+    _refuse_unused({k: v for k, v in sizes.items() if not _named(k, names)}, names)
+    for (inspection, test), name in zip(recorded, names, strict=True):
+        if len(recorded) > 1 and of_all is not None and name not in own:
+            refuse_other_size(inspection, test, of_all)
+    return [own.get(name, of_all) for name in names]
+
+
+def sizes_of(texts: Sequence[str]) -> dict[str, float]:
+    """Return the sizes of steps by the words of their tests; raises ExfitError."""
+    sizes = {}
+    for text in texts:
+        words, _, number = text.rpartition("=")
         try:
-            amount = float(number)
+            sizes[words or ALL_TESTS] = float(number)
         except ValueError:
             raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
-        named = _named(text, names)
-        (own if "=" in text else of_all).update(dict.fromkeys(named, amount))
-        unused += [] if named else [text]
-    _refuse_unused(unused, names)
-    for (inspection, test), name in zip(recorded, names, strict=True):
-        if len(recorded) > 1 and name in of_all and name not in own:
-            refuse_other_size(inspection, test, of_all[name])
-    return [own.get(name, of_all.get(name)) for name in names]
+    return sizes
 
 
-def sizes_in_use(texts: Sequence[str], inspections: Sequence[Inspection]) -> list[str]:
-    """Return the sizes, texts as 0.05 or up=0.05, that are of a test of some records."""
+def sizes_in_use(sizes: Mapping[str, float], inspections: Sequence[Inspection]) -> dict[str, float]:
+    """Return the sizes that are of a test of some records."""
     tests = [test for inspection in inspections for test in tests_of(inspection)]
     names = unique_names([test.name() for test in tests], tests)
-    return [text for text in texts if _named(text, names)]
+    return {word: amount for word, amount in sizes.items() if _named(word, names)}
 
 
 def doubtful_bases(tests: Sequence[StartingTest]) -> list[str]:
@@ -276,14 +276,14 @@ def refuse_other_size(inspection: Inspection, test: DetectedTest, amount: float)
         )
 
 
-def _named(text: str, names: Sequence[str]) -> list[str]:
+def _named(word: str, names: Sequence[str]) -> list[str]:
     """Return the names of the tests that a size is of."""
-    words = text.rpartition("=")[0]
-    return [name for name in names if f"-{words}-" in f"-{name}-" or not words]
+    return [name for name in names if f"-{word}-" in f"-{name}-" or word == ALL_TESTS]
 
 
-def _refuse_unused(texts: Sequence[str], names: Sequence[str]) -> None:
+def _refuse_unused(sizes: Mapping[str, float], names: Sequence[str]) -> None:
     """Raise ExfitError for sizes that belong to no test."""
-    if texts:
+    for word, amount in sizes.items():
         tests = ", ".join(names) or "none: it shows no step"
-        raise ExfitError(f"--step {texts[0]}: no test of that name; the record's tests: {tests}")
+        text = f"{amount!r}" if word == ALL_TESTS else f"{word}={amount!r}"
+        raise ExfitError(f"--step {text}: no test of that name; the record's tests: {tests}")

@@ -83,10 +83,11 @@ def verify(
     from exfit.features.report.writing import refuse_report, write_report
     from exfit.features.start.answers import checked
     from exfit.features.start.making import new_case, typical_left
+    from exfit.features.start.starting_tests import sizes_of
 
     options = {
         "record": record, "dyr": dyr, "bus": bus, "id": machine_id, "model": model,
-        "step": command.sizes_of(sizes), "base": command.bases_by_signal(bases), "kv": kv,
+        "step": sizes_of(sizes), "base": command.bases_by_signal(bases), "kv": kv,
         "mva": mva, "output": output,
     }  # fmt: skip
     given, read = command.merged(answers_file, options), dict[Path, Any]()

@@ -90,7 +90,7 @@ def test_rows_that_the_flags_call_bad_are_named_with_their_line(tmp_path):
 
 
 def test_a_case_of_an_event_has_no_test_and_plays_its_record_back(tmp_path):
-    tests = starting_tests([inspected(tmp_path)], (), RATED)
+    tests = starting_tests([inspected(tmp_path)], {}, RATED)
     text = starting_case(unit_with("AC8B", None, None, tmp_path), tests, tmp_path).text
     content = yaml.safe_load(text)
     assert content["plant"]["type"] == "grid-playback"

@@ -56,11 +56,11 @@ def record(tmp_path):
     return made
 
 
-def text_of(name, inspection, folder, machine="GENROU", sizes=()):
+def text_of(name, inspection, folder, machine="GENROU", sizes=None):
     """Return the text of the case that a model with typical data and a record begin with."""
     exciter, around = PartData.typical(MODELS[name]), PartData.typical(MACHINES[machine])
     return starting_case(
-        UnitData(name, exciter, around), starting_tests([inspection], sizes), folder
+        UnitData(name, exciter, around), starting_tests([inspection], sizes or {}), folder
     ).text
 
 
