@@ -77,7 +77,7 @@ def starting_tests(
 def _bump_tests(
     inspections: Sequence[Inspection],
     validating: Sequence[Inspection],
-    sizes: Sequence[str],
+    sizes: Mapping[str, float],
     given: Mapping[str, Base],
 ) -> tuple[StartingTest, ...]:
     """Return the tests of records that all show steps."""
