@@ -35,6 +35,7 @@ from exfit.features.planner.units import FORMATS
 from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
+from exfit.models.sheet import DynamicsRecord
 from exfit.results.influences import by_weight, first_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult

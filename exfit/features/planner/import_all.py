@@ -1,6 +1,6 @@
 """Cases of many units of dynamics files: of all of one file, or of a table of records."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
