@@ -326,11 +326,7 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
     if missing:
         raise ExfitError(f"{record.name}: no value of {', '.join(missing)} in the result")
     faults = [*outside(sheet, values)] or [*contradictions(definition.model, values)]
-    faults = faults or [
-        (symbol, f"{show(values[symbol])} is not a whole number")
-        for symbol, _ in record.icons
-        if not float(values.get(symbol, 0.0)).is_integer()
-    ]
+    faults = faults or [*_not_whole(record, values)]
     if faults:
         raise FileError(f"{record.name}: {prefix}{symbol}: {text}" for symbol, text in faults)
     sources = {
@@ -348,6 +344,13 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
         if prefix + symbol in of_file and values.get(symbol, 0.0) == 0.0
     }
     return Written(definition, values, by_source(definition.symbols, sources), unused)
+
+
+def _not_whole(record: DynamicsRecord, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Yield (symbol, fault) for each integer of a record whose value is none."""
+    for symbol, _ in record.icons:
+        if not float(values.get(symbol, 0.0)).is_integer():
+            yield symbol, f"{show(values[symbol])} is not a whole number"
 
 
 def not_of_catalogue(result: FitResult, program: str) -> str:
