@@ -44,6 +44,7 @@ set_option = click.option(
     shell_complete=completion.assigned_parameters,
 )
 ANY_PATH = click.Path(path_type=Path)
+ABOVE_ZERO = click.FloatRange(min=0.0, min_open=True)
 
 
 output_option = partial(click.option, "-o", "--output", type=ANY_PATH, metavar="FILE")

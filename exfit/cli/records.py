@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
-from exfit.cli.options import Output, output_options
+from exfit.cli.options import ABOVE_ZERO, Output, output_options
 
 if TYPE_CHECKING:
     from exfit.output.blocks import Block
@@ -38,7 +38,7 @@ bases_option = click.option(
 sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel file.")
 memory_option = click.option(
     "--memory",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=ABOVE_ZERO,
     metavar="GB",
     help="Limit of memory for reading. Default: 1, or four times the size of the file, 4 at most.",
 )

@@ -77,14 +77,13 @@ def _curves(
             axes.plot(*points, label=f"{curve.name}{f}", **looks[curve.name])
         else:
             axes.plot(*points, ".", color=MEASURED, markersize=3, label=curve.name)
-    axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
     between = [each for each in compared.between if each.signal == signal]
     if len(between) == 1:
         value, at = between[0].largest
         text = f"{_name(between[0])}: rms {between[0].rms:.3g} pu, largest {value:.3g} pu"
         axes.set_title(f"{text} at {at:.4g} s", fontsize=9, loc="right")
-    tidy(axes)
+    tidy(axes, label_of(signal))
 
 
 def _differences(
@@ -102,10 +101,9 @@ def _differences(
         )
     several = len(differences) > 1
     label = "difference" if several else _name(differences[0])
-    axes.set_ylabel(f"{label}\n(1e-3 pu)")
     if several:
         axes.legend(loc="best", frameon=False, ncols=len(differences), fontsize=8)
-    tidy(axes)
+    tidy(axes, f"{label}\n(1e-3 pu)")
 
 
 def _name(difference: "Difference") -> str:

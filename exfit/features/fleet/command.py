@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli.options import (
+    ABOVE_ZERO,
     ANY_PATH,
     NOT_CONVERGED,
     Interruption,
@@ -74,7 +75,7 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
 )
 @click.option(
     "--time-limit",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=ABOVE_ZERO,
     default=3600.0,
     metavar="S",
     help="Time that a case may take, s (default: 3600).",

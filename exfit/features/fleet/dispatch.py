@@ -193,16 +193,6 @@ def answered(worker: str, answer: Future[Mapping[str, Any]]) -> str | None:
     )
 
 
-def stop(client: "Client", workers: list[str], batch: str) -> None:
-    """End the processes of a batch in workers; one that does not answer is not waited for."""
-    if workers:
-        call = client._run
-        client.sync(
-            call, remote.stop_batch, batch, workers=workers, on_error="ignore",
-            callback_timeout=CLOSED_WITHIN,
-        )  # fmt: skip
-
-
 def cluster_workers(address: str, time_limit: float) -> Compute:
     """Make the `Compute` of a scheduler's cluster, each case in no more than ``time_limit`` s.
 
@@ -293,7 +283,11 @@ class Dispatch:
         """End what is under way, at once; what the scheduler has of it goes, too."""
         with suppress(Exception):  # of a connection that is lost already
             self.client.cancel([sent.future for sent in self.sent.values()], force=True)
-            stop(self.client, [*self.threads], self.batch)
+            if workers := [*self.threads]:  # one that does not answer is not waited for
+                self.client.sync(
+                    self.client._run, remote.stop_batch, self.batch, workers=workers,
+                    on_error="ignore", callback_timeout=CLOSED_WITHIN,
+                )  # fmt: skip
 
     def _look(self) -> None:
         """Look which workers there are; what those that are gone had waits again."""

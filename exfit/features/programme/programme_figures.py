@@ -64,9 +64,8 @@ def saturation(result: SaturationResult, title: str) -> Figure:
     above.set_ylim(-MARGIN, fitted.vt[-1] * (1.0 + 2.0 * MARGIN))
     name = "exciter field current" if result.exciter else "field current ifd"
     above.set_xlabel(f"{name} ({result.unit})")
-    above.set_ylabel("terminal voltage vt (pu)")
     above.legend(loc="lower right", frameon=False)
-    tidy(above)
+    tidy(above, "terminal voltage vt (pu)")
     fitted = result.curve
     loop = fitted.hysteresis
     half = 0.0 if loop is None else 0.5 * loop.value
@@ -76,11 +75,10 @@ def saturation(result: SaturationResult, title: str) -> Figure:
         for direction, _, _, color in BRANCHES:
             below.axhline(100.0 * half * direction, color=color, linewidth=0.9, linestyle="--")
     below.set_xlabel("terminal voltage vt (pu)")
-    below.set_ylabel("ifd beside the\nmean curve (% of base)")
     below.set_xlim(-MARGIN, fitted.vt[-1] * (1.0 + 2.0 * MARGIN))
     text = "" if loop is None else f"hysteresis {100.0 * loop.value:.2g} %, "
     below.set_title(f"{text}rms {100.0 * fitted.rms:.2g} %", fontsize=9, loc="right")
-    tidy(below)
+    tidy(below, "ifd beside the\nmean curve (% of base)")
     return figure
 
 
@@ -112,10 +110,9 @@ def v_curve(result: VCurve, title: str) -> Figure:
     above.plot([], [], color="black", linewidth=1.4, label="simulated")
     scale = "" if reading.unit == "pu" else f"; 1 pu is {reading.base:.4g} {reading.unit}"
     above.set_xlabel(f"{FIELD_NAMES[reading.signal]} (pu{scale})")
-    above.set_ylabel("stator current it (pu)")
     above.set_ylim(0.0, (1.0 + ROOM) * max(float(level.it.max()) for level in result.levels))
     above.legend(frameon=False, loc="lower right")
-    tidy(above)
+    tidy(above, "stator current it (pu)")
     words = []
     for signal, reading in result.readings.items():
         rms, limit = 100.0 * reading.rms, 100.0 * reading.limit
@@ -128,8 +125,7 @@ def v_curve(result: VCurve, title: str) -> Figure:
             below.axhline(at, color=LIMIT, linewidth=0.9, linestyle=":")
     zero_line(below)
     below.set_xlabel("reactive power q (pu)")
-    below.set_ylabel(f"{', '.join(result.readings)}: simulated\nless measured (% of 1 pu)")
     below.set_title(", ".join(words), fontsize=9, loc="right")
-    tidy(below)
+    tidy(below, f"{', '.join(result.readings)}: simulated\nless measured (% of 1 pu)")
     below.margins(x=ROOM)
     return figure

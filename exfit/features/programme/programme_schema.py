@@ -47,6 +47,7 @@ else:
     PointSignal = Literal[POINT_SIGNALS]
     CurveSignal = Literal[CURVE_SIGNALS]
 
+Rows = tuple[tuple[Number, ...], ...]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 Columns = Annotated[Mapping[Key, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
@@ -130,10 +131,7 @@ class SteadyTest(TestAtRest):
     """Points of the V-curves: field current, or voltage, of the machine at rest on load."""
 
     kind: Literal["steady"] = Field(description="Kind of test.")
-    points: (
-        Annotated[tuple[tuple[Number, ...], ...], Field(min_length=1, max_length=MOST_POINTS)]
-        | None
-    ) = Field(
+    points: Annotated[Rows, Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
         default=None,
         description="In place of a file: [p, q, vt, ifd] or [p, q, vt, ifd, efd] of each point.",
     )
@@ -181,7 +179,7 @@ class SaturationTest(TestAtRest):
         description="File of the points, in any format of a record, in the order in which they "
         "were taken.",
     )
-    points: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MOST_POINTS)] | None = Field(
+    points: Annotated[Rows, Field(max_length=MOST_POINTS)] | None = Field(
         default=None,
         description="In place of a file: [vt, ifd] or [vt, ifd, efd] of each point, in the order "
         "in which they were taken.",

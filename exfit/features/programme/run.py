@@ -19,7 +19,6 @@ from exfit.features.programme.result import (
     ProgrammeResult,
     ProgrammeStep,
     SaturationResult,
-    StepResult,
     VCurve,
 )
 from exfit.features.programme.tests_at_rest import points_of, saturation, steady
@@ -146,7 +145,26 @@ def finished_test(
     kept = result is not None
     if result is None:
         progress(step, None)
-        result = _result_of(programme, step, values, partial(progress, step), settings)
+        section, shared = programme.test(step.name), programme.shared_case()
+        machine = shared.parts.machine
+        if isinstance(section, SaturationTest):
+            result = saturation(section, points_of(section, programme.folder), machine)
+        elif isinstance(section, SteadyTest) and machine is not None:
+            case = with_values(shared, values)
+            own, errors = case.values(), {**case.std_errors()}
+            errors |= {
+                value.name: value.std_error
+                for value in values
+                if value.name.endswith(BASE) and value.entered
+            }
+            data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
+            std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
+            points = points_of(section, programme.folder)
+            result = steady(section, points, machine, data, std_errors)
+        else:
+            case, watch = with_values(programme.case_of(step.name), values), partial(progress, step)
+            strategy, search = settings
+            result = workflows.fit(case, strategy, watch, watch, search=search)
         if isinstance(result, FitResult) and not result.interrupted:
             inputs = {**result.inputs, KEY: key}
             files = {**result.files, KEY: "all its inputs"}
@@ -157,34 +175,6 @@ def finished_test(
             inputs["case"] = file_hash(programme.path)
         result = replace(result, about=programme.about, case_text=programme.text, inputs=inputs)
     return FinishedTest(**vars(step), key=key, result=result, kept=kept)
-
-
-def _result_of(
-    programme: Programme,
-    step: ProgrammeStep,
-    values: Values,
-    progress: Callable[[Progress | None], None],
-    settings: FitSettings,
-) -> StepResult:
-    section = programme.test(step.name)
-    shared = programme.shared_case()
-    machine = shared.parts.machine
-    if isinstance(section, SaturationTest):
-        return saturation(section, points_of(section, programme.folder), machine)
-    if isinstance(section, SteadyTest) and machine is not None:
-        case = with_values(shared, values)
-        own, errors = case.values(), {**case.std_errors()}
-        errors |= {
-            value.name: value.std_error
-            for value in values
-            if value.name.endswith(BASE) and value.entered
-        }
-        data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
-        std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
-        points = points_of(section, programme.folder)
-        return steady(section, points, machine, data, std_errors)
-    case = with_values(programme.case_of(step.name), values)
-    return workflows.fit(case, settings.strategy, progress, progress, search=settings.search)
 
 
 def with_values(case: Case, values: Values) -> Case:

@@ -10,6 +10,7 @@ import click
 from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import (
+    ABOVE_ZERO,
     ANY_PATH,
     Interruption,
     Output,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from exfit.features.start.answers import Given
     from exfit.features.start.making import Inspections, NewCase
 
-RATING = click.FloatRange(min=0.0, min_open=True)
 ENDING = ".answers.yaml"
 model_option = click.option(
     "--model",
@@ -45,11 +45,11 @@ model_option = click.option(
     shell_complete=completion.exciters,
 )
 kv_option = click.option(
-    "--kv", type=RATING, metavar="KV", help="Rated voltage of the unit: for --base vt=..kV."
+    "--kv", type=ABOVE_ZERO, metavar="KV", help="Rated voltage of the unit: for --base vt=..kV."
 )
 mva_option = click.option(
     "--mva",
-    type=RATING,
+    type=ABOVE_ZERO,
     metavar="MVA",
     help="Rated power of the unit: for --base p=..MW, q=..Mvar.",
 )

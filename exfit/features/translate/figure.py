@@ -31,8 +31,7 @@ def translation(result: "Translation", title: str) -> Figure:
                 target = envelope(result.time, step.target[signal])
                 axes.plot(*source, "-", color=START, linewidth=1.4)
                 axes.plot(*target, "--", color=SIMULATED, linewidth=1.4)
-            axes.set_ylabel(label_of(signal))
-            tidy(axes)
+            tidy(axes, label_of(signal))
         _errors(grid[2, column], result, steps)
         grid[0, column].set_title(plant, fontsize=10)
     below = grid[1, 0]
@@ -45,7 +44,6 @@ def _errors(axes: Axes, result: "Translation", steps: "list[StepComparison]") ->
     for step in steps:
         error = PERCENT * (step.target["vt"] - step.source["vt"]) / abs(step.step)
         axes.plot(*envelope(result.time, error), linewidth=1.1, label=f"{PERCENT * step.step:+g} %")
-    axes.set_ylabel("error of vt\n(% of the step)")
     axes.set_xlabel("time (s)")
     axes.legend(loc="best", frameon=False, fontsize=8, ncols=3)
-    tidy(axes)
+    tidy(axes, "error of vt\n(% of the step)")

@@ -66,10 +66,9 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
     figure, axes = stacked(height, len(ratios), title, sharex=True, height_ratios=ratios)
     for own, (name, signal) in zip(axes[:above], driving.items(), strict=True):
         own.plot(*envelope(comparison.time, signal.samples), "-", color=START, linewidth=1.1)
-        own.set_ylabel(f"{name} ({signal.unit})")
         departs = signal.excursion and f"; deviation {signal.excursion.text(signal.unit)}"
         own.set_title(f"recorded {name}, played in{departs or ''}", fontsize=9, loc="right")
-        tidy(own)
+        tidy(own, f"{name} ({signal.unit})")
     for k, name in enumerate(comparison.overlays):
         upper, lower = axes[above + 2 * k], axes[above + 2 * k + 1]
         _signal(upper, lower, comparison, name, label)
@@ -112,16 +111,14 @@ def _signal(axes: Axes, below: Axes, comparison: Comparison, signal: str, label:
         axes.plot(time, faint.simulated, "-", **look)
     label = label or ("fitted" if samples.start is not None else "simulated")
     axes.plot(*envelope(time, samples.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
-    axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
     match = comparison.channels[signal]
     text = f"rmse {match.rmse:.3g} pu, fit {percentage(match.fit_percent)} %"
     axes.set_title(text, fontsize=9, loc="right")
-    tidy(axes)
+    tidy(axes, label_of(signal))
     zero_line(below)
     below.plot(*envelope(time, MILLI * samples.error), color=SIMULATED, linewidth=0.7)
-    below.set_ylabel(ERROR)
-    tidy(below)
+    tidy(below, ERROR)
 
 
 def _limiters(panels_of_signals: Sequence[Axes], comparison: Comparison) -> None:
@@ -150,9 +147,8 @@ def response(simulated: Response, title: str) -> Figure:
         place = grid[1 + k // columns, k % columns]
         axes = figure.add_subplot(place, sharex=first)
         axes.plot(simulated.time, simulated.signals[name], color=START, linewidth=1.1)
-        axes.set_ylabel(f"{name} ({unit_of_signal(name)})")
         axes.tick_params(labelbottom=k + columns >= len(changing))
-        tidy(axes)
+        tidy(axes, f"{name} ({unit_of_signal(name)})")
     # one column lies on the same axis as the panels below it, two do not
     first.tick_params(labelbottom=columns > 1 or not changing)
     still = ", ".join(name for name in names if ranges[name] == 0.0)
@@ -167,9 +163,8 @@ def _voltages(axes: Axes, simulated: Response) -> None:
     for name in names:
         color = SIMULATED if name == "vt" else MEASURED
         axes.plot(simulated.time, simulated.signals[name], color=color, linewidth=1.3, label=name)
-    axes.set_ylabel(f"{', '.join(names)} (pu)")
     axes.legend(loc="best", frameon=False)
-    tidy(axes)
+    tidy(axes, f"{', '.join(names)} (pu)")
 
 
 def overview(title: str, simulated: Response) -> Figure:
@@ -180,8 +175,7 @@ def overview(title: str, simulated: Response) -> Figure:
         axes.sharex(rows[-1])
         axes.tick_params(labelbottom=axes is rows[-1])
         axes.plot(simulated.time, simulated.signals[name], color=SIMULATED, linewidth=1.4)
-        axes.set_ylabel(label_of(name))
-        tidy(axes)
+        tidy(axes, label_of(name))
     rows[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=12)
     return figure
@@ -292,11 +286,10 @@ def responses_beside(upper: Axes, errors: Axes, comparisons: Mapping[str, Compar
         label = f"{name}, rmse {match.rmse:.2e} pu"
         upper.plot(*envelope(match.time, line.simulated), label=label, **look)
         errors.plot(*envelope(match.time, MILLI * line.error), **{**look, "linewidth": 0.8})
-    upper.set_ylabel(label_of(signal))
     upper.legend(loc="best", frameon=False, fontsize=SMALL)
     errors.set_ylabel("error\n(1e-3 pu)", fontsize=SMALL)
     errors.set_xlabel("time (s)")
-    tidy(upper)
+    tidy(upper, label_of(signal))
     tidy(errors)
 
 

@@ -75,8 +75,7 @@ def convergence(result: FitResult) -> Figure:
         _by_phase(ax, result, [v if v > 0.0 else float("nan") for v in values], marker)
         if any(value > 0.0 for value in values):
             logarithmic(ax)
-        ax.set_ylabel(label)
-        tidy(ax)
+        tidy(ax, label)
     axes[0].legend(loc="upper right", frameon=False)
     axes[-1].set_xlabel("iteration")
     axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -155,12 +154,11 @@ def waterfall(search: Minima, title: str) -> Figure:
                 axes.plot(ranks[own], ends[own], marker, color=color, markersize=5, label=text)
     logarithmic(axes)
     axes.set_xlabel("run, by the cost at its end")
-    axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=8)
     lowest = f"{search.minima[0].starts} of {search.starts} runs converged to the lowest minimum"
     axes.set_title(lowest, fontsize=9, loc="right")
-    tidy(axes)
+    tidy(axes, "cost f (pu²)")
     return figure
 
 
@@ -224,11 +222,9 @@ def _after_each(upper: Axes, lower: Axes, responses: IterationResponses) -> None
         width = 1.6 if k in labels else 1.0
         upper.plot(time, samples, "-", color=colour, linewidth=width, label=labels.get(k))
         lower.plot(time, MILLI * (samples - measured), color=colour, linewidth=0.8)
-    upper.set_ylabel(label_of(responses.signal))
     upper.legend(loc="best", frameon=False)
-    lower.set_ylabel(ERROR)
-    tidy(upper)
-    tidy(lower)
+    tidy(upper, label_of(responses.signal))
+    tidy(lower, ERROR)
 
 
 def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
@@ -250,8 +246,7 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
                 label=labels.get(name, name),
             )
         zero_line(axes)
-        axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
-        tidy(axes)
+        tidy(axes, f"change of {response.label}\nfor +1 % (1e-3 pu)")
     column[-1].set_xlabel("time (s)")
     handles, texts = column[0].get_legend_handles_labels()
     figure.legend(handles, texts, loc="outside right upper", frameon=False)

@@ -132,8 +132,10 @@ def logarithmic(axes: Axes) -> None:
     axes.yaxis.set_minor_formatter(PowersOfTen())
 
 
-def tidy(axes: Axes) -> None:
-    """Give axes a grid and room, and no frame."""
+def tidy(axes: Axes, label: str = "") -> None:
+    """Give axes a grid and room, no frame, and the label of their y axis."""
+    if label:
+        axes.set_ylabel(label)
     axes.grid(visible=True, color="#e2e5e9", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
