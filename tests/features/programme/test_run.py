@@ -34,22 +34,19 @@ def whole(folder):
 
 
 @pytest.fixture
-def again(folder, whole, monkeypatch, tmp_path):
+def again(folder, whole, tmp_path):
     """Return what runs another content where the results are kept; nothing is kept of that."""
-    ran = []
-    real = running._result_of
-
-    def counting(programme, step, *others):
-        ran.append(step.name)
-        return real(programme, step, *others)
-
-    monkeypatch.setattr(running, "_result_of", counting)
 
     def run(content, **options):
-        ran.clear()
+        ran = []
+
+        def progress(step, iteration):
+            if iteration is None:  # it begins
+                ran.append(step.name)
+
         path = written(content, tmp_path)
-        result = exfit.run(path, folder / "run", keep=lambda *_: None, **options)
-        return result, [*ran]
+        places = {"folder": folder / "run", "keep": lambda *_: None}
+        return exfit.run(path, progress=progress, **places, **options), ran
 
     return run
 
