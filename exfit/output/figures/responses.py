@@ -142,12 +142,7 @@ def response(simulated: Response, title: str) -> Figure:
     figure = new_figure(2.6 + 1.6 * rows, title)
     grid = figure.add_gridspec(1 + rows, columns, height_ratios=[1.6, *[1.0] * rows])
     first = figure.add_subplot(grid[0, :])
-    voltages = [name for name in VOLTAGES if name in simulated.signals]
-    for name in voltages:
-        color = SIMULATED if name == "vt" else MEASURED
-        first.plot(simulated.time, simulated.signals[name], color=color, linewidth=1.3, label=name)
-    first.legend(loc="best", frameon=False)
-    tidy(first, f"{', '.join(voltages)} (pu)")
+    _voltages(first, simulated)
     for k, name in enumerate(changing):
         place = grid[1 + k // columns, k % columns]
         axes = figure.add_subplot(place, sharex=first)
@@ -160,6 +155,16 @@ def response(simulated: Response, title: str) -> Figure:
     rest = f"   (unused or at rest: {still})" if still else ""
     figure.supxlabel(f"time (s){rest}", fontsize=10)
     return figure
+
+
+def _voltages(axes: Axes, simulated: Response) -> None:
+    """Draw the reference and the voltage that follows it."""
+    names = [name for name in VOLTAGES if name in simulated.signals]
+    for name in names:
+        color = SIMULATED if name == "vt" else MEASURED
+        axes.plot(simulated.time, simulated.signals[name], color=color, linewidth=1.3, label=name)
+    axes.legend(loc="best", frameon=False)
+    tidy(axes, f"{', '.join(names)} (pu)")
 
 
 def overview(title: str, simulated: Response) -> Figure:
