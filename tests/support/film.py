@@ -1,7 +1,7 @@
 """A terminal as an animated SVG: frames that take turns by CSS, with no script and no font.
 
-A row that stays as it was over several frames is written once. Whoever prefers reduced motion, or
-has no animation at all, sees the last frame.
+A row that stays as it was over several frames is written once. Whoever prefers reduced motion, has
+no animation at all, or prints the page, sees the last frame.
 """
 
 from collections import defaultdict
@@ -58,7 +58,7 @@ def film(frames, columns, rows):
 <style>
 text{{font:{LETTER}px "SF Mono",Menlo,Consolas,"DejaVu Sans Mono","Liberation Mono",monospace}}
 {newline.join(rules)}
-@media (prefers-reduced-motion: no-preference) {{
+@media screen and (prefers-reduced-motion: no-preference) {{
 g[class]{{animation:{ends[-1]:g}s step-end infinite}}
 {newline.join(shown)}
 }}
