@@ -258,7 +258,7 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     names, values = analysis.confidence.names, analysis.confidence.correlation.matrix
     side = max(4.2, 1.6 + 0.62 * len(names))
     title = f"{title}: correlation of the parameters"
-    figure = new_figure(side + 0.8, title, side)
+    figure = new_figure(side, title, side + 0.8)
     axes, bar = panels(figure, 1, 2, width_ratios=[1.0, BAR])[0]
     axes.imshow(values, cmap=COLOUR_MAP, vmin=-1.0, vmax=1.0, aspect="auto")
     places = range(len(names))
