@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from shlex import join, quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -189,7 +190,7 @@ def new(
 
 def list_open(made: "NewCase", output: Path) -> None:
     """Say where a case was written, and what is open in it."""
-    echo(f"written to {output}; next: exfit check {output}")
+    echo(f"written to {output}; next: exfit check {quote(str(output))}")
     for value in made.open:
         hint = f" ({value.hint})" if value.hint else ""
         echo(f"to be filled in: {dotted(value.place)}{hint}, line {value.line}")
@@ -264,10 +265,10 @@ def complete(
             raise Interruption("nothing was answered") from None
         stem = Path(str(given.get("record") or "exfit")).stem
         path = keep(given, Path(stem + ENDING))
-        resume = f"exfit {command} --answers {path}"
+        resume = ["exfit", command, "--answers", str(path)]
         if "output" in given:
-            resume += f" -o {given['output']}"
-        raise Interruption(f"the answers are kept; to go on:\n{resume}") from None
+            resume += ["-o", str(given["output"])]
+        raise Interruption(f"the answers are kept; to go on:\n{join(resume)}") from None
 
 
 def keep(given: "Given", path: Path) -> Path:
@@ -314,4 +315,4 @@ def finish(given: "Given", read: "Inspections", made: "NewCase", output: Path) -
         show.draw(run_folder.write_inspection(inspection, folder))
         echo(f"look at {folder / 'inspect.png'}: is each step in its place?")
     load_case(output)  # refuses what no single question could show
-    echo(f"next: exfit fit {output}")
+    echo(f"next: exfit fit {quote(str(output))}")
