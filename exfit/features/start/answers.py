@@ -94,13 +94,14 @@ Given = dict[str, Any]  # answers by key, of which some may be "?"
 def read_answers(path: Path) -> Given:
     """Return the answers of a file, its paths as they are from the working folder.
 
+    Of those that are open, "?", only the model stays: there is no planner's file then.
     Raises CaseError with all faults of the file, each with its line and place.
     """
     top, faults = read_yaml(read_text(path), path)
     _checked(top.value, faults)
     if faults:
         raise faults_with_lines(faults, top, path)
-    given = {key: value for key, value in top.value.items() if value != QUESTION}
+    given = {k: value for k, value in top.value.items() if value != QUESTION or k == "model"}
     return _with_paths(given, lambda file: str(path.parent / file))
 
 

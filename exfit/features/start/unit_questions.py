@@ -45,7 +45,7 @@ def ask_models(talk: Conversation) -> None:
     given = talk.given
     if not {"dyr", "model"} & given.keys():
         _ask_planner(talk)
-    if not {"dyr", "model"} & given.keys():
+    if given.get("model") == QUESTION:
         given["model"] = _ask_model()
     known = {"dyr", "machine_model", "machine_from", "machine"} & given.keys()
     if not known and talk.case().draft.kind_of_plant != "none":
@@ -74,6 +74,7 @@ def _ask_planner(talk: Conversation) -> None:
         "result with it.",
     )
     if not file:
+        given["model"] = QUESTION
         return
     units = units_of_file(Path(file)).units
     unit = units[0]
