@@ -14,11 +14,13 @@ from exfit.util.interrupts import ENDING, deferred_interrupts, endings_as_interr
 
 
 @pytest.fixture(autouse=True)
-def handler():
-    """Have interruptions raise KeyboardInterrupt, as in a program that a shell starts."""
-    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+def handlers():
+    """Handle signals as a program does that a shell starts, even where nohup started the tests."""
+    defaults = {signal.SIGINT: signal.default_int_handler, **dict.fromkeys(ENDING, signal.SIG_DFL)}
+    former = {number: signal.signal(number, handler) for number, handler in defaults.items()}
     yield
-    signal.signal(signal.SIGINT, former)
+    for number, handler in former.items():
+        signal.signal(number, handler)
 
 
 def interrupted(steps, error=None):
