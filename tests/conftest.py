@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 
 import hypothesis
@@ -15,6 +16,7 @@ from exfit import cli
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import figures
+from exfit.util.interrupts import ENDING
 
 CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
 # one of each family: without a plant; commutators; rotating rectifiers; static; compound; a round
@@ -140,6 +142,16 @@ def surrounded(request):
 def saturated(request):
     """Name a model and a form of saturation in turn."""
     return request.param
+
+
+@pytest.fixture(autouse=True)
+def handlers():
+    """Handle signals as a program of a shell does, also behind nohup or in a background."""
+    defaults = {signal.SIGINT: signal.default_int_handler, **dict.fromkeys(ENDING, signal.SIG_DFL)}
+    former = {number: signal.signal(number, handler) for number, handler in defaults.items()}
+    yield
+    for number, handler in former.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture

@@ -168,6 +168,9 @@ def test_axes_of_another_version_change_a_figure_only_of_the_same_version(unchan
     assert not same(unchanged, moved())
     monkeypatch.setattr(small_svg, "DRAWN_BY", "Matplotlib 99.0")
     assert same(unchanged, moved())
+    other = figure()
+    other.axes[0].set_title("another title")
+    assert not same(unchanged, picture(other))
 
 
 @pytest.mark.parametrize(

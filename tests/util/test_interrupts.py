@@ -13,16 +13,6 @@ import exfit
 from exfit.util.interrupts import ENDING, deferred_interrupts, endings_as_interruptions
 
 
-@pytest.fixture(autouse=True)
-def handlers():
-    """Handle signals as a program does that a shell starts, even where nohup started the tests."""
-    defaults = {signal.SIGINT: signal.default_int_handler, **dict.fromkeys(ENDING, signal.SIG_DFL)}
-    former = {number: signal.signal(number, handler) for number, handler in defaults.items()}
-    yield
-    for number, handler in former.items():
-        signal.signal(number, handler)
-
-
 def interrupted(steps, error=None):
     """Be interrupted twice, and take a step after that, or fail."""
     with deferred_interrupts():
