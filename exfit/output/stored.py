@@ -7,7 +7,7 @@ from exfit.errors import ExfitError
 from exfit.output import fits, run_folder, terminal, validations
 from exfit.output.blocks import Cell, Table, columns, paragraph, row
 from exfit.output.iterations import iterations
-from exfit.results.io import load_result, load_validation, result_file
+from exfit.results.io import load_result, load_validation, stored_file
 from exfit.results.model import FitResult
 from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
 
@@ -32,9 +32,8 @@ def show(
         fit = result
     else:
         place = Path(result)
-        source = result_file(place)
-        programme = place / WHOLE_PROGRAMME if place.is_dir() else place
-        if programme.name == WHOLE_PROGRAMME and programme.is_file():
+        source = stored_file(place)
+        if source.name == WHOLE_PROGRAMME and source.is_file():
             raise ExfitError(f"{place}: the result of a programme: use exfit report {result}")
         validated = source.with_name(VALIDATION)
         if source == validated or (validated.is_file() and not source.exists()):

@@ -26,6 +26,7 @@ from exfit.util.file_names import (
     SENSITIVITIES,
     VALIDATION,
     WHOLE_FIT,
+    WHOLE_PROGRAMME,
 )
 from exfit.util.files import read_json
 from exfit.util.text import show_value, to_json
@@ -134,3 +135,11 @@ def _read(
 def result_file(path: Path) -> Path:
     """Name the file of a fit, given it or the folder that holds it."""
     return path / WHOLE_FIT if path.is_dir() else path
+
+
+def stored_file(path: Path) -> Path:
+    """Name the file of a programme, fit or validation, given it or the folder that holds it."""
+    if not path.is_dir():
+        return path
+    names = (WHOLE_PROGRAMME, WHOLE_FIT, VALIDATION)
+    return next((path / name for name in names if (path / name).is_file()), path / WHOLE_FIT)

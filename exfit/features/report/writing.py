@@ -15,7 +15,7 @@ from exfit.features.report.page import (
     page_html,
     result_page,
 )
-from exfit.results.io import load_result, load_validation, result_file
+from exfit.results.io import load_result, load_validation, stored_file
 from exfit.results.model import FitResult
 from exfit.util.file_names import VALIDATION, WHOLE_PROGRAMME
 from exfit.util.files import write
@@ -90,18 +90,14 @@ def _page(result: FitResult | str | PathLike[str], other: FitResult | None) -> t
     """Build the page of a result; return it with the folder of the result."""
     if isinstance(result, FitResult):
         return result_page(result, Path(), other), Path()
-    given = Path(result)
-    summary = given / WHOLE_PROGRAMME if given.is_dir() else given
-    if summary.name == WHOLE_PROGRAMME and summary.is_file():
+    source = stored_file(Path(result))
+    if source.name == WHOLE_PROGRAMME and source.is_file():
         from exfit.features.programme.folder import load_summary
         from exfit.features.programme.programme_page import programme_page
 
         if other is not None:
-            raise ExfitError(f"{summary}: --against compares fits, and this is a programme")
-        return programme_page(load_summary(summary.parent), summary.parent), summary.parent
-    source = result_file(given)
-    if given.is_dir() and not source.exists() and (given / VALIDATION).is_file():
-        source = given / VALIDATION
+            raise ExfitError(f"{source}: --against compares fits, and this is a programme")
+        return programme_page(load_summary(source.parent), source.parent), source.parent
     if source.name == VALIDATION:
         if other is not None:
             raise ExfitError(f"{source}: --against compares fits, and this is a validation")
