@@ -2,6 +2,7 @@
 
 import hashlib
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -136,6 +137,6 @@ def _refuse_edited(case: Path) -> None:
     text, mark, _ = case.read_bytes().decode(errors="replace").rpartition(MARK)
     if not mark or _marked(text).encode() != case.read_bytes():
         raise ExfitError(
-            f"{case}: exists already, and verify did not make it as it is; `exfit fit {case}` "
-            "fits it, --force writes over it"
+            f"{case}: exists already, and verify did not make it as it is; "
+            f"`exfit fit {quote(str(case))}` fits it, --force writes over it"
         )
