@@ -35,6 +35,7 @@ LAGS_IN_CHAIN = (1, 2, 3, 4)  # whose step responses are the shapes that a rise 
 LAGS = np.geomspace(0.02, 8.0, 14)  # each, of the time that the rise takes
 SHORTEST_LAG = 0.02  # of a sample: with it the rise is a jump
 TRIED_INSTANTS = 120
+TRIED_TOGETHER = 60  # of these: their shapes stay in the cache of the processor
 SOUGHT_BEFORE = 1.5  # times the rise: how long before its first sample the response may set out
 COMPARED_RISE, LESS_OF_IT = 0.5, 0.5  # of the first move, and of that, until a shape fits
 LEAST_RISE = 6.0  # times the noise: less of a rise shows no shape
@@ -416,20 +417,26 @@ def _costs(time: Array, samples: Array, instants: Array) -> Array:
 
     Level and size are eliminated (Golub and Pereyra 1973).
     """
-    rise = float(time[-1] - instants[0])
-    lags = np.maximum(LAGS * rise, SHORTEST_LAG * median_step(time))
-    ago = np.maximum(time - instants[:, None], 0.0)[:, None, :] / lags[:, None]
+    lags = np.maximum(LAGS * float(time[-1] - instants[0]), SHORTEST_LAG * median_step(time))
     y = samples - np.mean(samples)
+    y -= np.mean(y)  # of a small move on a large level
     costs = np.full(len(instants), y @ y)
-    # of a chain of n equal lags: 1 - exp(-x) (1 + x + ... + x^(n-1) / (n-1)!)
-    term = np.exp(-ago)
-    shape = 1.0 - term
-    for order in LAGS_IN_CHAIN:
-        if order > 1:
-            term = term * ago / (order - 1)
-            shape = shape - term
-        centred = shape - np.mean(shape, axis=-1, keepdims=True)
-        along, size = centred @ y, np.sum(centred**2, axis=-1)
-        gain = np.divide(along**2, size, out=np.zeros_like(size), where=size > 0.0)
-        costs = np.minimum(costs, y @ y - np.max(gain, axis=1))
+    for begin in range(0, len(instants), TRIED_TOGETHER):
+        tried = slice(begin, begin + TRIED_TOGETHER)
+        moved = int(np.searchsorted(time, instants[begin], side="right"))  # before, shapes are 0
+        ago = np.maximum(time[moved:] - instants[tried, None], 0.0)[:, None, :] / lags[:, None]
+        # of a chain of n equal lags: 1 - exp(-x) (1 + x + ... + x^(n-1) / (n-1)!)
+        term = np.exp(-ago)
+        shape = 1.0 - term
+        for order in LAGS_IN_CHAIN:
+            if order > 1:
+                term *= ago
+                term /= order - 1
+                shape -= term
+            squares = np.einsum("nlm,nlm->nl", shape, shape)
+            size = squares - np.sum(shape, axis=-1) ** 2 / len(time)  # without the mean
+            gain = np.divide(
+                (shape @ y[moved:]) ** 2, size, out=np.zeros_like(size), where=size > 0.0
+            )
+            costs[tried] = np.minimum(costs[tried], y @ y - np.max(gain, axis=1))
     return costs
