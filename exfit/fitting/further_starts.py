@@ -14,7 +14,6 @@ from exfit.fitting.problem import FitProblem, compressed
 from exfit.fitting.residuals import Residuals, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
-from exfit.simulation.simulator import Simulator
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import DEFAULT_STRATEGY
 
@@ -123,8 +122,7 @@ def coarse_form(residuals: Residuals) -> Residuals:
     values, experiments = residuals.values(residuals.start), list[Experiment]()
     for experiment in residuals.experiments:
         own = experiment.simulator
-        step = COARSENESS * own.step
-        coarse = Simulator(own.system, own.inputs, own.times, step, delay=own.delay)
+        coarse = own.remade(step=COARSENESS * own.step, least=1)
         try:
             experiments.append(replace(experiment, simulator=coarse).with_enough_substeps(values))
         except SimulationError:

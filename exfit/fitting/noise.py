@@ -9,7 +9,6 @@ import numpy as np
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, ExperimentSetup
-from exfit.simulation.simulator import Simulator
 from exfit.util.arrays import Array
 
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
@@ -84,8 +83,7 @@ def propagated_noise(
                 at_rest = given.time < steady
                 level = float(np.mean(added[at_rest])) if at_rest.any() else 0.0
                 recorded[signal] = replace(given, samples=given.samples + added - level)
-            inputs = replace(own.inputs, recorded=recorded)
-            changed = Simulator(own.system, inputs, own.times, own.step, own.least, own.delay)
+            changed = own.remade(inputs=replace(own.inputs, recorded=recorded))
             noisy.append(replace(experiment, simulator=changed).samples(at)[0])
     except SimulationError:
         return []

@@ -92,6 +92,7 @@ class Simulator:
     fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
     at ``times - delay``: before the start, where all is at rest, and after the end that there. A
     ``responder`` gives the response at these times in place of the equations, not that on the grid.
+    ``located``, the crossings of limits are found within a step, which starts anew from there.
     """
 
     def __init__(
@@ -103,9 +104,11 @@ class Simulator:
         least: int = 1,
         delay: float = 0.0,
         responder: Responder | None = None,
+        located: bool = False,
     ) -> None:
         self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay, self.responder = step, least, delay, responder
+        self.located = located
         self._share = 1.0  # of the inputs
         self._grid = grid_segments(inputs, step)
         # a long record is read on the grid once, whatever else a fit moves
@@ -140,9 +143,26 @@ class Simulator:
             result._sampling = Interpolation(self._grid, self.times, delay)
         return result
 
-    def of_system(self, system: System) -> "Simulator":
-        """Return the simulator of the same test of another system, which has the same inputs."""
-        return Simulator(system, self.inputs, self.times, self.step, self.least, self.delay)
+    def remade(
+        self,
+        *,
+        system: System | None = None,
+        inputs: Inputs | None = None,
+        times: Array | None = None,
+        step: float | None = None,
+        least: int | None = None,
+        delay: float | None = None,
+    ) -> "Simulator":
+        """Make the simulator by equations of another system, test or grid; the rest stays."""
+        return Simulator(
+            system or self.system,
+            inputs or self.inputs,
+            self.times if times is None else times,
+            step or self.step,
+            least or self.least,
+            self.delay if delay is None else delay,
+            located=self.located,
+        )
 
     def at_times(self, times: Array) -> "Simulator":
         """Return the simulator of the same run that is sampled at other times (M,) in s."""
@@ -235,8 +255,7 @@ class Simulator:
             parts, required = simulator.substeps_along(values)
             if required <= parts:
                 break
-            test = self.system, self.inputs, self.times, self.step
-            simulator = Simulator(*test, required, self.delay, self.responder)
+            simulator = self.remade(least=required).with_responder(self.responder)
         return simulator
 
     def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
@@ -249,9 +268,9 @@ class Simulator:
         for change in self.inputs.steps:
             if change.smooth and change.signal not in REFERENCES:
                 times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
-        coarse = Simulator(self.system, self.inputs, times, self.step, self.least)
+        coarse = self.remade(times=times, delay=0.0)
         samples, parts = coarse.samples(values, outputs)
-        finer = Simulator(self.system, self.inputs, times, self.step / 2.0, parts)
+        finer = coarse.remade(step=self.step / 2.0, least=parts)
         moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
         return dict(zip(outputs, map(float, moved), strict=True))
 

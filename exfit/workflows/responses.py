@@ -260,7 +260,8 @@ def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str]) -> 
     ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
     is no rest.
     """
-    still = Simulator(simulator.system, Inputs(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
+    at_rest = Inputs(0.0, FLAT_SECONDS, ())
+    still = simulator.remade(inputs=at_rest, times=FLAT_TIMES, least=1, delay=0.0)
     flat, _ = still.samples(values, tuple(signals))
     return float(np.max(np.abs(flat - flat[0])))
 

@@ -26,7 +26,6 @@ from exfit.fitting.further_starts import legs_of
 from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO, fitted, search
-from exfit.simulation.simulator import Simulator
 from exfit.workflows.given_values import with_values
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -77,7 +76,7 @@ def with_record(residuals: Residuals, made: Made) -> Residuals:
     (channel,) = experiment.channels
     own = experiment.simulator
     steps = tuple(step._replace(step=made.step) for step in own.inputs.steps)
-    simulator = Simulator(own.system, replace(own.inputs, steps=steps), own.times, own.step)
+    simulator = own.remade(inputs=replace(own.inputs, steps=steps))
     limits = {"VRMAX": made.ceiling, "VRMIN": made.floor}
     limited = replace(
         residuals,

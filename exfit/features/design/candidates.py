@@ -158,7 +158,7 @@ class Bench:
         count = round(duration / median_step(old.times))
         times = np.linspace(0.0, duration, count + 1)
         inputs = Inputs(0.0, duration, self.steps(moves))
-        return Simulator(old.system, inputs, times, old.step, old.least)
+        return old.remade(inputs=inputs, times=times, delay=0.0)
 
     def values(self) -> dict[str, float]:
         """Return the values of the case."""

@@ -28,7 +28,6 @@ from exfit.inference.confidence import Confidence
 from exfit.plants import REFERENCES
 from exfit.signals import NOISE
 from exfit.simulation.inputs import grid_segments
-from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
 from exfit.util.typed import plain
 from exfit.verdict.diagnostics import search_range_notes
@@ -253,8 +252,7 @@ def _scaled(experiment: Experiment, size: float) -> Experiment:
     if not recorded:
         return replace(experiment, simulator=old.with_inputs(steps, old.delay))
     inputs = replace(old.inputs, steps=steps, recorded=recorded)
-    simulator = Simulator(old.system, inputs, old.times, old.step, old.least, old.delay)
-    return replace(experiment, simulator=simulator)
+    return replace(experiment, simulator=old.remade(inputs=inputs))
 
 
 def _longer(experiment: Experiment) -> Experiment:
@@ -262,11 +260,11 @@ def _longer(experiment: Experiment) -> Experiment:
     old = experiment.simulator
     times = np.concatenate([old.times, old.times[1:] + (old.times[-1] - old.times[0])])
     inputs = replace(old.inputs, end=float(times[-1]) + max(0.0, -old.delay))
-    simulator = Simulator(old.system, inputs, times, old.step, old.least, old.delay)
     zeros = np.zeros(len(times))
     channels = tuple(
         replace(channel, measured=zeros, filtering=None) for channel in experiment.channels
     )
+    simulator = old.remade(inputs=inputs, times=times)
     return replace(experiment, simulator=simulator, channels=channels)
 
 

@@ -137,10 +137,7 @@ def with_added(simulator: Simulator, added: Mapping[str, Array]) -> Simulator:
         signal: replace(own, samples=own.samples + added[signal]) if signal in added else own
         for signal, own in simulator.inputs.recorded.items()
     }
-    inputs = replace(simulator.inputs, recorded=recorded)
-    return Simulator(
-        simulator.system, inputs, simulator.times, simulator.step, simulator.least, simulator.delay
-    )
+    return simulator.remade(inputs=replace(simulator.inputs, recorded=recorded))
 
 
 def pulse_places(time: Array) -> Rows:

@@ -71,7 +71,9 @@ def of_case(evidence: Evidence, other: Case) -> Residuals:
     """
     own, values = evidence.residuals, other.values()
     experiments = [
-        replace(experiment, simulator=experiment.simulator.of_system(system_of(other, recording)))
+        replace(
+            experiment, simulator=experiment.simulator.remade(system=system_of(other, recording))
+        )
         for experiment, recording in zip(own.experiments, other.recordings, strict=True)
     ]
     lost = evidence.case.values().keys() - values.keys()

@@ -10,7 +10,6 @@ from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.results.verdict import Cause
 from exfit.simulation.inputs import InputStep
-from exfit.simulation.simulator import Simulator
 from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, suspected
 from exfit.verdict.causes.trials import (
     LinearFit,
@@ -159,12 +158,11 @@ def further_step(evidence: Evidence) -> Iterator[Suspicion]:
             continue
         place, size = len(steps), max(abs(step.step) for step in steps)
         inputs = replace(own.inputs, steps=(*steps, InputStep(at, 0.0, smooth=True)))
-        simulator = Simulator(own.system, inputs, own.times, own.step, own.least, own.delay)
         opened = [
             Opened.around(Nuisance("cause.at", "at", place), at, 2.0 * spacing),
             Opened(Nuisance("cause.step", "step", place), 0.02 * size, -size, size),
         ]
-        changed = replace(experiment, simulator=simulator)
+        changed = replace(experiment, simulator=own.remade(inputs=inputs))
         residuals = with_experiment(evidence.residuals, number, changed)
         if trial := refitted(evidence, with_opened(residuals, number, opened)):
             cause = Cause(
