@@ -26,41 +26,41 @@ def sampled(sets: int, outputs: int, directions: int, moving: int) -> str:
     the rate that it has in a direction.
     """
     w = Writer(ONE, ONE)
-    work = _row(w, "%work", "0", WORK)
-    with _loop(w, "job", "%count") as k:
-        job = _row(w, "%jobs", k, JOB)
+    work = of_row(w, "%work", "0", WORK)
+    with loop(w, "job", "%count") as k:
+        job = of_row(w, "%jobs", k, JOB)
         states = [work["r"], work["x"]]
         tangents = [job["dp"], work["dr"], work["dx"]] if directions else []
         last = ["null"] if directions else []
-        w.put(f"call void @rest({_pointers(job['p'], *states, 'null', *tangents, *last)})")
-        with _loop(w, "segment", "%segments") as number:
-            span = _row(w, job["spans"], number, SPAN)
-            row = w.let(f"mul i64 {_whole(w, span['row'])}, {outputs * sets}")
+        w.put(f"call void @rest({pointers(job['p'], *states, 'null', *tangents, *last)})")
+        with loop(w, "segment", "%segments") as number:
+            span = of_row(w, job["spans"], number, SPAN)
+            row = w.let(f"mul i64 {whole(w, span['row'])}, {outputs * sets}")
             arrays = [job["p"], *states, w.address(work["out"], row), *tangents]
             if directions:
                 wide = w.let(f"mul i64 {row}, {directions}")
                 arrays += [w.address(work["dout"], wide)]
             arrays += [span["u"]]
-            n = _whole(w, span["n"])
+            n = whole(w, span["n"])
             if moving:
                 arrays += [work["du"]]
-                given = _pointers(span["shapes"], job["rates"], work["du"])
+                given = pointers(span["shapes"], job["rates"], work["du"])
                 w.put(f"call void @moved({given}, i64 {n}, i64 %columns)")
-            h = w.let(f"bitcast i64 {_whole(w, span['h'])} to double")
-            steps = f"double {h}, i64 {n}, i64 {_whole(w, span['parts'])}"
-            w.put(f"call void @run({_pointers(*arrays)}, {steps})")
-        with _loop(w, "lane", str(sets)) as lane:
+            h = w.let(f"bitcast i64 {whole(w, span['h'])} to double")
+            steps = f"double {h}, i64 {n}, i64 {whole(w, span['parts'])}"
+            w.put(f"call void @run({pointers(*arrays)}, {steps})")
+        with loop(w, "lane", str(sets)) as lane:
             place = w.let(f"add i64 {w.let(f'mul i64 {k}, {sets}')}, {lane}")
-            reading = _row(w, "%lanes", place, SAMPLES)
+            reading = of_row(w, "%lanes", place, SAMPLES)
             still = w.let(f"icmp eq ptr {reading['slopes']}, null")
             changing = w.let(f"select i1 {still}, i64 0, i64 %samples")
-            with _loop(w, "output", str(outputs)) as y:
+            with loop(w, "output", str(outputs)) as y:
                 column = w.let(f"add i64 {w.let(f'mul i64 {y}, {sets}')}, {lane}")
 
                 def read(shape: Shape, run: str, weights: str, out: str, samples: str) -> None:
                     first = w.address(work[run], w.let(f"mul i64 {column}, {shape.lanes}"))
                     into = w.address(reading[out], w.let(f"mul i64 {y}, {shape.lanes}"))
-                    arrays = _pointers(first, reading["rows"], reading[weights], into)
+                    arrays = pointers(first, reading["rows"], reading[weights], into)
                     counts = f"i64 {samples}, i64 %points, i64 {outputs * sets}, i64 {outputs}"
                     w.put(f"call void @read_{shape.suffix}({arrays}, {counts})")
 
@@ -69,32 +69,32 @@ def sampled(sets: int, outputs: int, directions: int, moving: int) -> str:
                     read(ONE, "out", "slopes", "change", changing)
                     read(Shape(directions), "dout", "weights", "dout", "%samples")
     w.put("ret void")
-    heads = [_reader(ONE), *([_reader(Shape(directions))] if directions else [])]
+    heads = [reader(ONE), *([reader(Shape(directions))] if directions else [])]
     if moving:
-        heads.append(_moved(Shape(directions), moving))
-    return "".join([*heads, _defined("void @sampled", ARGUMENTS, w)])
+        heads.append(moved_inputs(Shape(directions), moving))
+    return "".join([*heads, defined("void @sampled", ARGUMENTS, w)])
 
 
 def at_rest(parameters: int, states: int, directions: int) -> str:
     """Return the IR of ``at_rest``: the states, slopes and Jacobian at rest of many sets."""
     w = Writer(ONE, ONE)
-    with _loop(w, "set", "%count") as k:
+    with loop(w, "set", "%count") as k:
         p, x, slopes = (
             _of_number(w, k, array, size)
             for array, size in (("%p", parameters), ("%x", states), ("%slopes", states))
         )
-        starting = _pointers(p, "%r", x, "null", "%dp", "%dr", "%dx", "null")
+        starting = pointers(p, "%r", x, "null", "%dp", "%dr", "%dx", "null")
         w.put(f"call void @rest({starting})")
         _linearise(w, k, (p, x, slopes, "%u"), states, directions)
     w.put("ret void")
     arguments = ("i64 %count", *(f"ptr %{name}" for name in AT_REST))
-    return _defined("void @at_rest", arguments, w)
+    return defined("void @at_rest", arguments, w)
 
 
 def along(states: int, inputs: int, directions: int) -> str:
     """Return the IR of ``along``: the slopes of one set and their Jacobian at many states."""
     w = Writer(ONE, ONE)
-    with _loop(w, "point", "%count") as k:
+    with loop(w, "point", "%count") as k:
         x, slopes, u = (
             _of_number(w, k, array, size)
             for array, size in (("%x", states), ("%slopes", states), ("%u", inputs))
@@ -102,7 +102,7 @@ def along(states: int, inputs: int, directions: int) -> str:
         _linearise(w, k, ("%p", x, slopes, u), states, directions)
     w.put("ret void")
     arguments = ("i64 %count", *(f"ptr %{name}" for name in ALONG))
-    return _defined("void @along", arguments, w)
+    return defined("void @along", arguments, w)
 
 
 def _linearise(
@@ -111,22 +111,22 @@ def _linearise(
     """Write the calls that give the slopes for p, x and u, and the blocks of their Jacobian."""
     p, x, slopes, u = arrays
     blocks, size = -(-states // directions), states * directions
-    with _loop(w, "block", str(blocks)) as block:
+    with loop(w, "block", str(blocks)) as block:
         units = _of_number(w, block, "%units", size)
         place = w.let(f"add i64 {w.let(f'mul i64 {k}, {blocks}')}, {block}")
         columns = _of_number(w, place, "%jacobian", size)
-        given = _pointers(p, "%r", x, slopes, "%dp", "%dr", units, columns, u)
+        given = pointers(p, "%r", x, slopes, "%dp", "%dr", units, columns, u)
         w.put(f"call void @motion({given})")
 
 
-def _reader(shape: Shape) -> str:
+def reader(shape: Shape) -> str:
     """Return the function that samples a column of a run: sums of weighted rows."""
     w = Writer(shape, shape)
     total = w.let(f"alloca {shape.type}, align 64")
-    with _loop(w, "sample", "%samples") as m:
+    with loop(w, "sample", "%samples") as m:
         w.put(f"store {shape.type} {shape.number(0.0)}, ptr {total}, align 64")
         begin = w.let(f"mul i64 {m}, %points")
-        with _loop(w, "point", "%points") as k:
+        with loop(w, "point", "%points") as k:
             place = w.let(f"add i64 {begin}, {k}")
             row = w.let(f"load i64, ptr {w.address('%rows', place)}, align 8")
             first = w.let(f"mul i64 {w.let(f'mul i64 {row}, %pitch')}, {shape.lanes}")
@@ -142,19 +142,19 @@ def _reader(shape: Shape) -> str:
     arrays = ("run", "rows", "weights", "into")
     counts = ("samples", "points", "pitch", "apart")
     arguments = (*(f"ptr noalias %{a}" for a in arrays), *(f"i64 %{c}" for c in counts))
-    return _defined(f"internal void @read_{shape.suffix}", arguments, w)
+    return defined(f"internal void @read_{shape.suffix}", arguments, w)
 
 
-def _moved(shape: Shape, moving: int) -> str:
+def moved_inputs(shape: Shape, moving: int) -> str:
     """Return the function that writes the tangents of moving inputs at the points of a segment."""
     w = Writer(shape, shape)
     total = w.let(f"alloca {shape.type}, align 64")
     rows = w.let(f"mul i64 {w.let('add i64 %n, 1')}, {moving}")
-    with _loop(w, "row", rows) as row:
+    with loop(w, "row", rows) as row:
         w.put(f"store {shape.type} {shape.number(0.0)}, ptr {total}, align 64")
         begin = w.let(f"mul i64 {row}, %columns")
         own = w.let(f"mul i64 {w.let(f'urem i64 {row}, {moving}')}, %columns")
-        with _loop(w, "column", "%columns") as column:
+        with loop(w, "column", "%columns") as column:
             height = w.load("%shapes", w.let(f"add i64 {begin}, {column}"), ONE)
             place = w.let(f"mul i64 {w.let(f'add i64 {own}, {column}')}, {shape.lanes}")
             rate = w.load(w.address("%rates", place), 0, shape)
@@ -165,16 +165,17 @@ def _moved(shape: Shape, moving: int) -> str:
         w.store(result, w.address("%du", w.let(f"mul i64 {row}, {shape.lanes}")), 0, shape)
     w.put("ret void")
     arrays = (f"ptr noalias %{name}" for name in ("shapes", "rates", "du"))
-    return _defined("internal void @moved", (*arrays, "i64 %n", "i64 %columns"), w)
+    return defined("internal void @moved", (*arrays, "i64 %n", "i64 %columns"), w)
 
 
-def _defined(name: str, arguments: Sequence[str], body: Writer) -> str:
+def defined(name: str, arguments: Sequence[str], body: Writer) -> str:
+    """Return a function with its body."""
     head = f'define {name}({", ".join(arguments)}) "prefer-vector-width"="512" {{'
     return "\n".join([head, "entry:", *body.lines, "}", ""])
 
 
 @contextmanager
-def _loop(w: Writer, name: str, count: str) -> Iterator[str]:
+def loop(w: Writer, name: str, count: str) -> Iterator[str]:
     """Write a loop over what is written within, and give its counter."""
     before = w.block
     w.put(f"br label %{name}")
@@ -191,7 +192,8 @@ def _loop(w: Writer, name: str, count: str) -> Iterator[str]:
     w.label(f"{name}.done")
 
 
-def _row(w: Writer, table: str, number: str, fields: Sequence[str]) -> dict[str, str]:
+def of_row(w: Writer, table: str, number: str, fields: Sequence[str]) -> dict[str, str]:
+    """Read a row of a table, by the names of its fields."""
     first = w.address(table, w.let(f"mul i64 {number}, {len(fields)}"))
     return {
         field: w.let(f"load ptr, ptr {w.address(first, column)}, align 8")
@@ -204,9 +206,11 @@ def _of_number(w: Writer, number: str, array: str, size: int) -> str:
     return w.address(array, w.let(f"mul i64 {number}, {size}"))
 
 
-def _whole(w: Writer, address: str) -> str:
+def whole(w: Writer, address: str) -> str:
+    """Write a field of a table as a whole number."""
     return w.let(f"ptrtoint ptr {address} to i64")
 
 
-def _pointers(*names: str) -> str:
+def pointers(*names: str) -> str:
+    """Write addresses as arguments of a call."""
     return ", ".join(f"ptr {name}" for name in names)

@@ -62,14 +62,14 @@ def simulation(traced: Trace, lanes: int) -> str:
     """Return the IR of ``rest`` and ``run`` for parameter sets side by side."""
     parts = [TracePart(traced, Shape(lanes))]
     around = sampled(lanes, len(traced.outputs), 0, 0)
-    return _module(parts, {"rest": _rest(parts), "run": _run(parts)}, around)
+    return module(parts, {"rest": rest_function(parts), "run": _run(parts)}, around)
 
 
 def simulation_with_tangents(traced: Trace, derived: Tangents, directions: int) -> str:
     """Return the IR of ``rest`` and ``run`` for one parameter set and its derivatives."""
     parts = [TracePart(traced, Shape(1)), TracePart(derived, Shape(directions), "d")]
     around = sampled(1, len(traced.outputs), directions, len(parts[1].inputs))
-    return _module(parts, {"rest": _rest(parts), "run": _run(parts)}, around)
+    return module(parts, {"rest": rest_function(parts), "run": _run(parts)}, around)
 
 
 def linearisation(traced: Trace, derived: Tangents, directions: int) -> str:
@@ -77,10 +77,10 @@ def linearisation(traced: Trace, derived: Tangents, directions: int) -> str:
     parts = [TracePart(traced, Shape(1)), TracePart(derived, Shape(directions), "d")]
     states = len(traced.x)
     around = at_rest(len(traced.p), states, directions) + along(states, len(traced.u), directions)
-    return _module(parts, {"rest": _rest(parts), "motion": _motion(parts)}, around)
+    return module(parts, {"rest": rest_function(parts), "motion": _motion(parts)}, around)
 
 
-def _module(parts: Parts, functions: Mapping[str, Writer], around: str) -> str:
+def module(parts: Parts, functions: Mapping[str, Writer], around: str) -> str:
     """Return the functions of a system, with those ``around`` that call them."""
     shapes = dict.fromkeys(part.shape for part in parts)
     declarations = [
@@ -97,7 +97,7 @@ def _module(parts: Parts, functions: Mapping[str, Writer], around: str) -> str:
     for shape in shapes:
         inlined[f"@exp_{shape.suffix}("] = exponential(shape)
         inlined |= {f"@{name}_{shape.suffix}(": sine(shape, name) for name in ("sin", "cos")}
-    called = [text for name, text in inlined.items() if name in bodies]
+    called = [text for name, text in inlined.items() if name in bodies or name in around]
     return "".join([*declarations, *called, bodies, around, WEIGHTS])
 
 
@@ -113,7 +113,8 @@ def _function(name: str, body: Writer, parts: Parts) -> str:
     return "\n".join([head, "entry:", *body.lines, "  ret void", "}", ""])
 
 
-def _rest(parts: Parts) -> Writer:
+def rest_function(parts: Parts) -> Writer:
+    """Write the function of the start at rest."""
     w = Writer(parts[0].shape, parts[-1].shape)
     values = _merged(part.read(w, "p") for part in parts)
     w.prepare([node for part in parts for node in part.nodes.rest], values)

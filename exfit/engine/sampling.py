@@ -181,18 +181,18 @@ class Sampler:
         changing = dp is not None and courses.readings[0, 2] != 0
         changes = np.empty((count, *shape)) if changing else None
         table = np.zeros((jobs, blocks, len(JOB)), np.int64)
-        table[:, :, 0] = _places(p, jobs)[:, None]
+        table[:, :, 0] = places(p, jobs)[:, None]
         for column, array in ((1, dp), (2, rates)):
             if array is not None:
-                table[:, :, column] = _places(array, jobs * blocks).reshape(-1, blocks)
-        table[:, :, 3] = _places(courses.spans, count, np.int64)[sets[:, 0]][:, None]
+                table[:, :, column] = places(array, jobs * blocks).reshape(-1, blocks)
+        table[:, :, 3] = places(courses.spans, count, np.int64)[sets[:, 0]][:, None]
         lanes = np.zeros((jobs, blocks, sets.shape[1], len(SAMPLES)), np.int64)
         lanes[..., :3] = courses.readings[sets][:, None]
-        lanes[..., 3] = _places(outputs, count)[sets][:, None]
+        lanes[..., 3] = places(outputs, count)[sets][:, None]
         if slopes is not None:
-            lanes[..., 4] = _places(slopes, count * blocks).reshape(-1, blocks)[:, :, None]
+            lanes[..., 4] = places(slopes, count * blocks).reshape(-1, blocks)[:, :, None]
         if changes is not None:
-            lanes[..., 5] = _places(changes, count)[sets][:, None]
+            lanes[..., 5] = places(changes, count)[sets][:, None]
         work, scratch = self._work(courses)
         tables = (address(table, np.int64), address(lanes, np.int64))
         counts = (courses.segments, courses.samples, courses.points, courses.columns)
@@ -205,18 +205,22 @@ class Sampler:
         setpoints, states, outputs, sets, directions, moving = self.sizes
         values = np.array([setpoints, states, courses.rows * outputs]) * sets
         of_inputs = courses.longest * moving * directions
-        lengths = np.array([*values, *(values * directions), of_inputs])
-        ends = np.cumsum(-(-lengths // CACHE_LINE) * CACHE_LINE)
-        size = int(ends[-1]) + CACHE_LINE
-        scratch: Array | None = getattr(_scratch, "buffer", None)
-        if scratch is None or len(scratch) < size:
-            scratch = np.empty(size)
-            if size <= MOST_KEPT:
-                _scratch.buffer = scratch
-        begin = -(-address(scratch) // (8 * CACHE_LINE)) * (8 * CACHE_LINE)
-        return begin + 8 * np.array([0, *ends[:-1]]), scratch
+        return work_space([*values, *(values * directions), of_inputs])
 
 
-def _places(array: NDArray[Any], count: int, kind: type = np.float64) -> Table:
+def work_space(lengths: Sequence[int]) -> tuple[Table, Array]:
+    """Lay out arrays of so many numbers: their addresses, and this thread's buffer with them."""
+    ends = np.cumsum(-(-np.array(lengths) // CACHE_LINE) * CACHE_LINE)
+    size = int(ends[-1]) + CACHE_LINE
+    scratch: Array | None = getattr(_scratch, "buffer", None)
+    if scratch is None or len(scratch) < size:
+        scratch = np.empty(size)
+        if size <= MOST_KEPT:
+            _scratch.buffer = scratch
+    begin = -(-address(scratch) // (8 * CACHE_LINE)) * (8 * CACHE_LINE)
+    return begin + 8 * np.array([0, *ends[:-1]]), scratch
+
+
+def places(array: NDArray[Any], count: int, kind: type = np.float64) -> Table:
     """Take the addresses of ``count`` equal parts of an array."""
     return address(array, kind) + np.arange(count) * (array.nbytes // max(count, 1))

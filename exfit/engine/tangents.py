@@ -119,6 +119,8 @@ def _slope(node: Node, inner: Sequence[Slope | None]) -> Slope | None:
             return _chosen(args[0], inner[1], inner[2])
         case "clip":
             return _clipped(args, inner)
+        case "larger":
+            return _chosen(graph.compare("<", args[1], args[0]), *inner)
         case "exp":
             return _times(inner[0], node)
         case "log":

@@ -365,15 +365,13 @@ class Writer:
             if products:
                 return self._sum_with(products[0], node, shape, values)
         args = [self._operand(operand, shape, values) for operand in node.operands]
+        if node.op == "larger":
+            return self.held(shape, args[0], "olt", args[1])  # what is no number is not larger
         if node.op in BINARY:
             return self.arithmetic(BINARY[node.op], shape, *args)
-        if node.op in INTRINSICS:
-            return self.let(
-                f"call {shape.type} @llvm.{node.op}.{shape.suffix}({shape.type} {args[0]})"
-            )
-        if node.op in TRANSCENDENTAL:
-            return self.let(f"call {shape.type} @{node.op}_{shape.suffix}({shape.type} {args[0]})")
-        raise KeyError(f"{node.op} {node.args}")
+        name = f"llvm.{node.op}." if node.op in INTRINSICS else f"{node.op}_"
+        assert node.op in (*INTRINSICS, *TRANSCENDENTAL), f"{node.op} {node.args}"
+        return self.let(f"call {shape.type} @{name}{shape.suffix}({shape.type} {args[0]})")
 
     def _sum_with(self, product: Node, node: Node, shape: Shape, values: Values) -> str:
         """Write a sum or difference and a product in it as one operation."""

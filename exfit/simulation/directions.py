@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.kernel import DIRECTIONS
+from exfit.engine.located_runs import located_tangent_kernel
 from exfit.engine.sampling import Courses
 from exfit.engine.system import System
 from exfit.engine.tangents import tangent_kernel
@@ -84,6 +85,16 @@ class Moves(NamedTuple):
                 heights[:, row, place] = shape.on(segment, inputs)
         return heights
 
+    def without_instants(self, inputs: Inputs) -> "Moves":
+        """The moves without the shapes of exact steps whose instant moves."""
+        shapes = {
+            name: tuple(
+                shape for shape in own if not shape.instant or inputs.steps[shape.step].ramp
+            )
+            for name, own in self.shapes.items()
+        }
+        return self._replace(shapes={name: own for name, own in shapes.items() if own})
+
     @property
     def _most_shapes(self) -> int:
         return max(map(len, self.shapes.values()))
@@ -128,19 +139,34 @@ def tangents_by_equations(
     tests: "Sequence[Simulator] | None",
 ) -> tuple[Array, Array, Counts]:
     """Simulate as `Simulator.tangents_of_many`."""
-    system = simulator.system
     p, parts = simulator.prepared(sets)
     reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
     if not reached:
         samples = np.full((len(sets), len(simulator.times), len(outputs)), np.nan)
         return samples, np.full((*samples.shape, len(directions[0])), np.nan), parts
     own = [directions[k] for k in reached]
-    moves = moves_of(system, simulator.inputs, own)
     simulators = [simulator] if tests is None else [tests[k] for k in reached]
-    courses = Courses([test.course(moves) for test in simulators], parts[reached])
+    if simulator.located:
+        samples, slopes = _located_tangents(simulators, outputs, p[reached], parts[reached], own)
+    else:
+        samples, slopes = _literal_tangents(simulators, outputs, p[reached], parts[reached], own)
+    return _of_all(samples, reached, len(sets)), _of_all(slopes, reached, len(sets)), parts
+
+
+def _literal_tangents(
+    simulators: "Sequence[Simulator]",
+    outputs: tuple[str, ...],
+    p: Array,
+    parts: Counts,
+    own: Sequence[Sequence[Direction]],
+) -> tuple[Array, Array]:
+    """Outputs (K, M, ny) of sets p (K, np) on the literal grid, and their derivatives."""
+    system = simulators[0].system
+    moves = moves_of(system, simulators[0].inputs, own)
+    courses = Courses([test.course(moves) for test in simulators], parts)
     width = DIRECTIONS if len(moves.columns) <= DIRECTIONS else 2 * DIRECTIONS
     code = tangent_kernel(system, outputs, moves.free, tuple(moves.shapes), width)
-    p, tangents, rates = p[reached], moves.tangents(system, own), moves.rates(own)
+    tangents, rates = moves.tangents(system, own), moves.rates(own)
 
     def block(first: int) -> tuple[Array, Array, Array | None]:
         some = slice(first, first + width)
@@ -160,12 +186,53 @@ def tangents_by_equations(
     for k in moves.delayed if change is not None else ():
         delays = np.array([of_set[k].delay for of_set in own])
         slopes[..., k] -= delays[:, None, None] * change
+    return samples, slopes
 
-    def of_all(results: Array) -> Array:
-        if len(reached) == len(sets):
-            return results
-        every = np.full((len(sets), *results.shape[1:]), np.nan)
-        every[reached] = results
-        return every
 
-    return of_all(samples), of_all(slopes), parts
+def _located_tangents(
+    simulators: "Sequence[Simulator]",
+    outputs: tuple[str, ...],
+    p: Array,
+    parts: Counts,
+    directions: Sequence[Sequence[Direction]],
+) -> tuple[Array, Array]:
+    """Outputs (K, M, ny) of sets p (K, np) with located crossings, and their derivatives."""
+    first = simulators[0]
+    system, count = first.system, len(directions[0])
+    # the instant of a step is where a segment begins; only that of a ramp changes the input
+    moves = moves_of(system, first.inputs, directions).without_instants(first.inputs)
+    courses = [simulator.located_course(moves) for simulator in simulators]
+    instants = [
+        simulator.instants([own[k] for k in moves.columns])
+        for simulator, own in zip(
+            simulators if len(simulators) > 1 else [first] * len(directions),
+            directions,
+            strict=True,
+        )
+    ]
+    width = DIRECTIONS if len(moves.columns) <= DIRECTIONS else 2 * DIRECTIONS
+    code = located_tangent_kernel(system, outputs, moves.free, tuple(moves.shapes), width)
+    tangents, rates = moves.tangents(system, directions), moves.rates(directions)
+    samples, driven, change = code.samples(p, tangents, courses, parts, np.array(instants), rates)
+    slopes = driven
+    if len(moves.columns) < count:
+        slopes = np.zeros((*samples.shape, count))
+        slopes[..., list(moves.columns)] = driven
+    for k in moves.delayed:
+        delays = np.array([own[k].delay for own in directions])
+        moved = np.where([simulator.still for simulator in simulators], 0.0, 1.0)
+        slopes[..., k] -= delays[:, None, None] * moved[:, :, None] * change
+    share = first.share
+    if share != 1.0:
+        samples = samples[:, :1] + (samples - samples[:, :1]) / share
+        slopes = slopes[:, :1] + (slopes - slopes[:, :1]) / share
+    return samples, slopes
+
+
+def _of_all(results: Array, reached: Sequence[int], count: int) -> Array:
+    """Results of all sets, no numbers where one was not reached."""
+    if len(reached) == count:
+        return results
+    every = np.full((count, *results.shape[1:]), np.nan)
+    every[list(reached)] = results
+    return every

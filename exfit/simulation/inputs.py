@@ -158,6 +158,21 @@ class SplinedInput:
         values: Array = self._polynomials.derivative()(times)
         return values
 
+    def slope_beside(self, times: Array, side: float) -> Array:
+        """Slope (n,) just after some instants (``side`` 1) or before them (-1), per s.
+
+        Before the first sample and after the last it is zero.
+        """
+        place = np.searchsorted(self.time, times, side="right" if side > 0.0 else "left")
+        inside = (place > 0) & (place < len(self.time))
+        k = place.clip(1, len(self.time) - 1) - 1
+        derivative = self._polynomials.derivative()
+        away = times - self.time[k]
+        values = np.zeros(len(times))
+        for row in derivative.c:
+            values = values * away + row[k]
+        return np.where(inside, values, 0.0)
+
     @cached_property
     def _polynomials(self) -> Any:
         """The polynomials between the samples, as SciPy evaluates them."""

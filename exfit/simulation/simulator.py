@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Span, kernel, linear_kernel
+from exfit.engine.located_runs import LocatedCourse, located_kernel
 from exfit.engine.sampling import Course, Courses, Segment
 from exfit.engine.system import System
 from exfit.plants import REFERENCES
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
+from exfit.simulation.located_test import LocatedTest, Reading, exact
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
     groups,
@@ -34,6 +36,8 @@ Values = Mapping[str, float]
 POINTS_ALONG = 100  # of a response, where its sub-steps are checked
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 BESIDE_JUMP = 2.0  # steps: as far as the B-splines of a smooth jump reach on both grids
+REACH = 2.0  # of the fastest rate that a sub-step takes, where the step is chosen by its error
+READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
 
@@ -108,16 +112,30 @@ class Simulator:
     ) -> None:
         self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay, self.responder = step, least, delay, responder
-        self.located = located
         self._share = 1.0  # of the inputs
-        self._grid = grid_segments(inputs, step)
+        self._course: tuple[tuple[int, int], LocatedCourse] | None = None
+        self._located = LocatedTest(system.inputs, inputs, step, 1.0) if located else None
+        # of a run with located crossings, the points at which it is read as a whole
+        self._grid = (
+            grid_segments(exact(inputs), step / READ_IN) if located else grid_segments(inputs, step)
+        )
         # a long record is read on the grid once, whatever else a fit moves
         self._recorded_samples = [
             {name: recorded.on(segment) for name, recorded in inputs.recorded.items()}
-            for segment in self._grid
+            for segment in (() if located else self._grid)
         ]
         self._segments = self._segments_of()
-        self._sampling: Interpolation | GridPoints = Interpolation(self._grid, times, delay)
+        self._sampling: Interpolation | GridPoints | Reading = self._sampling_of(times)
+
+    @property
+    def located(self) -> bool:
+        """Whether crossings of limits are located within the steps."""
+        return self._located is not None
+
+    def _sampling_of(self, times: Array) -> Interpolation | Reading:
+        if self._located is not None:
+            return self._located.reading(times, self.delay)
+        return Interpolation(self._grid, times, self.delay)
 
     def with_responder(self, responder: Responder | None) -> "Simulator":
         """Make the simulator of the same test whose response another gives, or the equations."""
@@ -137,10 +155,16 @@ class Simulator:
         changed = {new.signal for new, old in pairs if new != old}
         result = copy(self)
         result.inputs, result.delay = replace(self.inputs, steps=steps), delay
+        if result._located is not None:
+            if changed:
+                result._located = result._located.with_steps(result.inputs.steps)
+            if changed or delay != self.delay:
+                result._sampling = result._sampling_of(self.times)
+            return result
         if changed:
             result._segments = result._segments_of(changed)
         if delay != self.delay:
-            result._sampling = Interpolation(self._grid, self.times, delay)
+            result._sampling = result._sampling_of(self.times)
         return result
 
     def remade(
@@ -167,7 +191,7 @@ class Simulator:
     def at_times(self, times: Array) -> "Simulator":
         """Return the simulator of the same run that is sampled at other times (M,) in s."""
         result = copy(self)
-        result.times, result._sampling = times, Interpolation(self._grid, times, self.delay)
+        result.times, result._sampling = times, result._sampling_of(times)
         return result
 
     def on_grid(self, points: int | None = None) -> "Simulator":
@@ -180,6 +204,9 @@ class Simulator:
         rows = np.arange(count) if points is None else np.linspace(0, count - 1, points).astype(int)
         result = self.with_responder(None)
         result.times, result._sampling = times[rows], GridPoints(rows)
+        if self._located is not None:
+            result.delay = 0.0
+            result._sampling = result._sampling_of(result.times)
         return result
 
     def small_signal(self) -> "Simulator":
@@ -190,6 +217,8 @@ class Simulator:
         """
         result = self.with_responder(None)
         result.least, result._share = 1, SMALL_SHARE
+        if self._located is not None:
+            result._located = LocatedTest(self.system.inputs, self.inputs, self.step, SMALL_SHARE)
         result._segments = result._segments_of()
         return result
 
@@ -208,7 +237,7 @@ class Simulator:
         """
         p, parts = self.prepared([values])
         if parts[0] == NO_SUBSTEPS:
-            raise why_unreachable(self.system, self.step, values, p[0])
+            raise why_unreachable(self.system, self._reach, values, p[0])
         if self.responder is not None:
             self.responder.confirm(self, values)
         return int(parts[0])
@@ -220,8 +249,13 @@ class Simulator:
         """
         names = self.system.parameters
         p = np.array([[values[name] for name in names] for values in sets], dtype=np.float64)
-        parts = substeps_at_rest(self.system, self.step, p)
+        parts = substeps_at_rest(self.system, self._reach, p)
         return p, np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
+
+    @property
+    def _reach(self) -> float:
+        """Step (s) of the rule for sub-steps: of its unit that of the literal grid is."""
+        return self.step / REACH if self.located else self.step
 
     def rates_at_rest(self, values: Values) -> ComplexArray:
         """Return the eigenvalues (1/s) of the system at rest, zero for a state that stays put.
@@ -238,12 +272,12 @@ class Simulator:
         system, some = self.system, self.on_grid(points)
         signals, parts = some.samples(values, system.outputs)
         states = signals[:, [system.outputs.index(name) for name in system.states]]
-        inputs = some._sampling([segment.u for segment in self._segments])
+        inputs = np.ascontiguousarray(some._inputs())
         code, (p, _) = linear_kernel(system), self.prepared([values])
         r = code.rest(p[0]).r
         _, jacobians = code.motion(p[0], r, np.ascontiguousarray(states), inputs)
         radius = float(spectral_radii(jacobians).max())
-        return parts, substeps_for(system, self.step, values, radius)
+        return parts, substeps_for(system, self._reach, values, radius)
 
     def with_enough_substeps(self, values: Values) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
@@ -290,11 +324,20 @@ class Simulator:
 
     def input(self, signal: str) -> Array:
         """Return an input (M,) at the sample times, which the recorder delays."""
-        inputs = self._sampling([segment.u for segment in self._segments])
-        return inputs[:, self.system.inputs.index(signal)]
+        return self._inputs()[:, self.system.inputs.index(signal)]
+
+    def _inputs(self) -> Array:
+        """All inputs (M, nu) at the sample times, which the recorder delays."""
+        if self._located is not None:
+            assert isinstance(self._sampling, Reading)
+            return self._located.inputs_at(self._sampling)
+        assert not isinstance(self._sampling, Reading)
+        return self._sampling([segment.u for segment in self._segments])
 
     def run(self, values: Values) -> Run:
         """Return all outputs and inputs of the system on the grid, without the recorder's delay."""
+        if self._located is not None:
+            return self._located_run(values)
         system, parts = self.system, self.substeps(values)
         code, p = kernel(system, system.outputs, 1), self.prepared([values])[0].T.copy()
         spans = [Span(segment.u, segment.step, parts) for segment in self._segments]
@@ -304,6 +347,15 @@ class Simulator:
             np.concatenate([segment.times for segment in self._grid]),
             dict(zip(system.outputs, outputs.T, strict=True)),
             dict(zip(system.inputs, inputs.T, strict=True)),
+        )
+
+    def _located_run(self, values: Values) -> Run:
+        whole, system = self.on_grid(), self.system
+        samples, _ = whole.samples(values, system.outputs)
+        return Run(
+            whole.times,
+            dict(zip(system.outputs, samples.T, strict=True)),
+            dict(zip(system.inputs, whole._inputs().T, strict=True)),
         )
 
     def samples_of_many(
@@ -320,6 +372,8 @@ class Simulator:
         """
         if self.responder is not None:
             return self.responder.samples_of_many(self, sets, outputs, tests)
+        if self._located is not None:
+            return self._located_samples(sets, outputs, tests)
         p, parts = self.prepared(sets)
         courses = [test.course() for test in tests or [self]]
         alike = tests is None or all(test._segments is tests[0]._segments for test in tests)
@@ -329,6 +383,54 @@ class Simulator:
             code = kernel(self.system, outputs, lanes)
             samples[group] = code.samples(p[group], Courses(own, parts[group]))
         return samples, parts
+
+    def _located_samples(
+        self,
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        tests: "Sequence[Simulator] | None",
+    ) -> tuple[Array, Counts]:
+        p, parts = self.prepared(sets)
+        alike = tests is None or all(
+            test._located is tests[0]._located and test._sampling is tests[0]._sampling
+            for test in tests
+        )
+        courses = [test.located_course() for test in (tests or [self])[: 1 if alike else None]]
+        samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
+        for lanes, group in groups(parts, SIDE_BY_SIDE if alike else 1):
+            own = courses if alike else [courses[k] for k in group]
+            code = located_kernel(self.system, outputs, lanes)
+            samples[group] = code.samples(p[group], own, parts[group])
+        if self._share != 1.0:
+            samples = samples[:, :1] + (samples - samples[:, :1]) / self._share
+        return samples, parts
+
+    def located_course(self, moves: "Moves | None" = None) -> LocatedCourse:
+        """Segments for machine code with located crossings, with the inputs that move."""
+        assert self._located is not None
+        assert isinstance(self._sampling, Reading)
+        if moves is not None and moves.shapes:
+            return self._located.course(self._sampling, tuple(moves.shapes.values()))
+        key = (id(self._located), id(self._sampling))
+        if self._course is None or self._course[0] != key:
+            self._course = key, self._located.course(self._sampling)
+        return self._course[1]
+
+    def instants(self, directions: Sequence[Direction]) -> Array:
+        """Moves of the instants at which segments begin, with located crossings."""
+        assert self._located is not None
+        return self._located.instants(directions)
+
+    @property
+    def still(self) -> NDArray[np.bool_]:
+        """Samples before the start and after the end, with located crossings."""
+        assert isinstance(self._sampling, Reading)
+        return self._sampling.still
+
+    @property
+    def share(self) -> float:
+        """Share of the inputs that is simulated."""
+        return self._share
 
     def tangents(
         self, values: Values, outputs: tuple[str, ...], directions: Sequence[Direction]
@@ -372,6 +474,7 @@ class Simulator:
                 segment._replace(shapes=self._share * moves.shapes_on(part, self.inputs))
                 for segment, part in zip(segments, self._grid, strict=True)
             ]
+        assert not isinstance(self._sampling, Reading)
         reading = self._sampling.reading(changing=moves is not None and bool(moves.delayed))
         return Course(segments, reading.enlarged(1.0 / self._share))
 
@@ -380,7 +483,9 @@ class Simulator:
 
         Only those ``changed`` are computed anew, where these are given.
         """
-        segments = []
+        segments: list[Segment] = []
+        if self._located is not None:
+            return segments
         for k, (part, recorded) in enumerate(zip(self._grid, self._recorded_samples, strict=True)):
             u = np.empty((part.steps + 1, len(self.system.inputs)))
             for column, name in enumerate(self.system.inputs):

@@ -1,6 +1,6 @@
 """Static exciters with a PID and a field voltage loop: ST6B and ST6C."""
 
-from exfit.models.blocks import Signal, clip, lag, larger, limited_lag, pi_rest, pid, smaller, where
+from exfit.models.blocks import Signal, clip, lag, larger, limited_lag, pi_rest, pid, smaller
 from exfit.models.exciter_parts import STATIC_SUPPLY, supply
 from exfit.models.sheet import (
     FREE,
@@ -117,9 +117,8 @@ def st6c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     current = larger(p.KLR * (p.KCI * p.ILR - u.ifd), p.VRMIN)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = clip(u.vref + u.vsum - vc, u.vuel, u.voel) + u.vs
-    va, slope, d.VD = pid(error, s.VI, s.VD, p.KPA, p.KIA, p.KDA, p.TDA, p.VAMIN, p.VAMAX)
-    d.VI = where((va >= current) & (slope > 0.0), 0.0, slope)
-    va = smaller(va, current)
+    ceiling = smaller(p.VAMAX, current)
+    va, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPA, p.KIA, p.KDA, p.TDA, p.VAMIN, ceiling)
     vr = clip(p.KFF * va + p.KM * (va - s.VG), p.VRMIN, p.VRMAX)
     least = smaller(clip(vr, u.vuel_out, u.voel_out), current)
     vm, d.VM = limited_lag(least, s.VM, 1.0, p.TA, p.VMMIN, p.VMMAX)
