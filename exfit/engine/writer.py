@@ -19,6 +19,8 @@ LOGIC = {"&": "and", "|": "or"}
 COMPARISON = {"<": "olt", "<=": "ole"}
 INTRINSICS = ("sqrt", "log")
 TRANSCENDENTAL = ("exp", "sin", "cos")
+FUNCTIONS = {name: f"llvm.{name}." for name in INTRINSICS}
+FUNCTIONS |= {name: f"{name}_" for name in TRANSCENDENTAL}
 SUMS = ("+", "-")
 COSTLY = ("/", *INTRINSICS, *TRANSCENDENTAL)
 UNLIKELY, WEIGHTS = ", !prof !0", '!0 = !{!"branch_weights", i32 1, i32 100}\n'
@@ -369,9 +371,8 @@ class Writer:
             return self.held(shape, args[0], "olt", args[1])  # what is no number is not larger
         if node.op in BINARY:
             return self.arithmetic(BINARY[node.op], shape, *args)
-        name = f"llvm.{node.op}." if node.op in INTRINSICS else f"{node.op}_"
-        assert node.op in (*INTRINSICS, *TRANSCENDENTAL), f"{node.op} {node.args}"
-        return self.let(f"call {shape.type} @{name}{shape.suffix}({shape.type} {args[0]})")
+        name = FUNCTIONS[node.op] + shape.suffix
+        return self.let(f"call {shape.type} @{name}({shape.type} {args[0]})")
 
     def _sum_with(self, product: Node, node: Node, shape: Shape, values: Values) -> str:
         """Write a sum or difference and a product in it as one operation."""
