@@ -77,4 +77,4 @@ def inspect_(
         suggested = CaseDraft(suggested_sections(inspection, file.as_posix()))
         yield from inspections.inspection(inspection, suggested.lines())
 
-    output.show(inspection.as_json(), blocks(), folder, figures)
+    output.show(inspection.as_json() if output.as_json else {}, blocks(), folder, figures)

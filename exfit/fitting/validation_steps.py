@@ -178,7 +178,7 @@ def _lasting(
     if not steps:
         raise RecordError(f"{record.source}: no step found in its channels; {GIVE_STEP}")
     noises = {name: noise_of(y[np.isfinite(y)]) for name, y in record.signals.items()}
-    sized = with_sizes(steps, record.signals, noises, record.time)
+    sized = with_sizes(steps, record.signals.items(), noises, record.time)
     if given.instants or given.sizes:
         return sized
     lasting = tuple(step for step in sized if "vt" in step.sizes)
@@ -210,7 +210,7 @@ def _through_gain(
 ) -> tuple[float, ...]:
     """Divide sizes of steps by the gain of the simulated vt (M,), where that moves the same way."""
     through = []
-    changes = with_sizes(steps, {"vt": simulated}, {}, record.time)
+    changes = with_sizes(steps, [("vt", simulated)], {}, record.time)
     for size, change in zip(sizes, changes, strict=True):
         gain = change.sizes.get("vt", 0.0) / size
         through.append(size / gain if gain > 0.0 and isfinite(size / gain) else size)

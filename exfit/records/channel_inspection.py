@@ -4,7 +4,8 @@ Of the signal some is sure, some a guess with its reasons, and some must be aske
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,14 @@ class InspectedChannel:
     question: str = ""
     system_base: bool = False
     rejected_load: bool = False
+
+    def as_json(self) -> dict[str, Any]:
+        """Give the figures as plain data."""
+        return {
+            **vars(self),  # `asdict` copies each number: a third of a second for 1,000 channels
+            "steps": [asdict(step) for step in self.steps],
+            "ripple": None if self.ripple is None else asdict(self.ripple),
+        }
 
     @property
     def constant(self) -> bool:

@@ -25,7 +25,6 @@ from exfit.records.contradictions import base_findings, contradictions
 from exfit.records.formats import PLAY_IN
 from exfit.records.formats.table import (
     RecordTable,
-    StoppedError,
     column_error,
     listed,
     refuse_uneven,
@@ -34,6 +33,7 @@ from exfit.records.phasors import Status, angle_findings, bad_rows, in_radians
 from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
+from exfit.records.samples import Samples
 from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
 from exfit.records.units import unit_in, usual
 from exfit.signals import OF_EVENT
@@ -161,7 +161,7 @@ class Inspection:
             "clock_unit": self.clock.unit,
             "samples": len(self.time),
             "sampling": {**asdict(sampling), "rate": sampling.rate, "even": sampling.even},
-            "channels": [asdict(channel) for channel in self.channels],
+            "channels": [channel.as_json() for channel in self.channels],
             "phases": [asdict(group) for group in self.phases],
             "steps": [asdict(step) for step in self.steps],
             "breaker_opens": None if self.opening is None else asdict(self.opening),
@@ -186,19 +186,18 @@ def inspect(
             or no column of numbers beside it.
     """
     place, stamps = _clock_of(table, clock, unit)
-    sampling, forward = sampling_of(stamps), increasing(stamps)
-    columns, unreadable = _columns_of_numbers(table, place, stamps)
-    rows = slice(None) if forward.all() else forward
-    time, samples = stamps[rows], {name: column[rows] for name, column in columns.items()}
+    sampling, time = sampling_of(stamps), stamps[increasing(stamps)]
+    samples, unreadable = _columns_of_numbers(table, place, stamps)
 
     units = {name: _unit(table, name) for name in samples}
     stated = {name: unit for name, (unit, _) in units.items() if unit}
     pmu = pmu_content(samples, stated, table.names)
     of_pmu = frozenset() if pmu is None else pmu.columns.intersection(samples)
-    plain = {name: column for name, column in samples.items() if name not in of_pmu}
-    groups = tuple(_phase_groups(time, plain, stated))
+    plain = [name for name in samples if name not in of_pmu]
+    groups = tuple(_phase_groups(time, samples, plain, stated))
 
-    signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
+    voltages = ((group.name, effective_value(samples, group.columns)) for group in groups)
+    signals = samples.beside(Samples(voltages))
     found = steps_of_record(time, signals, *_recognised(plain, groups, stated))
     inspected = [
         inspect_channel(name, units[name], time, column, found.channels[name], found.steps)
@@ -245,41 +244,46 @@ def _clock_of(
 
 def _columns_of_numbers(
     table: RecordTable, clock: Clock, stamps: Array
-) -> tuple[dict[str, Array], dict[str, str]]:
-    """Read the columns of numbers as long as the time, and the faults of the others.
+) -> tuple[Samples, dict[str, str]]:
+    """Read the columns of numbers where time increases, and the faults of the others.
 
     Raises RecordError where there is none.
     """
-
-    def numbers(names: Sequence[str]) -> dict[str, Array]:
-        columns = table.numbers(names, frozenset(names))
-        refuse_uneven(table.path, {clock.columns[0]: stamps, **columns})
-        for name, column in columns.items():
-            huge = np.isfinite(column) & (np.abs(column) > LARGEST)
-            if huge.any():
-                row = int(huge.argmax())
-                what = f"{column[row]} {why_unusable(column[row])}"
-                raise column_error(table.place(row), name, what)
-        return columns
-
-    names = [name for name in table.names if name not in clock.columns]
+    forward = increasing(stamps)
+    rows = slice(None) if forward.all() else forward
     refused: dict[str, str] = {}
-    try:
-        columns = numbers(names)
-    except StoppedError:
-        raise
-    except RecordError:
-        columns = {}
-        for name in names:
-            try:
-                columns |= numbers([name])
-            except StoppedError:
-                raise
-            except RecordError as fault:
+
+    def usable() -> Iterator[tuple[str, Array]]:
+        names = [name for name in table.names if name not in clock.columns]
+        for name, column in table.each(names):
+            fault = _fault_of(table, {clock.columns[0]: stamps}, name, column)
+            if isinstance(column, RecordError) or fault is not None:
                 refused[name] = str(fault)
-    if not columns:
+            else:
+                yield name, column[rows]
+
+    samples = Samples(usable())
+    if not samples:
         raise RecordError(f"{table.path}: no column of numbers beside the time")
-    return columns, refused
+    return samples, refused
+
+
+def _fault_of(
+    table: RecordTable, time: Mapping[str, Array], name: str, column: Array | RecordError
+) -> RecordError | None:
+    """Find what keeps a column (M,) from being used beside the time (M,)."""
+    if isinstance(column, RecordError):
+        return column
+    try:
+        refuse_uneven(table.path, {**time, name: column})
+    except RecordError as fault:
+        return fault
+    huge = np.isfinite(column) & (np.abs(column) > LARGEST)
+    if huge.any():
+        row = int(huge.argmax())
+        what = f"{column[row]} {why_unusable(column[row])}"
+        return column_error(table.place(row), name, what)
+    return None
 
 
 def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
@@ -289,20 +293,20 @@ def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
 
 
 def _recognised(
-    samples: Mapping[str, Array], groups: Sequence[InspectedPhases], units: Mapping[str, str]
+    names: Sequence[str], groups: Sequence[InspectedPhases], units: Mapping[str, str]
 ) -> tuple[list[str], set[str]]:
     """Find the channels of the reference, and all signals of a test, by their names."""
     phases = {name for group in groups for name in group.columns}
-    guesses = guess_signals([name for name in samples if name not in phases], units)
+    guesses = guess_signals([name for name in names if name not in phases], units)
     references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
     of_test = {name for name, guess in guesses.items() if guess.signal not in OF_EVENT}
     return references, {*of_test, *(group.name for group in groups)}
 
 
 def _phase_groups(
-    time: Array, samples: Mapping[str, Array], units: Mapping[str, str]
+    time: Array, samples: Mapping[str, Array], names: Sequence[str], units: Mapping[str, str]
 ) -> Iterator[InspectedPhases]:
-    for group in three_phases(tuple(samples), units):
+    for group in three_phases(tuple(names), units):
         waves = {mains_frequency(time, samples[name]) is not None for name in group}
         effective = effective_value(samples, group)
         measured = effective[np.isfinite(effective)]  # where a sample of no phase is missing

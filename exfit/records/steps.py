@@ -1,6 +1,6 @@
 """The steps of a record: what its channels show together, when, by how much, within what error."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,7 +101,7 @@ def steps_of_record(
         heard = own
     combined = combined_steps({name: channel.changes for name, channel in heard.items()})
     responding = {name: signals[name] for name, channel in heard.items() if channel.responds}
-    moving = {name: y for name, y in signals.items() if own[name].frequency is None}
+    moving = ((name, y) for name, y in signals.items() if own[name].frequency is None)
     noises = {name: channel.noise for name, channel in own.items()}
     steps = with_sizes([*_sharpened(time, responding, combined)], moving, noises, time)
     for name, channel in own.items():
@@ -289,7 +289,7 @@ def _sharpened(
 
 def with_sizes(
     steps: Sequence[RecordedStep],
-    signals: Mapping[str, Array],
+    signals: Iterable[tuple[str, Array]],
     noises: Mapping[str, float],
     time: Array,
 ) -> tuple[RecordedStep, ...]:
@@ -298,19 +298,17 @@ def with_sizes(
     It is the difference of the levels at the ends of the intervals before and after the step.
     """
     edges = [float(time[0]), *(step.at for step in steps), float(time[-1])]
-    sized = []
-    for k, step in enumerate(steps):
-        sizes = {}
-        for name, samples in signals.items():
+    sizes: list[dict[str, float]] = [{} for _ in steps]
+    for name, samples in signals if steps else ():
+        for k, step in enumerate(steps):
             if k == 0 and step.from_start:
                 before = float(samples[0])
             else:
                 before = _end_level(time, samples, edges[k], step.at, 1.0 if k == 0 else END_SHARE)
             change = _end_level(time, samples, edges[k + 1], edges[k + 2], END_SHARE) - before
             if abs(change) > LASTING_CHANGE * noises.get(name, 0.0):
-                sizes[name] = change
-        sized.append(replace(step, sizes=sizes))
-    return tuple(sized)
+                sizes[k][name] = change
+    return tuple(replace(step, sizes=own) for step, own in zip(steps, sizes, strict=True))
 
 
 def _end_level(time: Array, samples: Array, start: float, end: float, share: float) -> float:

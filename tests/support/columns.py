@@ -26,6 +26,13 @@ class Columns:
                 raise RecordError(f"record.csv:2: column {name!r}: not a number")
         return {name: self.content[name] for name in names}
 
+    def each(self, names):
+        for name in names:
+            try:
+                yield name, self.numbers([name])[name]
+            except RecordError as fault:
+                yield name, fault
+
     def instants(self, columns, unit=None):
         return self.content[columns[0]]
 

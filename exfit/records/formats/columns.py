@@ -1,6 +1,6 @@
 """A table whose columns are fetched one by one, as all readers of binary files give it."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -14,9 +14,11 @@ from exfit.records.clock import are_soc, find_clock, in_seconds, soc_in_seconds
 from exfit.records.formats.table import (
     NONE,
     MemoryLimit,
+    StoppedError,
     column_error,
     increases,
     positions,
+    positions_of_each,
     refuse_uneven,
 )
 from exfit.util.arrays import Array
@@ -60,10 +62,27 @@ class Columns:
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,), nan for samples that a ``gappy`` one lacks; see RecordTable."""
         columns = self._fetched([*names], gappy)
-        for name, column in columns.items():
-            if column.dtype.kind != "f":
-                raise column_error(self.path, name, "timestamps, not numbers")
-        return {name: np.asarray(column, np.float64) for name, column in columns.items()}
+        return {name: self._as_numbers(name, column) for name, column in columns.items()}
+
+    def each(self, names: Sequence[str]) -> Iterator[tuple[str, Array | RecordError]]:
+        """Yield columns (M,) or their faults, fetched one by one; see RecordTable."""
+        places, refused = positions_of_each(self.path, self.names, names)
+        if self.limit is not None:
+            self.limit.check_columns([self.lengths[at] for at in places.values()], self.held)
+        for name in names:
+            found: Array | RecordError
+            try:
+                found = refused.get(name) or self._as_numbers(name, self.fetch(places[name]))
+            except StoppedError:
+                raise
+            except RecordError as fault:
+                found = fault
+            yield name, found
+
+    def _as_numbers(self, name: str, column: NDArray[Any]) -> Array:
+        if column.dtype.kind != "f":
+            raise column_error(self.path, name, "timestamps, not numbers")
+        return np.asarray(column, np.float64)
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
         """Return the time (M,) in s, of numbers in ``unit`` or of timestamps; see RecordTable."""

@@ -4,6 +4,7 @@ A file of a few kilobytes can declare, or unpack to, more than any computer hold
 will need is estimated before it is read.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,6 +61,13 @@ class RecordTable(Protocol):
         """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
 
         Raises RecordError for a column that is not there, and a cell that is no number.
+        """
+
+    def each(self, names: Sequence[str]) -> Iterator[tuple[str, Array | RecordError]]:
+        """Yield names with their columns (M,), nan where a sample is missing, or their faults.
+
+        No more columns than the kind of file asks for are read at a time. Raises StoppedError where
+        all of them need too much memory.
         """
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
@@ -138,6 +146,20 @@ def positions(path: Path, names: Sequence[str], wanted: Iterable[str]) -> dict[s
             numbers = " and ".join(str(at) for at, other in enumerate(names, 1) if other == name)
             raise RecordError(f"{path}: {name!r} names more than one column: {numbers}")
     return {name: places[name] for name in wanted}
+
+
+def positions_of_each(
+    path: Path, names: Sequence[str], wanted: Sequence[str]
+) -> tuple[dict[str, int], dict[str, RecordError]]:
+    """Return the positions of columns, and the faults of those of which there are several."""
+    places, refused = {name: at for at, name in enumerate(names)}, dict[str, RecordError]()
+    for name, count in Counter(names).items() if len(places) < len(names) else ():
+        if count > 1:
+            try:
+                positions(path, names, [name])
+            except RecordError as fault:
+                refused[name] = fault
+    return {name: places[name] for name in wanted if name not in refused}, refused
 
 
 def _columns_like(name: str, names: Sequence[str]) -> str:

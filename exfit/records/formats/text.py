@@ -32,6 +32,7 @@ from exfit.records.formats.table import (
     increases,
     memory_limit,
     positions,
+    positions_of_each,
     read_bytes,
 )
 from exfit.util.arrays import Array
@@ -105,18 +106,33 @@ class TextTable:
         """Return columns (M,), nan for samples that a ``gappy`` one lacks; see RecordTable."""
         names = [*names]
         self.limit.check_columns([self._count] * len(names), len(self.text.data))
-        places = positions(self.path, self.names, names)
+        return self._numbers(positions(self.path, self.names, names), gappy)
 
-        def fault(name: str, cell: str) -> str:
-            known = is_number(cell, self.dialect.comma) or (name in gappy and is_missing(cell))
-            return "" if known else why_not(cell, self.dialect.comma)
+    def each(self, names: Sequence[str]) -> Iterator[tuple[str, Array | RecordError]]:
+        """Yield columns (M,) with their faults, read all at once; see RecordTable."""
+        self.limit.check_columns([self._count] * len(names), len(self.text.data))
+        places, refused = positions_of_each(self.path, self.names, names)
+        gappy = frozenset(places)
+        try:
+            columns = self._numbers(places, gappy)
+        except RecordError:
+            try:
+                for name, error in self._faults(places, partial(self._fault, gappy)):
+                    refused.setdefault(name, error)
+            except RecordError as ragged:
+                refused |= dict.fromkeys(places, ragged)
+            sound = {name: at for name, at in places.items() if name not in refused}
+            columns = self._numbers(sound, gappy) if sound else {}
+        for name in names:
+            yield name, refused[name] if name in refused else columns[name]
 
+    def _numbers(self, places: Mapping[str, int], gappy: frozenset[str]) -> dict[str, Array]:
         if not self._even:
-            self._refuse_first(places, fault)
+            self._refuse_first(places, partial(self._fault, gappy))
         try:
             data = self._loaded(self._numeric_lines(), places.values(), float)
         except ValueError:
-            self._refuse_first(places, fault)
+            self._refuse_first(places, partial(self._fault, gappy))
             one_by_one: dict[int | str, Callable[[str], float]] = {
                 places[name]: _number_or_nan for name in gappy if name in places
             }
@@ -125,6 +141,10 @@ class TextTable:
             except ValueError as error:
                 raise RecordError(f"{self.path}: {error}") from None
         return {name: data[:, at] for at, name in enumerate(places)}
+
+    def _fault(self, gappy: frozenset[str], name: str, cell: str) -> str:
+        known = is_number(cell, self.dialect.comma) or (name in gappy and is_missing(cell))
+        return "" if known else why_not(cell, self.dialect.comma)
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
         """Return the time (M,) in s, of numbers in ``unit`` or of timestamps; see RecordTable."""
@@ -241,6 +261,13 @@ class TextTable:
 
     def _refuse_first(self, places: Mapping[str, int], fault: Callable[[str, str], str]) -> None:
         """Raise a RecordError for the first row that is ragged or has a cell with a ``fault``."""
+        for _, error in self._faults(places, fault):
+            raise error
+
+    def _faults(
+        self, places: Mapping[str, int], fault: Callable[[str, str], str]
+    ) -> Iterator[tuple[str, RecordError]]:
+        """Yield the first ``fault`` of each column; raises RecordError for a row that is ragged."""
         named = len(self.names)
         for line, row in self.rows():
             if len(row) != self.dialect.cells or any(cell.strip() for cell in row[named:]):
@@ -251,7 +278,8 @@ class TextTable:
             for name, place in places.items():
                 what = fault(name, row[place].strip())
                 if what:
-                    raise column_error(f"{self.path}:{line}", name, what)
+                    yield name, column_error(f"{self.path}:{line}", name, what)
+                    places = {other: at for other, at in places.items() if other != name}
 
     def _stamps(self, places: Mapping[str, int]) -> Array:
         """Return timestamps of one column, or of two, in s since the first."""

@@ -661,6 +661,26 @@ def test_a_damaged_file_is_refused_with_line_and_column(file, fault):
     refused(lambda: read_whole(path, clock.split("+"), ["vt"]), "record.csv", *named)
 
 
+def test_columns_are_read_beside_those_that_hold_no_numbers(file):
+    table = open_table(
+        file(form("t,a,b,a,c,d", "0,1,2,2,3,4", "1,1,,2,3,4", "2,1,bad,4,x,", "3,7,8,9,y,10"))
+    )
+    found = dict(table.each(table.names))
+    alone = {}
+    for name in {*table.names}:
+        try:
+            alone[name] = table.numbers([name], frozenset([name]))[name]
+        except RecordError as fault:
+            alone[name] = str(fault)
+    assert {*alone} == {*found}
+    for name, column in found.items():
+        if isinstance(column, RecordError):
+            assert str(column) == alone[name]
+        else:
+            np.testing.assert_array_equal(column, alone[name])
+    assert {name for name in found if isinstance(found[name], RecordError)} == {"a", "b", "c"}
+
+
 def test_a_unit_is_refused_where_the_file_says_another_one_or_has_timestamps(file):
     path = file(form("t/ms,vt", "0,1", "5,2"))
     with pytest.raises(RecordError, match="in ms as the file says, not in s"):
