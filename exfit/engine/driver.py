@@ -7,7 +7,17 @@ tables of addresses and counts, whose rows `sampling` describes.
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from exfit.engine.sampling import ALONG, AT_REST, JOB, SAMPLES, SPAN, WORK
+from exfit.engine.sampling import (
+    ALONG,
+    AT_REST,
+    JOB,
+    LOCATED_JOB,
+    LOCATED_SPAN,
+    LOCATED_WORK,
+    SAMPLES,
+    SPAN,
+    WORK,
+)
 from exfit.engine.writer import Shape, Writer
 
 ARGUMENTS = (
@@ -73,6 +83,45 @@ def sampled(sets: int, outputs: int, directions: int, moving: int) -> str:
     if moving:
         heads.append(moved_inputs(Shape(directions), moving))
     return "".join([*heads, defined("void @sampled", ARGUMENTS, w)])
+
+
+def located_runs(states: int, outputs: int, sets: int, directions: int, moving: int) -> str:
+    """Return the IR of ``located_runs``: rest and all segments of many jobs."""
+    w = Writer(ONE, ONE)
+    with loop(w, "job", "%count") as k:
+        job, work = of_row(w, "%jobs", k, LOCATED_JOB), of_row(w, "%work", "0", LOCATED_WORK)
+        for array, size in (("f", states * sets), ("df", states * directions)):
+            if size:
+                with loop(w, f"zero.{array}", str(size)) as row:
+                    place = w.address(work[array], row)
+                    w.put(f"store double {ONE.number(0.0)}, ptr {place}, align 8")
+        rest = [job["p"], work["r"], work["x"], "null"]
+        if directions:
+            rest += [job["dp"], work["dr"], work["dx"], "null"]
+        w.put(f"call void @rest({pointers(*rest)})")
+        with loop(w, "segment", "%segments") as number:
+            span = of_row(w, job["spans"], number, LOCATED_SPAN)
+            row = w.let(f"mul i64 {whole(w, span['first'])}, {outputs * sets}")
+            n = whole(w, span["n"])
+            arrays = [job["p"], work["r"], work["x"], work["f"], w.address(job["out"], row)]
+            if directions:
+                if moving:
+                    given = pointers(span["shapes"], job["rates"], work["du"])
+                    w.put(f"call void @moved({given}, i64 {n}, i64 %columns)")
+                wide = w.let(f"mul i64 {row}, {directions}")
+                instant = w.let(f"mul i64 {number}, {directions}")
+                arrays += [job["dp"], work["dr"], work["dx"], work["df"]]
+                arrays += [w.address(job["dtau"], instant), w.address(job["dout"], wide)]
+                arrays += [w.address(job["change"], row), work["du"]]
+            arrays += [span["u"], span["h"], span["pos"]]
+            counts = ", ".join(
+                f"i64 {whole(w, span[name])}" for name in ("parts", "samples", "still")
+            )
+            w.put(f"call void @located({pointers(*arrays)}, i64 {n}, {counts})")
+    w.put("ret void")
+    arguments = ("i64 %count", "ptr %jobs", "i64 %segments", "i64 %columns", "ptr %work")
+    heads = moved_inputs(Shape(directions), moving) if moving else ""
+    return heads + defined("void @located_runs", arguments, w)
 
 
 def at_rest(parameters: int, states: int, directions: int) -> str:

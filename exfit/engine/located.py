@@ -20,7 +20,7 @@ NEVER = 1e30  # the margin of a condition that does not vary
 NEAR = 1e-9  # pu: a signal so near to its limit is on it
 
 
-class Stop(NamedTuple):
+class Hold(NamedTuple):
     """What holds a state x: its slope ``free`` is zero while ``y`` is beyond ``low`` or ``high``.
 
     ``y`` is the state itself where a limit puts it back, else the output that it is part of.
@@ -33,7 +33,7 @@ class Stop(NamedTuple):
     high: Node | None
 
 
-class Side(NamedTuple):
+class LimitSide(NamedTuple):
     """One limit of a state: its modes, of which at most one is set, and how they are decided.
 
     ``sign`` is 1 for an upper limit. ``follows`` is the mode in which the state moves with its
@@ -42,7 +42,7 @@ class Side(NamedTuple):
 
     sign: float
     state: int
-    stop: Stop
+    stop: Hold
     limit: Node
     follows: Node
     waits: Node | None
@@ -167,7 +167,7 @@ def located(traced: Trace, inputs: Sequence[str], names: Sequence[str]) -> Locat
     )
 
 
-def _sides(stops: Sequence[Stop | None], names: Sequence[str]) -> list[Side]:
+def _sides(stops: Sequence[Hold | None], names: Sequence[str]) -> list[LimitSide]:
     """The limits of the states, each with symbols for its modes."""
     sides = []
     for k, stop in enumerate(stops):
@@ -176,18 +176,18 @@ def _sides(stops: Sequence[Stop | None], names: Sequence[str]) -> list[Side]:
                 symbol = partial(limit.graph.symbol, varies=True)
                 name = f"{'high' if sign > 0.0 else 'low'}.{names[k]}"
                 waits = None if stop.y is stop.x else symbol(f"waits.{name}")
-                sides.append(Side(sign, k, stop, limit, symbol(f"follows.{name}"), waits))
+                sides.append(LimitSide(sign, k, stop, limit, symbol(f"follows.{name}"), waits))
     return sides
 
 
-def _by_state(sides: Sequence[Side]) -> Iterator[list[Side]]:
+def _by_state(sides: Sequence[LimitSide]) -> Iterator[list[LimitSide]]:
     for _, own in groupby(sides, key=lambda side: side.state):
         yield list(own)
 
 
 def _projected(
-    choices: "_Choices", traced: Trace, sides: Sequence[Side]
-) -> "tuple[_Frozen, dict[Side, Node]]":
+    choices: "_Choices", traced: Trace, sides: Sequence[LimitSide]
+) -> "tuple[_Frozen, dict[LimitSide, Node]]":
     """What rewrites nodes, with the states that follow a limit put there, and the PIDs' gains."""
     frozen = _Frozen(choices, dict(zip(traced.x, traced.x, strict=True)))
     gains = {
@@ -216,7 +216,7 @@ def _guard_conditions(
     return tuple(signs.values())
 
 
-def stop_of(x: Node, slope: Node) -> Stop | None:
+def stop_of(x: Node, slope: Node) -> Hold | None:
     """Recognise ``where(outward, 0, free)`` as the blocks with limits write it."""
     if slope.op != "select" or slope.operands[1].constant != 0.0:
         return None
@@ -235,15 +235,15 @@ def stop_of(x: Node, slope: Node) -> Stop | None:
         else:
             return None
         signals.add(y)
-    return Stop(x, free, signals.pop(), low, high) if len(signals) == 1 else None
+    return Hold(x, free, signals.pop(), low, high) if len(signals) == 1 else None
 
 
-def _of_limits(stop: Stop | None, x: Node, held: Node, slope: Node) -> Stop | None:
-    """Stop of a state that has limits, also where its slope does not tell it."""
+def _of_limits(stop: Hold | None, x: Node, held: Node, slope: Node) -> Hold | None:
+    """Hold of a state that has limits, also where its slope does not tell it."""
     if held is x or (stop is not None and stop.y is x):
         return stop
     low, high = (None if limit.constant in (-inf, inf) else limit for limit in held.operands[1:])
-    return Stop(x, slope, x, low, high)
+    return Hold(x, slope, x, low, high)
 
 
 def _within(clip: Node, limits: Mapping[Node, tuple[Node, Node]]) -> Node:
@@ -268,12 +268,12 @@ def _expanded(clip: Node) -> Node:
     return graph.select(graph.compare("<", high, raised), high, raised)
 
 
-def _moves(side: Side) -> bool:
+def _moves(side: LimitSide) -> bool:
     return side.limit.varies or side.waits is not None
 
 
 def _put(
-    frozen: _Frozen, traced: Trace, sides: Sequence[Side], gains: Mapping[Side, Node]
+    frozen: _Frozen, traced: Trace, sides: Sequence[LimitSide], gains: Mapping[LimitSide, Node]
 ) -> list[Node]:
     """Put the states that follow a limit there."""
     states = [frozen(x) for x in traced.x]
@@ -287,7 +287,7 @@ def _put(
     return states
 
 
-def _held_slope(free: Node, state: int, sides: Sequence[Side]) -> Node:
+def _held_slope(free: Node, state: int, sides: Sequence[LimitSide]) -> Node:
     for side in sides:
         if side.state == state:
             for bit in (side.follows, side.waits):
@@ -300,7 +300,7 @@ class _Decisions:
     """How modes of states are decided, and when they do not hold any more."""
 
     def __init__(
-        self, frozen: _Frozen, motion: Mapping[Node, Node], gains: Mapping[Side, Node]
+        self, frozen: _Frozen, motion: Mapping[Node, Node], gains: Mapping[LimitSide, Node]
     ) -> None:
         self.frozen, self.motion, self.gains = frozen, motion, gains
 
@@ -308,7 +308,7 @@ class _Decisions:
         """Derivative of a node to time."""
         return tangents([node], self.motion)[0]
 
-    def first(self, side: Side) -> dict[Node, Node]:
+    def first(self, side: LimitSide) -> dict[Node, Node]:
         """Decide by the natural equations: at a limit, and pushed beyond it."""
         graph, stop = side.limit.graph, side.stop
         pushed = _positive(side.sign * stop.free)
@@ -321,7 +321,7 @@ class _Decisions:
             side.waits: graph.compare("<", -NEAR, self._beyond(side)) & pushed,
         }
 
-    def final(self, side: Side) -> dict[Node, Node]:
+    def final(self, side: LimitSide) -> dict[Node, Node]:
         """Decide by how the state and its limit move, with the modes that were decided first."""
         stop = side.stop
         if side.waits is None:
@@ -338,7 +338,7 @@ class _Decisions:
             side.waits: active & ((beyond >= NEAR) | _positive(waiting)),
         }
 
-    def guard(self, sides: Sequence[Side]) -> Node:
+    def guard(self, sides: Sequence[LimitSide]) -> Node:
         """Positive once a state is beyond a limit, or leaves one that held it."""
         graph, stop = sides[0].limit.graph, sides[0].stop
         y, free = self.frozen(stop.y), self.frozen(stop.free)
@@ -361,10 +361,10 @@ class _Decisions:
         return guard
 
     @staticmethod
-    def _beyond(side: Side) -> Node:
+    def _beyond(side: LimitSide) -> Node:
         return side.sign * (side.stop.y - side.limit)
 
-    def _drift(self, side: Side) -> tuple[Node, Node]:
+    def _drift(self, side: LimitSide) -> tuple[Node, Node]:
         """How fast a PID's output passes its limit while its integral waits, and while it moves."""
         y, limit, x = (self.frozen(node) for node in (side.stop.y, side.limit, side.stop.x))
         gain = self.gains[side]

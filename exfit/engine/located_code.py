@@ -10,27 +10,20 @@ from cubic Hermite polynomials of the states, which never reach across a crossin
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from exfit.engine.driver import ONE, defined, loop, moved_inputs, of_row, pointers, whole
+from exfit.engine.crossing import MOST_CROSSINGS, TOLERANCE, CrossingSearch
+from exfit.engine.driver import ONE, located_runs
 from exfit.engine.emit import TracePart, module, rest_function
+from exfit.engine.lanes import Slot
 from exfit.engine.located import LocatedTrace, located
-from exfit.engine.located_runs import JOB, SPAN
 from exfit.engine.system import System, Trace, trace
 from exfit.engine.tangents import Tangents, differentiate, tangents
 from exfit.engine.trace import Node, in_order
-from exfit.engine.writer import Shape, Values, Writer, plan
+from exfit.engine.writer import Shape, Values, plan
 
-TOLERANCE = 1e-10  # pu: a mode holds until its margin is passed by more,
-AIM, ENOUGH = 3e-10, 1e-9  # and a crossing is where it is passed by so much, or up to that
-CLOSE = 1e-10  # of a step: as near as a crossing is located
-MOST_TRIALS = 60.0  # steps that locate one crossing
-MOST_CROSSINGS = 12.0  # in a sub-step; the rest of it goes in MINI parts, each with its own modes
-MINI = 1.0 / 16.0
 WINDOW = 32  # steps after which a run is checked for having settled
 SETTLED = 1e-9  # pu: by no more will a settled run move until the next segment
 EVER = -1e300
 STANDS = 1e-200  # 1/s: a guard that moves less has no instant
-
-WORK = ("r", "x", "f", "dr", "dx", "df", "du")
 
 
 class _Kind(NamedTuple):
@@ -72,93 +65,21 @@ def simulation(
         parts.append(TracePart(derived, Shape(lanes), "d"))
     body = _Run(run, kinds)
     sizes = (lanes, 0, 0) if derived is None else (1, lanes, len(parts[1].inputs))
-    around = _driver(body, len(outputs), *sizes)
+    around = located_runs(len(system.states), len(outputs), *sizes)
     return module(parts, {"rest": rest_function(parts)}, body.text + around)
 
 
-class _Slot(NamedTuple):
-    """A variable of the loop: its type and its place."""
-
-    type: str
-    place: str
-
-
-class _Run:
+class _Run(CrossingSearch):
     """Writes the function of one segment."""
 
     def __init__(self, run: LocatedTrace, kinds: Sequence[_Kind]) -> None:
         self.run, self.kinds, self.traced = run, kinds, run.traced
-        self.narrow, self.broad = kinds[0].shape, kinds[-1].shape
+        super().__init__(kinds[0].shape, kinds[-1].shape)
         self.wide = kinds[1] if len(kinds) > 1 else None
-        self.w = Writer(self.narrow, self.broad)
-        self.one, self.truth = self.narrow.type, self.narrow.of("i1")
-        alone = self.narrow.lanes == 1
-        self.true, self.false = (
-            ("true", "false") if alone else ("splat (i1 true)", "zeroinitializer")
-        )
         self.shape_of = {x: kind.shape for kind in kinds for x in kind.given.x}
         of_inputs = self.wide.given.u if self.wide else ()
         self.moving = [node for node in of_inputs if node is not None]
         self._write()
-
-    # --- what the blocks are written with
-
-    def slot(self, type_: str, start: str) -> _Slot:
-        place = self.w.let(f"alloca {type_}, align 64")
-        self.w.put(f"store {type_} {start}, ptr {place}, align 64")
-        return _Slot(type_, place)
-
-    def get(self, slot: _Slot) -> str:
-        return self.w.let(f"load {slot.type}, ptr {slot.place}, align 64")
-
-    def put(self, slot: _Slot, value: str) -> None:
-        self.w.put(f"store {slot.type} {value}, ptr {slot.place}, align 64")
-
-    def number(self, value: float) -> str:
-        return self.narrow.number(value)
-
-    def op(self, op: str, a: str, b: str) -> str:
-        return self.w.arithmetic(op, self.narrow, a, b)
-
-    def test(self, comparison: str, a: str, b: str) -> str:
-        return self.w.let(f"fcmp {comparison} {self.one} {a}, {b}")
-
-    def both(self, a: str, b: str) -> str:
-        return self.w.let(f"and {self.truth} {a}, {b}")
-
-    def either(self, a: str, b: str) -> str:
-        return self.w.let(f"or {self.truth} {a}, {b}")
-
-    def no(self, a: str) -> str:
-        return self.w.let(f"xor {self.truth} {a}, {self.true}")
-
-    def pick(self, condition: str, a: str, b: str) -> str:
-        return self.w.let(f"select {self.truth} {condition}, {self.one} {a}, {self.one} {b}")
-
-    def some(self, condition: str) -> str:
-        """Bit that is set where a condition holds in any lane."""
-        if self.narrow.lanes == 1:
-            return condition
-        bits = f"i{self.narrow.lanes}"
-        packed = self.w.let(f"bitcast {self.truth} {condition} to {bits}")
-        return self.w.let(f"icmp ne {bits} {packed}, 0")
-
-    def every(self, condition: str) -> str:
-        return self.w.let(f"xor i1 {self.some(self.no(condition))}, true")
-
-    def size(self, value: str) -> str:
-        """Write an absolute value."""
-        name = f"@llvm.fabs.{self.narrow.suffix}"
-        return self.w.let(f"call {self.one} {name}({self.one} {value})")
-
-    def spread(self, value: str, shape: Shape) -> str:
-        """A value of one set in every direction."""
-        return value if shape == self.narrow else self.w.spread(value, shape)
-
-    def splat(self, scalar: str) -> str:
-        return self.w.spread(scalar, self.narrow)
-
-    # --- the inputs
 
     def inputs(self, s: str, rates: bool = False) -> Values:
         """Write the inputs at a fraction of the step, with their slopes where these are wanted."""
@@ -190,13 +111,11 @@ class _Run:
                 values[node] = w.add_product(shape, a, w.arithmetic("fsub", shape, b, a), share)
         return values
 
-    def values_of(self, slots: dict[Node, _Slot]) -> Values:
+    def values_of(self, slots: dict[Node, Slot]) -> Values:
         return {node: self.get(slot) for node, slot in slots.items()}
 
     def modes_now(self) -> Values:
         return self.values_of(self.modes) | self.values_of(self.signs)
-
-    # --- the function
 
     def nodes(self, group: str) -> list[Node]:
         """The nodes of a group of all kinds: states, slopes or outputs."""
@@ -216,9 +135,9 @@ class _Run:
         share = self._allocate()
         w.put("br label %settle")
         self._attempt()
-        self._slow()
+        self.shrink()
         self._commit()
-        self._advance()
+        self.advance()
         self._settle()
         self._next(share)
         w.label("done")
@@ -261,10 +180,10 @@ class _Run:
     def _allocate(self) -> str:
         """Write the variables of the loop, and the share of a step that a sub-step is."""
         w, run = self.w, self.run
-        self.x: dict[Node, _Slot] = {}
-        self.f: dict[Node, _Slot] = {}
-        self.xn: dict[Node, _Slot] = {}
-        self.fn: dict[Node, _Slot] = {}
+        self.x: dict[Node, Slot] = {}
+        self.f: dict[Node, Slot] = {}
+        self.xn: dict[Node, Slot] = {}
+        self.fn: dict[Node, Slot] = {}
         for kind in self.kinds:
             for row, node in enumerate(kind.given.x):
                 for slots, array in ((self.x, "x"), (self.f, "f")):
@@ -277,23 +196,12 @@ class _Run:
         self.signs = {sign: self.slot(self.one, self.number(1.0)) for sign in run.signs}
         m = w.let("sitofp i64 %m to double")
         share = w.let(f"fdiv double {ONE.number(1.0)}, {m}")
-        zero = self.number(0.0)
-        # of a part of a sub-step: where it begins, where a trial ends, what was found
-        self.tb, self.te = self.slot(self.one, zero), self.slot(self.one, self.splat(share))
-        self.g, self.g0, self.next = (self.slot(self.one, zero) for _ in range(3))
-        self.lo, self.hi, self.hi2 = (self.slot(self.one, zero) for _ in range(3))
-        self.glo, self.ghi, self.ghi2 = (self.slot(self.one, zero) for _ in range(3))
-        self.count, self.side, self.met = (self.slot(self.one, zero) for _ in range(3))
+        self.allocate_search(share)
         self.after = self.slot(self.one, self.number(EVER))  # samples up to there are read
-        self.alive, self.committed, self.settling = (
-            self.slot(self.truth, self.true) for _ in range(3)
-        )
-        self.still, self.going, self.ended = (self.slot(self.truth, self.false) for _ in range(3))
         self.fresh = self.slot("i1", "true")
         self.k, self.j, self.sample = (self.slot("i64", "0") for _ in range(3))
         self.step = self.slot("double", w.load("%h", 0, ONE))
         self.length = self.slot(self.one, self.splat(self.get(self.step)))
-        self.end = self.slot("double", share)  # of the sub-step, as a fraction of the step
         return share
 
     def _attempt(self) -> None:
@@ -350,81 +258,6 @@ class _Run:
             self.put(slot, self.false)
         w.put(f"br i1 {busy}, label %slow, label %commit")
 
-    def _slow(self) -> None:
-        """Write how the bracket of a crossing shrinks, and where the next trial ends."""
-        w = self.w
-        w.label("slow")
-        tb, te, g = self.get(self.tb), self.get(self.te), self.get(self.g)
-        count, side, met = self.get(self.count), self.get(self.side), self.get(self.met)
-        lo, hi, glo, ghi = (self.get(s) for s in (self.lo, self.hi, self.glo, self.ghi))
-        locating = self.test("ogt", count, self.number(0.0))
-        bad = self.both(self.test("ugt", g, self.number(TOLERANCE)), self.get(self.alive))
-        over = self.both(self.no(locating), self.test("oge", met, self.number(MOST_CROSSINGS)))
-        bad = self.both(bad, self.no(over))
-        new, above = self.both(bad, self.no(locating)), self.both(bad, locating)
-        below = self.both(locating, self.no(bad))
-        shifted = self.op("fsub", g, self.number(AIM))
-        start = self.op("fsub", self.get(self.g0), self.number(AIM))
-        start = self.pick(self.test("olt", start, self.number(-AIM)), start, self.number(-AIM))
-        half = self.number(0.5)
-        hi2, ghi2 = (
-            self.pick(above, hi, self.get(self.hi2)),
-            self.pick(above, ghi, self.get(self.ghi2)),
-        )
-        glo = self.pick(new, start, self.pick(below, shifted, glo))
-        ghi = self.pick(bad, shifted, ghi)
-        again = self.both(below, self.test("olt", side, self.number(-0.5)))
-        lo = self.pick(new, tb, self.pick(below, te, lo))
-        hi = self.pick(bad, te, hi)
-        hi2, ghi2 = self.pick(new, hi, hi2), self.pick(new, ghi, ghi2)
-        side = self.pick(
-            new,
-            self.number(0.0),
-            self.pick(above, self.number(1.0), self.pick(below, self.number(-1.0), side)),
-        )
-        count = self.pick(
-            new,
-            self.number(1.0),
-            self.op("fadd", count, self.pick(locating, self.number(1.0), self.number(0.0))),
-        )
-        width = self.op("fsub", hi, lo)
-        close = self.either(
-            self.test("ole", width, self.number(CLOSE)),
-            self.test("oge", count, self.number(MOST_TRIALS)),
-        )
-        there = self.both(above, self.either(close, self.test("ole", g, self.number(ENOUGH))))
-        ended = self.both(self.no(bad), self.no(locating))
-        # from both sides, or from two places behind it: before it another guard may be the largest
-        away = self.pick(above, self.op("fsub", hi, hi2), width)
-        falls = self.op("fsub", ghi, self.pick(above, ghi2, glo))
-        guess = self.op("fsub", hi, self.op("fdiv", self.op("fmul", ghi, away), falls))
-        inside = self.both(self.test("olt", lo, guess), self.test("olt", guess, hi))
-        inside = self.both(inside, self.no(again))
-        guess = self.pick(inside, guess, w.add_product(self.narrow, lo, width, half))
-        for slot, value in (
-            (self.lo, lo),
-            (self.hi, hi),
-            (self.glo, glo),
-            (self.ghi, ghi),
-            (self.side, side),
-            (self.hi2, hi2),
-            (self.ghi2, ghi2),
-            (self.count, count),
-            (self.next, self.pick(close, hi, guess)),
-            (self.going, self.both(self.either(new, locating), self.no(there))),
-            (self.ended, ended),
-            (self.settling, self.either(there, over)),
-        ):
-            self.put(slot, value)
-        lost = self.both(there, self.test("uno", g, g))
-        self.put(self.alive, self.both(self.get(self.alive), self.no(lost)))
-        self.put(
-            self.met, self.op("fadd", met, self.pick(there, self.number(1.0), self.number(0.0)))
-        )
-        committed = self.either(there, ended)
-        self.put(self.committed, committed)
-        w.put(f"br i1 {self.some(committed)}, label %commit, label %advance")
-
     def _commit(self) -> None:
         """Write the samples of a part of a step that is done, and move to its end."""
         w = self.w
@@ -468,10 +301,6 @@ class _Run:
         for slot, value in ((self.tb, te), (self.after, te), (self.g0, self.get(self.g))):
             self.put(slot, self.pick(committed, value, self.get(slot)))
         w.put("br label %advance")
-
-    def line(self, start: float, slope: float, way: str) -> str:
-        """Write a linear function."""
-        return self.w.add_product(self.narrow, self.number(start), self.number(slope), way)
 
     def _write_sample(
         self,
@@ -532,27 +361,6 @@ class _Run:
             old = w.load(base, row, shape)
             kept = w.let(f"select {self.truth} {inside}, {shape.type} {value}, {shape.type} {old}")
             w.store(kept, base, row, shape)
-
-    def _advance(self) -> None:
-        """Write where the next part of the sub-step ends, and whether modes are decided first."""
-        w = self.w
-        w.label("advance")
-        last = self.splat(self.get(self.end))
-        over = self.test("oge", self.get(self.met), self.number(MOST_CROSSINGS))
-        m = w.let("sitofp i64 %m to double")
-        mini = self.splat(w.let(f"fdiv double {ONE.number(MINI)}, {m}"))
-        short = self.op("fadd", self.get(self.tb), mini)
-        short = self.pick(self.test("olt", short, last), short, last)
-        end = self.pick(over, short, last)
-        self.put(self.te, self.pick(self.get(self.going), self.get(self.next), end))
-        done = self.get(self.committed)
-        self.put(self.count, self.pick(done, self.number(0.0), self.get(self.count)))
-        settles = self.some(self.get(self.settling))
-        w.put(f"br i1 {settles}, label %settle, label %whole")
-        w.label("whole")
-        last = self.splat(self.get(self.end))
-        done = self.every(self.test("oge", self.get(self.tb), last))
-        w.put(f"br i1 {done}, label %next, label %attempt")
 
     def _settle(self) -> None:
         """Write how the modes are decided, and the states and tangents behind a crossing."""
@@ -730,43 +538,3 @@ class _Run:
         for slot in (self.count, self.met):
             self.put(slot, self.number(0.0))
         w.put("br label %attempt")
-
-
-def _driver(body: _Run, outputs: int, sets: int, directions: int, moving: int) -> str:
-    """Return the IR of ``located_runs``: rest and all segments of many jobs."""
-    w = Writer(ONE, ONE)
-    states = len(body.traced.x)
-    with loop(w, "job", "%count") as k:
-        job, work = of_row(w, "%jobs", k, JOB), of_row(w, "%work", "0", WORK)
-        for array, size in (("f", states * sets), ("df", states * directions)):
-            if size:
-                with loop(w, f"zero.{array}", str(size)) as row:
-                    place = w.address(work[array], row)
-                    w.put(f"store double {ONE.number(0.0)}, ptr {place}, align 8")
-        rest = [job["p"], work["r"], work["x"], "null"]
-        if directions:
-            rest += [job["dp"], work["dr"], work["dx"], "null"]
-        w.put(f"call void @rest({pointers(*rest)})")
-        with loop(w, "segment", "%segments") as number:
-            span = of_row(w, job["spans"], number, SPAN)
-            row = w.let(f"mul i64 {whole(w, span['first'])}, {outputs * sets}")
-            n = whole(w, span["n"])
-            arrays = [job["p"], work["r"], work["x"], work["f"], w.address(job["out"], row)]
-            if directions:
-                if moving:
-                    given = pointers(span["shapes"], job["rates"], work["du"])
-                    w.put(f"call void @moved({given}, i64 {n}, i64 %columns)")
-                wide = w.let(f"mul i64 {row}, {directions}")
-                instant = w.let(f"mul i64 {number}, {directions}")
-                arrays += [job["dp"], work["dr"], work["dx"], work["df"]]
-                arrays += [w.address(job["dtau"], instant), w.address(job["dout"], wide)]
-                arrays += [w.address(job["change"], row), work["du"]]
-            arrays += [span["u"], span["h"], span["pos"]]
-            counts = ", ".join(
-                f"i64 {whole(w, span[name])}" for name in ("parts", "samples", "still")
-            )
-            w.put(f"call void @located({pointers(*arrays)}, i64 {n}, {counts})")
-    w.put("ret void")
-    arguments = ("i64 %count", "ptr %jobs", "i64 %segments", "i64 %columns", "ptr %work")
-    heads = moved_inputs(Shape(directions), moving) if moving else ""
-    return heads + defined("void @located_runs", arguments, w)

@@ -8,12 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.kernel import compiled, text_of
-from exfit.engine.sampling import Table, address, function, places, work_space
+from exfit.engine.sampling import (
+    LOCATED_JOB,
+    LOCATED_SPAN,
+    Table,
+    address,
+    function,
+    places,
+    work_space,
+)
 from exfit.engine.system import System
 from exfit.util.arrays import Array
-
-JOB = ("p", "dp", "dtau", "rates", "spans", "out", "dout", "change")
-SPAN = ("u", "h", "n", "parts", "pos", "samples", "still", "first", "shapes")
 
 
 class LocatedSegment(NamedTuple):
@@ -91,7 +96,7 @@ class LocatedKernel:
         together = p if lanes == 1 else np.ascontiguousarray(p[jobs].transpose(0, 2, 1))
         out = np.empty((len(jobs), first.samples, len(self.outputs), lanes))
         spans = _spans(courses, parts[jobs[:, 0]], jobs[:, 0])
-        table = np.zeros((len(jobs), len(JOB)), np.int64)
+        table = np.zeros((len(jobs), len(LOCATED_JOB)), np.int64)
         for column, array in ((0, together), (5, out)):
             table[:, column] = places(array, len(jobs))
         table[:, 4] = places(spans, len(jobs), np.int64)
@@ -150,7 +155,7 @@ class LocatedTangentKernel:
         shape = (count, first.samples, len(self.outputs))
         outputs, changes = np.empty((2, blocks, *shape))
         slopes = np.empty((blocks, *shape, width))
-        tables = np.zeros((blocks, count, len(JOB)), np.int64)
+        tables = np.zeros((blocks, count, len(LOCATED_JOB)), np.int64)
         spans = _spans(courses, parts, np.arange(count))
         kept = []
         for block in range(blocks):
@@ -198,7 +203,7 @@ def _spans(courses: Sequence[LocatedCourse], parts: NDArray[np.int64], sets: Tab
         spans = np.repeat(courses[0].table[None], len(sets), axis=0)
     else:
         spans = np.array([courses[k].table for k in sets])
-    spans[:, :, SPAN.index("parts")] = parts[:, None]
+    spans[:, :, LOCATED_SPAN.index("parts")] = parts[:, None]
     return spans
 
 

@@ -21,6 +21,11 @@ SPAN = ("u", "shapes", "row", "n", "parts", "h")  # a segment of a run
 SAMPLES = ("rows", "weights", "slopes", "out", "dout", "change")  # of one of the sets of a job
 WORK = ("r", "x", "out", "dr", "dx", "dout", "du")  # where a job leaves what is not asked for
 
+# the same of runs with located crossings
+LOCATED_JOB = ("p", "dp", "dtau", "rates", "spans", "out", "dout", "change")
+LOCATED_SPAN = ("u", "h", "n", "parts", "pos", "samples", "still", "first", "shapes")
+LOCATED_WORK = ("r", "x", "f", "dr", "dx", "df", "du")
+
 # the arrays of the functions that linearise
 AT_REST = ("p", "r", "x", "slopes", "jacobian", "dp", "dr", "dx", "units", "u")
 ALONG = ("p", "r", "x", "u", "slopes", "jacobian", "dp", "dr", "units")

@@ -18,7 +18,7 @@ DENSEST = 1e-3  # s: a recorded input with closer samples is averaged over steps
 SAME = 1e-9  # of a step
 
 
-class Reading(NamedTuple):
+class SamplePlaces(NamedTuple):
     """The samples of a run: in each segment their ``positions``, in steps from its start.
 
     ``still`` (M,) are the samples before the start and after the end, which a delay does not move.
@@ -84,7 +84,7 @@ class LocatedTest:
                 line += change.step * _share(change, times)
         return line
 
-    def reading(self, times: Array, delay: float = 0.0) -> Reading:
+    def reading(self, times: Array, delay: float = 0.0) -> SamplePlaces:
         """Where samples at times (M,) lie, less a delay (s).
 
         At the instant of a jump a sample is before it; of two at one time the second is behind it.
@@ -106,10 +106,10 @@ class LocatedTest:
             nearest = np.rint(position)
             position = np.where(np.abs(position - nearest) < SAME, nearest, position)
             positions.append(position.clip(0.0, len(grid) - 1.0))
-        return Reading(tuple(positions), np.asarray(np.abs(wanted - read) > near))
+        return SamplePlaces(tuple(positions), np.asarray(np.abs(wanted - read) > near))
 
     def course(
-        self, reading: Reading, shapes: Sequence[Sequence["tuple[int, bool]"]] = ()
+        self, reading: SamplePlaces, shapes: Sequence[Sequence["tuple[int, bool]"]] = ()
     ) -> LocatedCourse:
         """What machine code runs through; ``shapes`` are those of each input that moves."""
         segments = []
@@ -147,7 +147,7 @@ class LocatedTest:
                 moved[row] += [weight * d.steps.get(n, (0.0, 0.0))[0] for d in directions]
         return moved
 
-    def inputs_at(self, reading: Reading) -> Array:
+    def inputs_at(self, reading: SamplePlaces) -> Array:
         """Inputs (M, nu) at samples."""
         parts = []
         for u, positions in zip(self.polynomials, reading.positions, strict=True):

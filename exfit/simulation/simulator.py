@@ -15,7 +15,7 @@ from exfit.engine.system import System
 from exfit.plants import REFERENCES
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
-from exfit.simulation.located_test import LocatedTest, Reading, exact
+from exfit.simulation.located_test import LocatedTest, SamplePlaces, exact
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
     groups,
@@ -125,14 +125,14 @@ class Simulator:
             for segment in (() if located else self._grid)
         ]
         self._segments = self._segments_of()
-        self._sampling: Interpolation | GridPoints | Reading = self._sampling_of(times)
+        self._sampling: Interpolation | GridPoints | SamplePlaces = self._sampling_of(times)
 
     @property
     def located(self) -> bool:
         """Whether crossings of limits are located within the steps."""
         return self._located is not None
 
-    def _sampling_of(self, times: Array) -> Interpolation | Reading:
+    def _sampling_of(self, times: Array) -> Interpolation | SamplePlaces:
         if self._located is not None:
             return self._located.reading(times, self.delay)
         return Interpolation(self._grid, times, self.delay)
@@ -329,9 +329,9 @@ class Simulator:
     def _inputs(self) -> Array:
         """All inputs (M, nu) at the sample times, which the recorder delays."""
         if self._located is not None:
-            assert isinstance(self._sampling, Reading)
+            assert isinstance(self._sampling, SamplePlaces)
             return self._located.inputs_at(self._sampling)
-        assert not isinstance(self._sampling, Reading)
+        assert not isinstance(self._sampling, SamplePlaces)
         return self._sampling([segment.u for segment in self._segments])
 
     def run(self, values: Values) -> Run:
@@ -408,7 +408,7 @@ class Simulator:
     def located_course(self, moves: "Moves | None" = None) -> LocatedCourse:
         """Segments for machine code with located crossings, with the inputs that move."""
         assert self._located is not None
-        assert isinstance(self._sampling, Reading)
+        assert isinstance(self._sampling, SamplePlaces)
         if moves is not None and moves.shapes:
             return self._located.course(self._sampling, tuple(moves.shapes.values()))
         key = (id(self._located), id(self._sampling))
@@ -424,7 +424,7 @@ class Simulator:
     @property
     def still(self) -> NDArray[np.bool_]:
         """Samples before the start and after the end, with located crossings."""
-        assert isinstance(self._sampling, Reading)
+        assert isinstance(self._sampling, SamplePlaces)
         return self._sampling.still
 
     @property
@@ -474,7 +474,7 @@ class Simulator:
                 segment._replace(shapes=self._share * moves.shapes_on(part, self.inputs))
                 for segment, part in zip(segments, self._grid, strict=True)
             ]
-        assert not isinstance(self._sampling, Reading)
+        assert not isinstance(self._sampling, SamplePlaces)
         reading = self._sampling.reading(changing=moves is not None and bool(moves.delayed))
         return Course(segments, reading.enlarged(1.0 / self._share))
 
