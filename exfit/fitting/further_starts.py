@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 from exfit.errors import SimulationError
 from exfit.estimate import Descent, spread
+from exfit.fitting.compression import compressed
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import Way
-from exfit.fitting.problem import FitProblem, compressed
+from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest

@@ -13,7 +13,7 @@ from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import Residuals
+from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals
 from exfit.inference.confidence import (
     CORRELATED,
     TIED,
@@ -180,21 +180,18 @@ def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> 
 
 
 def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
-    """Sensitivity of each channel: at the record's samples or, where compressed, of the grid."""
+    """Sensitivity of each channel: at the record's samples or, where compressed, at some."""
     residuals = problem.residuals
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.ranked_size / slopes_of(residuals, theta)
     labels = iter(linear.channels)
     own = [n for n, of_record in enumerate(linear.nuisances) if not of_record]
-    pairs = zip(problem.compressed.experiments, residuals.experiments, strict=True)
-    for experiment, whole in pairs:
+    for experiment in problem.compressed.experiments:
         _, slopes = experiment.response_with_derivatives(values, moves)
-        simulator = experiment.simulator
-        delay = 0.0 if experiment is whole else simulator.delay  # the grid is the simulation's
         for k in range(len(experiment.channels)):
             moved = slopes[:, k] * size
             by_name = {linear.names[n]: moved[:, n] for n in own}
-            yield Sensitivity(next(labels).label, simulator.times + delay, by_name)
+            yield Sensitivity(next(labels).label, experiment.simulator.times, by_name)
 
 
 def slopes_of(residuals: Residuals, theta: Array) -> Array:
@@ -213,13 +210,15 @@ def linearisation(
     """
     residuals = problem.residuals
     values, free = residuals.values(theta), residuals.free
-    compressed_errors, slopes = problem.compressed.errors(theta)
+    # of all samples, where these fit in memory, as only they tell how a recorder rounds
+    of_all = residuals.count * len(free) <= MOST_NUMBERS_AT_ONCE
+    own = residuals if of_all else problem.compressed
+    own_errors, slopes = own.errors(theta)
     if not np.isfinite(slopes).all():
         at = ", ".join(f"{parameter.name} = {values[parameter.name]:g}" for parameter in free)
         raise SimulationError(f"the derivatives are not finite at {at}")
     if errors is None:
-        same = problem.compressed is residuals
-        errors = compressed_errors if same else residuals(theta)[: residuals.count]
+        errors = own_errors if own is residuals else residuals(theta)[: residuals.count]
     influence, curvature = residuals.influence(errors)
     return Linearisation(
         names=tuple(parameter.name for parameter in free),
@@ -232,7 +231,7 @@ def linearisation(
         jacobian=slopes / slopes_of(residuals, theta),
         influence=influence,
         curvature=curvature,
-        channels=tuple(_channels(residuals, problem.compressed.sizes, errors, slopes)),
+        channels=tuple(_channels(residuals, own.sizes, errors, slopes)),
         priors=tuple(
             PriorRow(k, prior.mean, prior.std, residuals.noise)
             for k, prior in residuals.priors.items()

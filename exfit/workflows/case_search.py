@@ -20,6 +20,7 @@ from exfit.fitting.channel_weights import (
     other_deviations,
     weighted_alike,
 )
+from exfit.fitting.compression import compressed, is_as_all
 from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import Judge, SearchResult, continued, judged_again
@@ -43,7 +44,7 @@ from exfit.results.intervals.determination import (
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
 from exfit.util.arrays import Array
 from exfit.util.text import digits
-from exfit.util.vocabulary import FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
+from exfit.util.vocabulary import COMPRESSED_ANEW, FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
 from exfit.workflows.responses import aligned, validation_of
 
 Values = Mapping[str, float]
@@ -170,7 +171,22 @@ def descents(state: SearchState) -> SearchState:
         judge = judge_of(case, problem, state.setups, state.unseen)
     settings = state.counter, state.options, judge, state.program
     found = search(case, problem, state.method, state.on_line, state.watch, *settings)
-    return replace(state, searched=found)
+    return on_all_samples(replace(state, searched=found))
+
+
+def on_all_samples(state: SearchState) -> SearchState:
+    """Search on where compressed records do not have the minimum of all their samples.
+
+    They are compressed anew, at the end of the search.
+    """
+    problem, found = state.problem, state.found
+    x = found.best.x
+    if state.interrupted or is_as_all(problem.compressed, problem.residuals, x):
+        return state
+    problem = FitProblem(problem.residuals, compressed(problem.residuals, x))
+    return replace(
+        state, problem=problem, searched=state.continued(problem, found, x, COMPRESSED_ANEW)
+    )
 
 
 def judge_of(

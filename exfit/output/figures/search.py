@@ -33,7 +33,13 @@ from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult, Minima
 from exfit.signals import label_of
 from exfit.util.arrays import Array
-from exfit.util.vocabulary import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHTED_BY_NOISE
+from exfit.util.vocabulary import (
+    COMPRESSED_ANEW,
+    FROM_FURTHER_STARTS,
+    HISTORY_PHASES,
+    PHASES,
+    WEIGHTED_BY_NOISE,
+)
 from exfit.workflows.profiles import Profiles
 
 LONGEST = 30  # letters of a parameter
@@ -41,6 +47,7 @@ COLOURS: Mapping[str, str] = {
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
     FROM_FURTHER_STARTS: LIMIT,
     WEIGHTED_BY_NOISE: LIMIT,
+    COMPRESSED_ANEW: LIMIT,
 }
 WAYS = {
     "strategy": ("the case's start", "D"),
