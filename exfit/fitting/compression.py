@@ -23,14 +23,14 @@ Rows = NDArray[np.intp]
 
 LEAST_SAMPLES = 10_000  # of a record: fewer cost little
 LEAST_GAIN = 3  # times fewer errors: else it does not pay
-NODES = 12  # samples of which all others of a panel follow
+NODES = 12  # samples of which all others of a stretch follow
 EXTREMES = np.cos(np.pi * np.arange(NODES) / (NODES - 1))  # of the polynomial of highest degree
-LEAST_PANEL = 3 * NODES  # samples: fewer are compared one by one
-CHECKED = 8 * NODES  # samples of a panel, spread over it, that its polynomial must match
+LEAST_STRETCH = 3 * NODES  # samples: fewer are compared one by one
+CHECKED = 8 * NODES  # samples of a stretch, spread over it, that its polynomial must match
 TOLERANCE = 1e-7  # of a channel's noise: how near its response must be to the polynomials
 OF_DERIVATIVES = 1e-8  # of the largest derivative to a parameter: the same of these
 LEAST_ERROR = 1e-11  # pu: below that rounding of a long run is seen
-WIDTH = 0.25  # of a panel, as a share of the time since the last change of an input
+WIDTH = 0.25  # of a stretch, as a share of the time since the last change of an input
 BLOCK = 1 << 16  # samples that are looked at together
 SCALED = 1 << 12  # samples that show how large derivatives are
 NO_ROWS = np.arange(0)
@@ -38,7 +38,7 @@ WITHIN = 1e-6  # standard errors: how far a search may end from the minimum of a
 CHANGING_SAMPLES = ("shift", "delay", "scale", "offset")  # nuisances that change what is compared
 
 
-class Panel(NamedTuple):
+class Stretch(NamedTuple):
     """Samples of a record from its row ``first`` on to that before ``end``.
 
     They follow a polynomial through ``nodes`` (NODES,) of them; without any each stands for itself.
@@ -54,11 +54,11 @@ class Panel(NamedTuple):
         return self.end - self.first
 
     def polynomials(self, times: Array, rows: Rows) -> Array:
-        """Chebyshev polynomials of the panel at some rows, (rows, NODES)."""
+        """Chebyshev polynomials of the stretch at some rows, (rows, NODES)."""
         low, high = times[self.first], times[self.end - 1]
         return chebvander((2.0 * times[rows] - low - high) / (high - low), NODES - 1)
 
-    def with_nodes(self, times: Array) -> "Panel":
+    def with_nodes(self, times: Array) -> "Stretch":
         """Return it with the samples nearest to the extremes of the last polynomial as nodes."""
         low, high = times[self.first], times[self.end - 1]
         wanted = 0.5 * (low + high) - 0.5 * (high - low) * EXTREMES
@@ -86,9 +86,9 @@ class CompressedChannel(Channel):
     """A channel that is simulated at few of its samples (G,).
 
     Its squared errors are those of D samples that stand for themselves, of NODES errors for each of
-    K panels, and of one more. The samples ``alone`` are rows (D,) of those simulated; the errors of
-    a panel are ``maps`` (K, NODES, NODES) times the samples at its ``nodes`` (K, NODES). What they
-    are compared with is ``theirs``; ``rest`` is the root of what no response can lower.
+    K stretches, and of one more. The samples ``alone`` are rows (D,) of those simulated; the errors
+    of a stretch are ``maps`` (K, NODES, NODES) times the samples at its ``nodes`` (K, NODES). What
+    they are compared with is ``theirs``; ``rest`` is the root of what no response can lower.
     """
 
     alone: Rows = field(kw_only=True)
@@ -124,7 +124,7 @@ class CompressedChannel(Channel):
 def compressed(residuals: Residuals, at: Array | None = None) -> Residuals:
     """Return residuals with the same cost and gradient near a point (N,), but fewer of them.
 
-    Between the changes of its inputs a record is divided into panels, until on each of them the
+    Between the changes of its inputs a record is divided into stretches, until on each of them the
     response at the point (by default the start) and its derivatives are polynomials through NODES
     samples, within TOLERANCE. So they are short where something happens, or the samples stand for
     themselves, and long where a unit settles. None is longer than the time since the last change:
@@ -190,42 +190,42 @@ def _compressed(
     whole: Experiment, residuals: Residuals, values: dict[str, float], moves: list[dict[str, float]]
 ) -> Experiment:
     """Compress a long record by its response to some values, if that pays."""
-    alone, panels = list[Rows](), list[Panel]()
-    for panel in _divided(whole, residuals, partial(_curves, whole, values, moves)):
-        if not len(panel.nodes):
-            alone.append(np.arange(panel.first, panel.end))
+    alone, stretches = list[Rows](), list[Stretch]()
+    for stretch in _divided(whole, residuals, partial(_curves, whole, values, moves)):
+        if not len(stretch.nodes):
+            alone.append(np.arange(stretch.first, stretch.end))
         else:
-            panels.append(panel)
-    samples, count = len(whole.simulator.times), sum(map(len, alone)) + NODES * len(panels)
-    if not panels or LEAST_GAIN * count > samples:
+            stretches.append(stretch)
+    samples, count = len(whole.simulator.times), sum(map(len, alone)) + NODES * len(stretches)
+    if not stretches or LEAST_GAIN * count > samples:
         return whole
-    alone_, nodes = np.concatenate([NO_ROWS, *alone]), np.stack([one.nodes for one in panels])
+    alone_, nodes = np.concatenate([NO_ROWS, *alone]), np.stack([one.nodes for one in stretches])
     rows = np.union1d(alone_, nodes)
     return replace(
         whole,
         simulator=whole.simulator.at_times(whole.simulator.times[rows]),
         channels=tuple(
-            _compressed_channel(channel, whole.simulator.times, panels, alone_, rows)
+            _compressed_channel(channel, whole.simulator.times, stretches, alone_, rows)
             for channel in whole.channels
         ),
     )
 
 
 def _compressed_channel(
-    channel: Channel, times: Array, panels: Sequence[Panel], alone: Rows, rows: Rows
+    channel: Channel, times: Array, stretches: Sequence[Stretch], alone: Rows, rows: Rows
 ) -> CompressedChannel:
     kept, measured = channel.kept, channel.measured
-    maps, theirs = np.zeros((len(panels), NODES, NODES)), np.zeros((len(panels), NODES))
+    maps, theirs = np.zeros((len(stretches), NODES, NODES)), np.zeros((len(stretches), NODES))
     rest = 0.0
-    for k, panel in enumerate(panels):
-        here = np.arange(panel.first, panel.end)[kept[panel.first : panel.end]]
+    for k, stretch in enumerate(stretches):
+        here = np.arange(stretch.first, stretch.end)[kept[stretch.first : stretch.end]]
         level = np.mean(measured[here]) if len(here) else 0.0  # about it squares do not cancel
         # with rows of zeros the factors of few samples are as large as those of many
         missing = np.zeros(max(0, NODES - len(here)))
         y = np.append(measured[here] - level, missing)
-        polynomials = np.vstack([panel.polynomials(times, here), np.zeros((len(missing), NODES))])
+        polynomials = np.vstack([stretch.polynomials(times, here), np.zeros((len(missing), NODES))])
         factor, triangle = np.linalg.qr(polynomials)
-        maps[k] = triangle @ np.linalg.inv(panel.polynomials(times, panel.nodes))
+        maps[k] = triangle @ np.linalg.inv(stretch.polynomials(times, stretch.nodes))
         along = y @ factor
         theirs[k] = along + maps[k].sum(axis=1) * level
         left = y - factor @ along
@@ -234,7 +234,7 @@ def _compressed_channel(
     return CompressedChannel(
         **{each.name: getattr(channel, each.name) for each in fields(Channel)},
         alone=np.searchsorted(rows, own),
-        nodes=np.searchsorted(rows, np.stack([panel.nodes for panel in panels])),
+        nodes=np.searchsorted(rows, np.stack([stretch.nodes for stretch in stretches])),
         maps=maps,
         theirs=np.concatenate([measured[own], theirs.ravel()]),
         rest=float(np.sqrt(rest)),
@@ -243,8 +243,8 @@ def _compressed_channel(
 
 def _divided(
     whole: Experiment, residuals: Residuals, curves_of: Callable[[Array], Array]
-) -> Iterator[Panel]:
-    """Yield the panels of a record, in the order of time; ``curves_of`` times are its response."""
+) -> Iterator[Stretch]:
+    """Yield the stretches of a record in their order; ``curves_of`` times are its response."""
     times = whole.simulator.times
     some = times[:: -(-len(times) // SCALED)]
     tolerance = OF_DERIVATIVES * np.max(np.abs(curves_of(some)), axis=0)
@@ -258,28 +258,28 @@ def _divided(
         curves = curves_of(times[block:behind])
         inside = divisions[(divisions > block) & (divisions < behind)]
         bounds = np.unique([block, *inside, behind]).tolist()
-        waiting = [Panel(*pair) for pair in pairwise(bounds)][::-1]
+        waiting = [Stretch(*pair) for pair in pairwise(bounds)][::-1]
         while waiting:
-            panel = waiting.pop()
-            if panel.size >= LEAST_PANEL and _lies_far(panel, times, *changes):
-                own = panel.with_nodes(times)
-                here = curves[panel.first - block : panel.end - block]
+            stretch = waiting.pop()
+            if stretch.size >= LEAST_STRETCH and _lies_far(stretch, times, *changes):
+                own = stretch.with_nodes(times)
+                here = curves[stretch.first - block : stretch.end - block]
                 if len(own.nodes) and own.matches(times, here, tolerance):
                     yield own
                     continue
-            if panel.size >= 2 * LEAST_PANEL:
-                middle = _middle(panel, grid)
-                waiting += [Panel(middle, panel.end), Panel(panel.first, middle)]
+            if stretch.size >= 2 * LEAST_STRETCH:
+                middle = _middle(stretch, grid)
+                waiting += [Stretch(middle, stretch.end), Stretch(stretch.first, middle)]
             else:
-                yield panel
+                yield stretch
 
 
-def _middle(panel: Panel, grid: NDArray[np.int64]) -> int:
-    """Row at which to divide a panel: best at a point of the grid, where a response has corners."""
-    middle = (panel.first + panel.end) // 2
+def _middle(stretch: Stretch, grid: NDArray[np.int64]) -> int:
+    """Row at which to divide a stretch: best a point of the grid, where a response has corners."""
+    middle = (stretch.first + stretch.end) // 2
     point = int(grid[min(int(np.searchsorted(grid, middle)), len(grid) - 1)])
-    least = LEAST_PANEL // 2
-    return point if panel.first + least <= point <= panel.end - least else middle
+    least = LEAST_STRETCH // 2
+    return point if stretch.first + least <= point <= stretch.end - least else middle
 
 
 def _curves(
@@ -308,9 +308,9 @@ def _changes(whole: Experiment, residuals: Residuals) -> tuple[Array, Array]:
     return starts, ends
 
 
-def _lies_far(panel: Panel, times: Array, starts: Array, ends: Array) -> bool:
-    """Test that nothing changes within a panel, nor just before it."""
-    low, high = times[panel.first], times[panel.end - 1]
+def _lies_far(stretch: Stretch, times: Array, starts: Array, ends: Array) -> bool:
+    """Test that nothing changes within a stretch, nor just before it."""
+    low, high = times[stretch.first], times[stretch.end - 1]
     if np.any((starts < high) & (ends >= low)):
         return False
     before = ends[ends < low]
