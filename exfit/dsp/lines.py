@@ -30,6 +30,7 @@ MOST_FILLED_IN = 4  # times its samples: a rest with longer gaps shows no line
 FEWEST_PERIODS_AT_REST = 8.0  # in the rest: with fewer a line is like a drift
 BY_CHANCE = 1e-5  # probability that white noise has a line as large: a likelier one is none
 LEAST_SHARE = 0.4  # of the standard deviation at rest: a smaller amplitude does no harm
+LEAST_EXPLAINED = LEAST_SHARE**2 / 8.0  # a quarter of what a line so large explains at rest
 SLOW = 5.0  # Hz: what oscillates more slowly is the grid or the unit, and no ripple
 MAINS = (50.0, 60.0)  # Hz
 HARMONICS = (1, 2, 3, 6, 12)  # of the mains that bridges and recorders leave
@@ -61,12 +62,16 @@ def largest_line(
     kept: Mask,
     slopes: Array | None = None,
     within: Range = (0.0, inf),
+    by_chance: float = 1.0,
+    least_explained: float = 0.0,
 ) -> Line:
     """Return the largest line in errors (kept,) at the kept ones of the instants (M,), s.
 
     ``slopes`` (kept, N) are the derivatives of the errors to what a fit moves: the line is found
     together with the linear change of these. It lies ``within`` a range (Hz). Raises ValueError
-    where the clock is uneven, or where the record shows too few frequencies.
+    where the clock is uneven, where the record shows too few frequencies, where white noise has as
+    large a line with a higher probability than ``by_chance``, and where it explains less than a
+    share of the squares of the errors, ``least_explained``.
     """
     spacing = 1.0 / (len(time) * even_step(time, "a line"))
     filled = np.zeros(len(time))
@@ -79,6 +84,11 @@ def largest_line(
     if np.count_nonzero(power) < FEWEST_FREQUENCIES or not inside.any():
         raise ValueError(f"{len(time)} samples show no line there")
     nearest = int(np.argmax(np.where(inside, power, 0.0)))
+    share = float(power[nearest] / np.sum(power))
+    counts = int(np.count_nonzero(power)), int(np.count_nonzero(inside))
+    p_value = share_by_chance(share, *counts)
+    if p_value > by_chance:
+        raise ValueError(f"no line stands out of white noise: probability {p_value:.2g}")
     about = 0.5 * float(time[0] + time[-1])
     basis = np.zeros((len(errors), 0))
     if slopes is not None:
@@ -89,14 +99,13 @@ def largest_line(
     near = np.clip(even, *within)
     others, t = errors - basis @ (basis.T @ errors), time[kept] - about
     explained = np.where(near == even, _explained(others, even, t, basis), np.nan)
-    least = np.max(explained, initial=0.0, where=explained > 0.0) - NEARLY_BEST * others @ others
-    candidates = np.flatnonzero(~(explained < least))
+    largest, squares = np.max(explained, initial=0.0, where=explained > 0.0), others @ others
+    if largest < least_explained * squares:
+        raise ValueError(f"no line explains {100.0 * least_explained:.2g} % of the squares")
+    candidates = np.flatnonzero(~(explained < largest - NEARLY_BEST * squares))
     fits = [_regression(others, cosine_and_sine(near[k], t), basis) for k in candidates]
     first = int(np.argmin([rest for _, rest in fits]))
     best, (cosine, sine) = candidates[first], fits[first][0].tolist()
-    share = float(power[nearest] / np.sum(power))
-    counts = int(np.count_nonzero(power)), int(np.count_nonzero(inside))
-    p_value = share_by_chance(share, *counts)
     return Line(float(near[best]), cosine, sine, about, p_value)
 
 
@@ -210,9 +219,11 @@ def ripple_at_rest(time: Array, samples: Array, rests: list[tuple[float, float]]
     level = level - np.polyval(np.polyfit(way, level, 2), way)
     within = (FEWEST_PERIODS_AT_REST / (spacing * len(even)), 0.5 / spacing)
     try:
-        line = largest_line(even, level, np.ones(len(even), bool), within=within)
+        line = largest_line(
+            even, level, np.ones(len(even), bool), None, within, BY_CHANCE, LEAST_EXPLAINED
+        )
     except ValueError:
         return None
-    if line.p_value > BY_CHANCE or line.amplitude < LEAST_SHARE * float(np.std(level)):
+    if line.amplitude < LEAST_SHARE * float(np.std(level)):
         return None
     return Ripple(line.frequency, line.amplitude, 1.0 / spacing)

@@ -35,7 +35,7 @@ LAGS_IN_CHAIN = (1, 2, 3, 4)  # whose step responses are the shapes that a rise 
 LAGS = np.geomspace(0.02, 8.0, 14)  # each, of the time that the rise takes
 SHORTEST_LAG = 0.02  # of a sample: with it the rise is a jump
 TRIED_INSTANTS = 120
-TRIED_TOGETHER = 60  # of these: their shapes stay in the cache of the processor
+TRIED_TOGETHER = 40  # of these: their shapes stay in the cache of the processor
 SOUGHT_BEFORE = 1.5  # times the rise: how long before its first sample the response may set out
 COMPARED_RISE, LESS_OF_IT = 0.5, 0.5  # of the first move, and of that, until a shape fits
 LEAST_RISE = 6.0  # times the noise: less of a rise shows no shape
@@ -420,23 +420,25 @@ def _costs(time: Array, samples: Array, instants: Array) -> Array:
     lags = np.maximum(LAGS * float(time[-1] - instants[0]), SHORTEST_LAG * median_step(time))
     y = samples - np.mean(samples)
     y -= np.mean(y)  # of a small move on a large level
+    beside = np.column_stack([y, np.ones(len(y))])
     costs = np.full(len(instants), y @ y)
     for begin in range(0, len(instants), TRIED_TOGETHER):
         tried = slice(begin, begin + TRIED_TOGETHER)
         moved = int(np.searchsorted(time, instants[begin], side="right"))  # before, shapes are 0
-        ago = np.maximum(time[moved:] - instants[tried, None], 0.0)[:, None, :] / lags[:, None]
+        since = np.maximum(time[moved:] - instants[tried, None], 0.0)
+        ago = (since[:, None, :] / lags[:, None]).reshape(-1, len(time) - moved)
         # of a chain of n equal lags: 1 - exp(-x) (1 + x + ... + x^(n-1) / (n-1)!)
         term = np.exp(-ago)
         shape = 1.0 - term
+        gains = np.zeros(len(ago))
         for order in LAGS_IN_CHAIN:
             if order > 1:
                 term *= ago
                 term /= order - 1
                 shape -= term
-            squares = np.einsum("nlm,nlm->nl", shape, shape)
-            size = squares - np.sum(shape, axis=-1) ** 2 / len(time)  # without the mean
-            gain = np.divide(
-                (shape @ y[moved:]) ** 2, size, out=np.zeros_like(size), where=size > 0.0
-            )
-            costs[tried] = np.minimum(costs[tried], y @ y - np.max(gain, axis=1))
+            along, total = (shape @ beside[moved:]).T
+            size = np.einsum("nm,nm->n", shape, shape) - total**2 / len(time)  # without the mean
+            np.divide(along**2, size, out=along, where=size > 0.0)
+            np.maximum(gains, along, out=gains, where=size > 0.0)
+        costs[tried] -= np.max(gains.reshape(-1, len(lags)), axis=1)
     return costs

@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from itertools import pairwise
 
 from exfit.records.units import OTHER_UNITS, bare, quantity_of
@@ -128,10 +129,10 @@ def read_name(name: str, unit: str | None) -> NameReading:
         return reading
     whole, words = " ".join(tokens(bare(name))), words_of(bare(name))
     kinds = {KINDS[word]: word for word in reversed(words) if word in KINDS}
-    named = (row for row in ROWS if whole in map(folded, row.words))
+    named = (row for row in ROWS if whole in _folded_words(row.words))
     row = next(named, None)
     if row is not None:  # an own word of a signal, though it may be joined of others
-        order = [folded(word) for word in row.words].index(whole)
+        order = _folded_words(row.words).index(whole)
         doubts = DOUBTS.get(whole, ())
         reading = NameReading(row.symbol, Clarity.OWN, _named(whole), doubts, order)
     else:
@@ -165,7 +166,7 @@ def _own(words: tuple[str, ...]) -> NameReading | None:
         for row in ROWS
         for clarity, own in ((Clarity.OWN, row.words), (Clarity.VAGUE, row.vague_words))
         for order, word in enumerate(own)
-        if f" {folded(word)} " in text
+        if f" {_folded_words(own)[order]} " in text
     ]
     return min(readings, key=lambda reading: (reading.clarity, -len(reading.why)), default=None)
 
@@ -275,6 +276,11 @@ def _named(*words: str) -> str:
 
 
 # ---- words
+
+
+@cache
+def _folded_words(words: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(map(folded, words))
 
 
 def folded(text: str) -> str:

@@ -16,10 +16,16 @@ def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
 
     The same numbers as `np.median`, which imports numpy.ma: an eighth of the time of a short fit.
     """
-    samples = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    samples = np.asarray(values, dtype=np.float64)
+    if axis not in (-1, samples.ndim - 1):
+        samples = np.moveaxis(samples, axis, -1)
     count = samples.shape[-1]
     low, high = (count - 1) // 2, count // 2
     parted = np.partition(samples, (low, high, count - 1), axis=-1)
+    if samples.ndim == 1 and not keepdims:
+        return np.float64(
+            parted[-1] if np.isnan(parted[-1]) else 0.5 * (parted[low] + parted[high])
+        )
     middle = 0.5 * (parted[..., low] + parted[..., high])
     middle = np.where(np.isnan(parted[..., -1]), np.nan, middle)
     return np.expand_dims(middle, axis) if keepdims else middle[()]
