@@ -73,6 +73,7 @@ class LocatedTrace(NamedTuple):
     outputs: tuple[Node, ...]
     guard: Node
     guard_rate: Node
+    rates: tuple[Node, ...]  # of the states, also of those that follow a limit
     output_rates: tuple[Node, ...]
     clamp_rates: tuple[Node, ...]  # of the clamped states, as the inputs move
 
@@ -162,6 +163,10 @@ def located(traced: Trace, inputs: Sequence[str], names: Sequence[str]) -> Locat
         outputs=outputs,
         guard=guard,
         guard_rate=decide.rate(guard),
+        rates=tuple(
+            decide.rate(frozen(x)) if any(_moves(side) for side in sides if side.state == k) else f
+            for k, (x, f) in enumerate(zip(traced.x, slopes, strict=True))
+        ),
         output_rates=tuple(tangents(outputs, dict(zip(traced.x, w, strict=True)) | driven)),
         clamp_rates=tuple(tangents(traced.clamped, driven)),
     )

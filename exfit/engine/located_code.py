@@ -144,7 +144,13 @@ class _Run(CrossingSearch):
         for kind in self.kinds:
             for row, node in enumerate(kind.given.x):
                 w.store(self.get(self.x[node]), f"%{kind.mark}x", row, kind.shape)
-                w.store(self.get(self.f[node]), f"%{kind.mark}f", row, kind.shape)
+        if self.wide:
+            # the next segment may begin at an instant that moves
+            u = self.inputs(self.number(1.0), rates=True)
+            values = {**self.fixed, **u, **self.values_of(self.x), **self.modes_now()}
+            w.prepare(self.run.rates, values)
+            for row, rate in enumerate(w.results(self.run.rates, values, self.narrow)):
+                w.store(rate, "%f", row, self.narrow)
         w.put("ret void")
         arrays = ["p", "r", "x", "f", "out"]
         if self.wide:
@@ -173,7 +179,7 @@ class _Run(CrossingSearch):
             *run.modes.final,
         ]
         if self.wide:
-            targets += [run.guard_rate, *run.output_rates, *run.clamp_rates]
+            targets += [run.guard_rate, *run.rates, *run.output_rates, *run.clamp_rates]
         w.prepare([n for n in in_order(targets) if not n.varies and n.op != "symbol"], fixed)
         return fixed
 
@@ -415,7 +421,7 @@ class _Run(CrossingSearch):
             return ""
         w, run, shape = self.w, self.run, self.broad
         values = {**self.fixed, **u, **x, **old}
-        w.prepare([self.wide.guard, run.guard_rate], values)
+        w.prepare([self.wide.guard, run.guard_rate, *run.rates], values)
         rate = w.results([run.guard_rate], values, self.narrow)[0]
         moves = self.test("ogt", self.size(rate), self.number(STANDS))
         inverse = self.op("fdiv", self.number(-1.0), self.pick(moves, rate, self.number(1.0)))
@@ -425,8 +431,10 @@ class _Run(CrossingSearch):
         given = w.load("%dtau", 0, shape)
         fresh = self.get(self.fresh)
         shift = w.let(f"select i1 {fresh}, {shape.type} {given}, {shape.type} {crossing}")
-        for node, d in zip(self.traced.x, self.wide.given.x, strict=True):
-            x[d] = w.add_product(shape, x[d], shift, w.spread(f[node], shape))
+        rates = w.results(run.rates, values, self.narrow)
+        for n, rate, d in zip(self.traced.x, rates, self.wide.given.x, strict=True):
+            slope = self.pick(fresh, f[n], rate)
+            x[d] = w.add_product(shape, x[d], shift, w.spread(slope, shape))
         return shift
 
     def _clamped_tangents(self, values: Values, shift: str) -> Values:
