@@ -163,12 +163,20 @@ def located(traced: Trace, inputs: Sequence[str], names: Sequence[str]) -> Locat
         outputs=outputs,
         guard=guard,
         guard_rate=decide.rate(guard),
-        rates=tuple(
-            decide.rate(frozen(x)) if any(_moves(side) for side in sides if side.state == k) else f
-            for k, (x, f) in enumerate(zip(traced.x, slopes, strict=True))
-        ),
+        rates=_rates(traced, slopes, sides, decide),
         output_rates=tuple(tangents(outputs, dict(zip(traced.x, w, strict=True)) | driven)),
         clamp_rates=tuple(tangents(traced.clamped, driven)),
+    )
+
+
+def _rates(
+    traced: Trace, slopes: Sequence[Node], sides: Sequence[LimitSide], decide: "_Decisions"
+) -> tuple[Node, ...]:
+    """How fast the states move, also those that follow a limit."""
+    following = {side.state for side in sides if _moves(side)}
+    return tuple(
+        decide.rate(decide.frozen(x)) if k in following else slope
+        for k, (x, slope) in enumerate(zip(traced.x, slopes, strict=True))
     )
 
 
