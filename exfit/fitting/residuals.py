@@ -177,8 +177,8 @@ class Residuals:
         self._count(len(self.experiments))
         values, moves = self.values(theta), self.moves(theta)
         each = [experiment.tangents(values, moves) for experiment in self.experiments]
-        errors = np.concatenate([errors for errors, _ in each])
-        return errors, np.concatenate([slopes for _, slopes in each])
+        errors = _stacked([errors for errors, _ in each])
+        return errors, _stacked([slopes for _, slopes in each])
 
     def exact(self, theta: Array) -> Array:
         """Return the exact Jacobian (samples + priors, N)."""

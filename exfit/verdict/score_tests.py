@@ -161,9 +161,11 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     if evidence.weighted_by_noise:
         extended, _ = parts("INPUT_NOISE")["without bias"].load()(extended, theta)
     errors, slopes = extended.errors(theta)
-    own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
+    slopes /= slopes_of(extended, theta)
+    own, others = np.split(slopes, [count], axis=1)
     column = {free.name: each for free, each in zip(added, others.T, strict=True)}
-    directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
+    others[:, : len(of_test)] *= [held.size for held in of_test]
+    directions = [*zip(of_test, others.T, strict=False)]
     for names in _together([*fixed]):
         direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
         directions.append((_held_value(evidence, names), direction))

@@ -1,6 +1,7 @@
 """How all figures look, and how one becomes a file."""
 
 import warnings
+from collections import defaultdict
 from io import BytesIO
 from typing import Any
 
@@ -12,6 +13,7 @@ from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
 from matplotlib.ticker import LogFormatter
+from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
 MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
@@ -19,7 +21,8 @@ GREEN = "#2f855a"
 WIDTH = 9.0  # inches
 DPI = 120
 MILLI = 1e3
-PAD = 5.0 / 72.0  # inches around the axes with their labels
+POINTS = 72.0  # in an inch
+PAD = 5.0 / POINTS  # inches around the axes with their labels
 SMALLEST = 6.0  # points: letters of a title that is made to fit
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LONGEST_NAME = 20  # letters
@@ -70,16 +73,42 @@ def drawn(figure: Figure) -> NDArray[np.uint8]:
     canvas = FigureCanvasAgg(figure)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
-        figure.align_ylabels([axes for axes in figure.axes if axes.get_ylabel()])
+        ticks = _with_aligned_labels(figure, canvas)
         layout = figure.get_layout_engine()
         if layout is not None:
             layout.execute(figure)
-            if _fitted(figure):
+            other_ticks = _with_aligned_labels(figure, canvas) != ticks  # as axes have their size
+            if _fitted(figure) or other_ticks:
                 layout.execute(figure)
+                _with_aligned_labels(figure, canvas)
             figure.set_layout_engine("none")  # all has its place
         canvas.draw()
     figure.dpi = former
     return np.asarray(canvas.buffer_rgba())
+
+
+def _with_aligned_labels(figure: Figure, canvas: FigureCanvasAgg) -> list[int]:
+    """Place the labels of the vertical axes of a column in one line, left of all their ticks.
+
+    Return the room (pixels) of the ticks of each. Matplotlib's own alignment measures the ticks of
+    a column anew for each of its labels.
+    """
+    columns, renderer = defaultdict[int, dict[Axes, float]](dict), canvas.get_renderer()
+    for axes in figure.axes:
+        place, label = axes.get_subplotspec(), axes.yaxis.label
+        if place is None or not label.get_text() or str(axes.yaxis.label_position) != "left":
+            continue
+        label.set_visible(False)
+        ticks, left = axes.yaxis.get_tightbbox(renderer), axes.get_window_extent().x0
+        label.set_visible(True)
+        room = 0.0 if ticks is None else max(left - ticks.x0, 0.0)
+        columns[place.colspan.start][axes] = room
+    for column in columns.values():
+        for axes in column:
+            left = -max(column.values()) / figure.dpi - axes.yaxis.labelpad / POINTS
+            away = ScaledTranslation(left, 0.0, figure.dpi_scale_trans)
+            axes.yaxis.set_label_coords(0.0, 0.5, axes.transAxes + away)
+    return [round(max(column.values())) for column in columns.values()]
 
 
 def _fitted(figure: Figure) -> bool:
