@@ -82,7 +82,8 @@ class LocatedKernel:
 
         engine = compiled(f"located {lanes} {text_of(system, self.outputs)}", ir)
         self._call = function(engine, "located_runs", "ipiip")
-        self._sizes = np.array([len(system.setpoints), len(system.states), len(system.states)])
+        sizes = (len(system.setpoints), len(system.states), len(system.states))
+        self._lengths = (*(size * lanes for size in sizes), 0, 0, 0, 0)
 
     def samples(
         self, p: Array, courses: Sequence[LocatedCourse], parts: NDArray[np.int64]
@@ -92,20 +93,20 @@ class LocatedKernel:
         Those with the same course and the same sub-steps run side by side.
         """
         count, lanes, first = len(p), self.lanes, courses[0]
-        jobs = np.arange(count)[:, None] if lanes == 1 else _side_by_side(parts, lanes)
-        together = p if lanes == 1 else np.ascontiguousarray(p[jobs].transpose(0, 2, 1))
+        alone = lanes == 1
+        jobs = np.arange(count)[:, None] if alone else _side_by_side(parts, lanes)
+        together = p if alone else np.ascontiguousarray(p[jobs].transpose(0, 2, 1))
         out = np.empty((len(jobs), first.samples, len(self.outputs), lanes))
-        spans = _spans(courses, parts[jobs[:, 0]], jobs[:, 0])
+        spans = _spans(courses, parts if alone else parts[jobs[:, 0]], jobs[:, 0])
         table = np.zeros((len(jobs), len(LOCATED_JOB)), np.int64)
-        for column, array in ((0, together), (5, out)):
-            table[:, column] = places(array, len(jobs))
+        table[:, 0], table[:, 5] = places(together, len(jobs)), places(out, len(jobs))
         table[:, 4] = places(spans, len(jobs), np.int64)
-        work, scratch = work_space([*(self._sizes * lanes), 0, 0, 0, 0])
+        work, scratch = work_space(self._lengths)
         self._call(
             len(jobs), address(table, np.int64), len(first.segments), 0, address(work, np.int64)
         )
         del scratch
-        if lanes == 1:
+        if alone:
             return out[..., 0]
         samples = np.empty((count, *out.shape[1:3]))
         samples[jobs] = out.transpose(0, 3, 1, 2)
@@ -133,7 +134,7 @@ class LocatedTangentKernel:
         traced = text_of(system, self.outputs)
         engine = compiled(f"located {tuple(free)} {tuple(moving)} {directions} {traced}", ir)
         self._call = function(engine, "located_runs", "ipiip")
-        self._sizes = [len(system.setpoints), len(system.states), len(system.states)]
+        self._sizes = (len(system.setpoints), len(system.states), len(system.states))
 
     def samples(
         self,
@@ -173,9 +174,9 @@ class LocatedTangentKernel:
             ):
                 table[:, column] = places(array, count)
             table[:, 4] = places(spans, count, np.int64)
-        states = np.array(self._sizes)
         inputs = (first.longest + 1) * self.moving * width
-        work, scratch = work_space([*states, *(states * width), inputs])
+        of_states = (*self._sizes, *(size * width for size in self._sizes))
+        work, scratch = work_space((*of_states, inputs))
         self._call(
             blocks * count,
             address(tables, np.int64),
@@ -199,7 +200,9 @@ def _padded(array: Array, width: int) -> Array:
 
 def _spans(courses: Sequence[LocatedCourse], parts: NDArray[np.int64], sets: Table) -> Table:
     """Tables of the segments of jobs, with the sub-steps of each."""
-    if len(courses) == 1:
+    if len(sets) == 1:
+        spans = courses[0].table[None].copy()
+    elif len(courses) == 1:
         spans = np.repeat(courses[0].table[None], len(sets), axis=0)
     else:
         spans = np.array([courses[k].table for k in sets])

@@ -6,6 +6,7 @@ Arrays are given by their addresses; a call releases the interpreter's lock.
 import ctypes
 import threading
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -208,22 +209,28 @@ class Sampler:
     def _work(self, courses: Courses) -> tuple[Table, Array]:
         """Lay out the work space of a job: its addresses, and this thread's buffer with it."""
         setpoints, states, outputs, sets, directions, moving = self.sizes
-        values = np.array([setpoints, states, courses.rows * outputs]) * sets
+        values = [size * sets for size in (setpoints, states, courses.rows * outputs)]
         of_inputs = courses.longest * moving * directions
-        return work_space([*values, *(values * directions), of_inputs])
+        return work_space((*values, *(size * directions for size in values), of_inputs))
 
 
-def work_space(lengths: Sequence[int]) -> tuple[Table, Array]:
-    """Lay out arrays of so many numbers: their addresses, and this thread's buffer with them."""
+@cache
+def _layout(lengths: tuple[int, ...]) -> tuple[Table, int]:
+    """Offsets of arrays of so many numbers, each at a line of the cache, and the size of all."""
     ends = np.cumsum(-(-np.array(lengths) // CACHE_LINE) * CACHE_LINE)
-    size = int(ends[-1]) + CACHE_LINE
+    return 8 * np.array([0, *ends[:-1]]), int(ends[-1]) + CACHE_LINE
+
+
+def work_space(lengths: tuple[int, ...]) -> tuple[Table, Array]:
+    """Lay out arrays of so many numbers: their addresses, and this thread's buffer with them."""
+    offsets, size = _layout(lengths)
     scratch: Array | None = getattr(_scratch, "buffer", None)
     if scratch is None or len(scratch) < size:
         scratch = np.empty(size)
         if size <= MOST_KEPT:
             _scratch.buffer = scratch
     begin = -(-address(scratch) // (8 * CACHE_LINE)) * (8 * CACHE_LINE)
-    return begin + 8 * np.array([0, *ends[:-1]]), scratch
+    return begin + offsets, scratch
 
 
 def places(array: NDArray[Any], count: int, kind: type = np.float64) -> Table:

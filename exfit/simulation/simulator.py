@@ -391,14 +391,15 @@ class Simulator:
         tests: "Sequence[Simulator] | None",
     ) -> tuple[Array, Counts]:
         p, parts = self.prepared(sets)
-        alike = tests is None or all(
-            test._located is tests[0]._located and test._sampling is tests[0]._sampling
-            for test in tests
-        )
-        courses = [test.located_course() for test in (tests or [self])[: 1 if alike else None]]
+        if len(sets) == 1 and tests is None and self._share == 1.0 and parts[0] != NO_SUBSTEPS:
+            course = [self.located_course()]
+            return located_kernel(self.system, outputs, 1).samples(p, course, parts), parts
+        every = tests or [self]
+        alike = {(id(test._located), id(test._sampling)) for test in every}
+        courses = [test.located_course() for test in (every if len(alike) > 1 else every[:1])]
         samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-        for lanes, group in groups(parts, SIDE_BY_SIDE if alike else 1):
-            own = courses if alike else [courses[k] for k in group]
+        for lanes, group in groups(parts, SIDE_BY_SIDE if len(courses) == 1 else 1):
+            own = courses if len(courses) == 1 else [courses[k] for k in group]
             code = located_kernel(self.system, outputs, lanes)
             samples[group] = code.samples(p[group], own, parts[group])
         if self._share != 1.0:
