@@ -169,13 +169,15 @@ class Residuals:
         """Return the residuals (samples + priors,)."""
         return self.residuals([theta])[0]
 
-    def errors(self, theta: Array) -> tuple[Array, Array]:
+    def errors(self, theta: Array, some: Sequence[int] | None = None) -> tuple[Array, Array]:
         """Return the weighted errors (samples,) and their exact derivatives (samples, N).
 
-        No loss is applied, and no prior is among them.
+        They are those to ``some`` of the free parameters, where these are given. No loss is
+        applied, and no prior is among them.
         """
         self._count(len(self.experiments))
         values, moves = self.values(theta), self.moves(theta)
+        moves = moves if some is None else [moves[k] for k in some]
         each = [experiment.tangents(values, moves) for experiment in self.experiments]
         errors = _stacked([errors for errors, _ in each])
         return errors, _stacked([slopes for _, slopes in each])

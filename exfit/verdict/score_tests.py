@@ -1,6 +1,6 @@
 """Whether a record contradicts what its case holds fixed: a score test of each such value."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import erfc, exp, hypot, log, sqrt
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from exfit.errors import SimulationError
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
-from exfit.fitting.residuals import Residuals
+from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slices, slopes_of
 from exfit.inference.whitening import BIAS_KNOWN_TO
@@ -148,34 +148,56 @@ def _score(
     return Contradiction((change / error) ** 2, held, change)
 
 
-def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]], Array]:
+def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Array]], Array]:
     """Return the linear model, and what each value that the case holds fixed does to the errors.
 
-    All derivatives are taken at once. A voltage that the test takes from the record is as uncertain
-    as a parameter.
+    As many derivatives as fit in memory are taken at once. A voltage that the test takes from the
+    record is as uncertain as a parameter.
     """
     extended, of_test, fixed = _left_open(evidence)
     count = len(evidence.solution.x)
-    added = extended.free[count:]
     theta = np.append(evidence.solution.x, extended.start[count:])
     if evidence.weighted_by_noise:
         extended, _ = parts("INPUT_NOISE")["without bias"].load()(extended, theta)
-    errors, slopes = extended.errors(theta)
-    slopes /= slopes_of(extended, theta)
-    own, others = np.split(slopes, [count], axis=1)
-    column = {free.name: each for free, each in zip(added, others.T, strict=True)}
-    others[:, : len(of_test)] *= [held.size for held in of_test]
-    directions = [*zip(of_test, others.T, strict=False)]
-    for names in _together([*fixed]):
-        direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
-        directions.append((_held_value(evidence, names), direction))
-    directions = [each for each in directions if np.isfinite(each[1]).all()]
+    sizes = slopes_of(extended, theta)
+    errors, slopes = extended.errors(theta, range(count + len(of_test)))
+    slopes /= sizes[: slopes.shape[1]]
+    directions = [
+        (held, held.size * each)
+        for held, each in zip(of_test, slopes[:, count:].T, strict=True)
+        if np.isfinite(each).all()
+    ]
     from_record = [direction for held, direction in directions if not held.words]
-    known = np.column_stack([own[:, moving(evidence)], *from_record])
+    known = np.column_stack([slopes[:, :count][:, moving(evidence)], *from_record])
     influence, _ = evidence.residuals.influence(errors)
-    tested = [each for each in directions if each[0].words]
-    tested.extend(_of_channels(evidence, errors))
-    return linear_model(influence, known), tested, extended.shift
+
+    def tested() -> Iterator[tuple[Held, Array]]:
+        yield from (each for each in directions if each[0].words)
+        place = {free.name: k for k, free in enumerate(extended.free)}
+        for several in _at_once(_together([*fixed]), MOST_NUMBERS_AT_ONCE // len(errors)):
+            names = [name for each in several for name in each]
+            _, own = extended.errors(theta, [place[name] for name in names])
+            column = dict(zip(names, own.T, strict=True))
+            for each in several:
+                by_name = [fixed[name] / sizes[place[name]] * column[name] for name in each]
+                direction = np.sum(by_name, axis=0)
+                if np.isfinite(direction).all():
+                    yield _held_value(evidence, each), direction
+        yield from _of_channels(evidence, errors)
+
+    return linear_model(influence, known), tested(), extended.shift
+
+
+def _at_once(together: Iterable[tuple[str, ...]], most: int) -> Iterator[list[tuple[str, ...]]]:
+    """Yield what belongs together in lists of no more names than ``most``, but one at least."""
+    several = list[tuple[str, ...]]()
+    for names in together:
+        if several and sum(map(len, several)) + len(names) > most:
+            yield several
+            several = []
+        several.append(names)
+    if several:
+        yield several
 
 
 def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, float]]:
