@@ -5,12 +5,14 @@ The keys in history.csv and result.json are others: `results.tables.HISTORY`.
 
 from collections.abc import Callable, Iterable, Iterator
 from math import isnan
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from exfit.output.blocks import Block, Note, Table, TableColumn, row
-from exfit.results.model import Iteration
 from exfit.results.tables import yes_or_no
 from exfit.util.vocabulary import HISTORY_PHASES
+
+if TYPE_CHECKING:
+    from exfit.results.model import Iteration
 
 COST = "cost f"
 GRADIENT = "gradient norm"
@@ -34,7 +36,7 @@ class IterationColumn(NamedTuple):
     """
 
     title: str
-    value: Callable[[Iteration], Value]
+    value: Callable[["Iteration"], Value]
     width: int
     form: str = ""
     expendable: int = 0
@@ -49,19 +51,19 @@ class IterationColumn(NamedTuple):
         """The title, in two lines where it is wider than the column."""
         return self.title if len(self.title) <= self.width else self.title.replace(" ", "\n")
 
-    def text(self, line: Iteration, missing: str = "-") -> str:
+    def text(self, line: "Iteration", missing: str = "-") -> str:
         """Write the value in a line; ``missing`` where there is none."""
         value = self.value(line)
         unknown = value in (None, "") or (isinstance(value, float) and isnan(value))
         return missing if unknown else format(value, self.form)
 
 
-def armijo_halvings(line: Iteration) -> int | None:
+def armijo_halvings(line: "Iteration") -> int | None:
     """Count how often Armijo's rule shortened a step: a full step of gn, never; None in lm."""
     return {"dgn": line.inner, "gn": 0}.get(line.phase)
 
 
-def rejected_trials(line: Iteration) -> int | None:
+def rejected_trials(line: "Iteration") -> int | None:
     """Count the trials that lm rejected, or gn; None in dgn, which shortens a step instead."""
     return line.inner if line.phase in REJECTING else None
 
@@ -80,7 +82,7 @@ COLUMNS = (
 )
 
 
-def iterations(history: Iterable[Iteration]) -> Iterator[Block]:
+def iterations(history: Iterable["Iteration"]) -> Iterator[Block]:
     """Yield the table of the iterations, and what its columns mean."""
     heads = tuple(
         TableColumn(each.heading, each.number, expendable=each.expendable) for each in COLUMNS

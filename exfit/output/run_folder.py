@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
 from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.results.tables import DIGITS, whole_table
@@ -119,6 +118,7 @@ def write_fit(result: "FitResult", folder: Path) -> FigureFiles:
 
 def figures_of_fit(result: "FitResult") -> PlannedFigures:
     """Return the figures of a fit."""
+    from exfit.case.schema import SINGLE
     from exfit.output import figures as plots
 
     plan: dict[str, PlannedFigure] = {}

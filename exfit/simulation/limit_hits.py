@@ -1,10 +1,12 @@
 """Which limits a response has met, for how long, and which limiters acted."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from exfit.plants import LIMITER_KINDS
-from exfit.simulation.simulator import Simulator
+
+if TYPE_CHECKING:
+    from exfit.simulation.simulator import Simulator
 
 LIMITER_PREFIXES = tuple(f"{kind}." for kind in LIMITER_KINDS)  # of what belongs to a limiter
 
@@ -40,7 +42,9 @@ class LimiterAction(NamedTuple):
         return f"{self.name} acts from {first:.4g} s to {last:.4g} s{times}"
 
 
-def limiter_actions(simulator: Simulator, values: Mapping[str, float]) -> tuple[LimiterAction, ...]:
+def limiter_actions(
+    simulator: "Simulator", values: Mapping[str, float]
+) -> tuple[LimiterAction, ...]:
     """Return the limiters of excitation that act in the response to these values, and when.
 
     Raises SimulationError where the start is no rest.

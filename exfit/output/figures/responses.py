@@ -26,7 +26,6 @@ from exfit.output.figures.style import (
 )
 from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.signals import label_of, unit_of_signal
-from exfit.simulation.simulator import Response
 from exfit.util.arrays import Array
 from exfit.util.text import percentage
 
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from exfit.records.channel_inspection import InspectedChannel
     from exfit.records.inspection import Inspection
     from exfit.runs.fits import FitSeries
+    from exfit.simulation.simulator import Response
 
 
 FAINT = 0.4  # opacity of what is not compared
@@ -132,7 +132,7 @@ def _limiters(panels_of_signals: Sequence[Axes], comparison: Comparison) -> None
         panels_of_signals[0].annotate(text, place, xycoords=corner, fontsize=SMALL)
 
 
-def response(simulated: Response, title: str) -> Figure:
+def response(simulated: "Response", title: str) -> Figure:
     """Return every signal of a simulation over time; vref and vt share an axis."""
     names = [name for name in simulated.signals if name not in (*VOLTAGES, *DRAWN_OTHERWISE)]
     ranges = {name: np.ptp(simulated.signals[name]) for name in names}
@@ -157,7 +157,7 @@ def response(simulated: Response, title: str) -> Figure:
     return figure
 
 
-def _voltages(axes: Axes, simulated: Response) -> None:
+def _voltages(axes: Axes, simulated: "Response") -> None:
     """Draw the reference and the voltage that follows it."""
     names = [name for name in VOLTAGES if name in simulated.signals]
     for name in names:
@@ -167,7 +167,7 @@ def _voltages(axes: Axes, simulated: Response) -> None:
     tidy(axes, f"{', '.join(names)} (pu)")
 
 
-def overview(title: str, simulated: Response) -> Figure:
+def overview(title: str, simulated: "Response") -> Figure:
     """Draw the voltages of a model with its typical data."""
     signals = [name for name in ("vt", "efd") if name in simulated.signals]
     figure, rows = stacked(0.6 + 2.2 * len(signals), len(signals))

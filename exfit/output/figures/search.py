@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from exfit.dsp.sampling import envelope
-from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.output.figures.style import (
     COLORS,
     GREEN,
@@ -29,8 +29,6 @@ from exfit.output.figures.style import (
     zero_line,
 )
 from exfit.output.iterations import COST, DAMPINGS, GRADIENT
-from exfit.results.comparisons import IterationResponses
-from exfit.results.model import FitResult, Minima
 from exfit.signals import label_of
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import (
@@ -40,7 +38,12 @@ from exfit.util.vocabulary import (
     PHASES,
     WEIGHTED_BY_NOISE,
 )
-from exfit.workflows.profiles import Profiles
+
+if TYPE_CHECKING:
+    from exfit.fitting.uncertainty import UncertaintyAnalysis
+    from exfit.results.comparisons import IterationResponses
+    from exfit.results.model import FitResult, Minima
+    from exfit.workflows.profiles import Profiles
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
@@ -66,7 +69,7 @@ BAR = 0.05  # width of the colour bar, of that of the map
 ERROR = "simulated\n- measured\n(1e-3 pu)"
 
 
-def convergence(result: FitResult) -> Figure:
+def convergence(result: "FitResult") -> Figure:
     """Return cost, gradient and damping over the iterations."""
     figure, axes = stacked(
         7.0, 3, f"{result.name}: {result.strategy}; {result.message}", sharex=True
@@ -89,7 +92,7 @@ def convergence(result: FitResult) -> Figure:
     return figure
 
 
-def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: str) -> None:
+def _by_phase(axes: Axes, result: "FitResult", values: Sequence[float], marker: str) -> None:
     numbers = [line.number for line in result.history]
     axes.plot(numbers, values, "-", color=MEASURED, linewidth=0.8)
     for phase in dict.fromkeys(line.phase for line in result.history):
@@ -105,7 +108,7 @@ def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: st
         )
 
 
-def trajectories(result: FitResult) -> Figure:
+def trajectories(result: "FitResult") -> Figure:
     """Return every free parameter over the iterations, between its bounds."""
     names = list(result.parameters)
     columns = min(3, len(names))
@@ -137,7 +140,7 @@ def trajectories(result: FitResult) -> Figure:
     return figure
 
 
-def waterfall(search: Minima, title: str) -> Figure:
+def waterfall(search: "Minima", title: str) -> Figure:
     """Return the costs that all descents led to, in rising order, with those they began at.
 
     Those ends are refuted whose minimum, the one at or next below them, is.
@@ -169,7 +172,7 @@ def waterfall(search: Minima, title: str) -> Figure:
     return figure
 
 
-def iterations(result: FitResult) -> Figure:
+def iterations(result: "FitResult") -> Figure:
     """Return the record and the response after each iteration, with the error, record by record.
 
     The colour shows the iteration, from the start in pale blue to the fit in red. Where a fit kept
@@ -217,7 +220,7 @@ def _colours(numbers: Sequence[int]) -> list[tuple[float, float, float, float]]:
     return [FADING(place) for place in places[: len(numbers)]]
 
 
-def _after_each(upper: Axes, lower: Axes, responses: IterationResponses) -> None:
+def _after_each(upper: Axes, lower: Axes, responses: "IterationResponses") -> None:
     """Draw the responses after some iterations, and their errors."""
     time, measured, last = responses.time, responses.measured, len(responses.numbers) - 1
     upper.plot(time, measured, ".", color=MEASURED, markersize=3, label="measured")
@@ -234,7 +237,7 @@ def _after_each(upper: Axes, lower: Axes, responses: IterationResponses) -> None
     tidy(lower, ERROR)
 
 
-def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
+def sensitivity(analysis: "UncertaintyAnalysis", title: str) -> Figure:
     """Draw the change of each signal over time for 1 % more of each parameter.
 
     What belongs to a record is left out.
@@ -260,7 +263,7 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     return figure
 
 
-def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
+def correlation(analysis: "UncertaintyAnalysis", title: str) -> Figure:
     """Return the correlations of the estimates as a map; what has none is left blank."""
     names, values = analysis.confidence.names, analysis.confidence.correlation.matrix
     side = max(4.2, 1.6 + 0.62 * len(names))
@@ -295,7 +298,7 @@ def smooth(at: Array, rise: Array) -> tuple[Array, Array]:
     return np.interp(between, places, at), np.interp(between, places, roots) ** 2
 
 
-def profiles(profiled: Profiles) -> Figure:
+def profiles(profiled: "Profiles") -> Figure:
     """Return the profile of each parameter: the rise of the cost in units of that at the limit."""
     columns = min(3, len(profiled.profiles))
     rows = -(-len(profiled.profiles) // columns)
