@@ -138,6 +138,7 @@ def located(traced: Trace, inputs: Sequence[str], names: Sequence[str]) -> Locat
         frozen(slope) if stop is None else _held_slope(frozen(stop.free), k, sides)
         for k, (slope, stop) in enumerate(zip(traced.slopes, stops, strict=True))
     )
+    outputs = tuple(frozen(output) for output in traced.outputs)
     driven = dict(zip(traced.u, v, strict=True))
     motion = dict(zip(traced.x, slopes, strict=True)) | driven
     decide = _Decisions(frozen, motion, gains)
@@ -151,7 +152,6 @@ def located(traced: Trace, inputs: Sequence[str], names: Sequence[str]) -> Locat
     first = {mode: condition for condition, mode in choices.modes.items()} | first
     final = {mode: mode for mode in choices.modes.values()} | final
     guard = reduce(_larger, guards, graph.constant(-NEVER))
-    outputs = tuple(frozen(output) for output in traced.outputs)
     return LocatedTrace(
         traced=traced,
         v=v,

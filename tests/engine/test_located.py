@@ -2,8 +2,14 @@
 
 import numpy as np
 import pytest
-from oracle import system_of, typical_values
+from oracle import EXCITERS, system_of, typical_values
 
+from exfit.engine.located import located
+from exfit.engine.system import trace
+from exfit.engine.trace import in_order
+from exfit.models import MODELS
+from exfit.models.blocks import quadratic
+from exfit.plants.playback import playback
 from exfit.simulation.inputs import Direction, Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
@@ -112,3 +118,14 @@ def test_a_sample_at_a_jump_shows_the_value_before_it_and_a_second_one_that_behi
     efd = test.samples(values("ST6B"), ("efd",))[0][:, 0]
     assert efd[0] == pytest.approx(efd[1], abs=1e-12)
     assert abs(efd[2] - efd[1]) > 0.1
+
+
+@pytest.mark.parametrize("model", EXCITERS)
+def test_every_choice_has_a_mode_also_one_that_only_an_output_makes(model):
+    system = playback(MODELS[model], quadratic, ("vt", "ifd", "p", "q"))
+    traced = trace(system, system.outputs)
+    run = located(traced, system.inputs, system.states)
+    computed = [*run.states, *run.slopes, *run.outputs, run.guard]
+    symbols = {node for node in in_order(computed) if node.op == "symbol" and node.varies}
+    known = {*traced.x, *traced.u, *run.v, *run.signs, *run.modes.bits}
+    assert symbols <= known
