@@ -39,6 +39,7 @@ FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, f
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
 CLOCKS = {1e3: "ms", 1e6: "microseconds", 60.0: "minutes", 50.0: "cycles of 50 Hz"}
+ENOUGH_SAMPLES = 30_000  # to tell windows of averages apart
 WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
 LATE = Nuisance("cause.delay", "delay")
 
@@ -211,6 +212,10 @@ def _likeliest_window(
     time = record.setup.record.time
     step = median_step(time)
     found, costs = finds_instant(experiment), dict[float, float]()
+    every = slice(None, None, -(-len(time) // ENOUGH_SAMPLES))
+    thinned = [replace(each, measured=each.measured[every]) for each in experiment.channels]
+    simulator = experiment.simulator.at_times(experiment.simulator.times[every])
+    experiment = replace(experiment, simulator=simulator, channels=tuple(thinned))
     for window in sorted({step, *(window for window in WINDOWS if window > step)}):
         if not window < 0.1 * np.ptp(time):
             continue

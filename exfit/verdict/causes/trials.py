@@ -9,6 +9,7 @@ import numpy as np
 
 from exfit import estimate
 from exfit.errors import SimulationError
+from exfit.fitting.compression import compressed
 from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
@@ -93,6 +94,7 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     own = {
         free.name: x for free, x in zip(evidence.residuals.free, evidence.solution.x, strict=True)
     }
+    residuals = compressed(residuals)
     start, (low, high) = residuals.start, residuals.bounds
     solution = np.array(
         [own.get(free.name, x) for free, x in zip(residuals.free, start, strict=True)]
