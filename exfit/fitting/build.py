@@ -15,6 +15,7 @@ from exfit.case.schema import (
     Unknown,
     start_value,
 )
+from exfit.engine.system import System
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, filtered_end, with_filter, without_masked
 from exfit.fitting.experiment import (
@@ -31,7 +32,10 @@ from exfit.fitting.system import system_of
 from exfit.plants import BREAKER, NETWORK, REFERENCES, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInput, SplinedInput
-from exfit.simulation.simulator import Simulator
+from exfit.simulation.simulator import LARGEST_STEP, Simulator
+from exfit.util.arrays import Array
+
+TWIN_STEP = 1e-3  # s, of what simulates beside another program
 
 
 def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:
@@ -56,7 +60,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     network = {} if view is case else _network_values(view)
     at = {**values, **network}
     inputs, found = _moved(view, recording, test, record, driving, switchings, references, at)
-    simulator = Simulator(system, inputs, record.time, case.simulation.step)
+    simulator = _simulator(case, system, inputs, record.time)
     delay = start_value(file.delay)
     compared = {*system.outputs}.difference(driving)
     experiment = Experiment(
@@ -272,7 +276,18 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
 
         test, recorded, _ = references_of(case, test, (0.0, duration))
     inputs = Inputs(0.0, duration, tuple(input_steps(case, test, values)), recorded)
-    return Simulator(system_of(case), inputs, times, case.simulation.step), {VT0: vt0}
+    return _simulator(case, system_of(case), inputs, times), {VT0: vt0}
+
+
+def _simulator(case: Case, system: System, inputs: Inputs, times: Array) -> Simulator:
+    """Simulator on the grid that a case gives, or the first one that is tried for its accuracy."""
+    step = case.simulation.step
+    if step != "auto":
+        return Simulator(system, inputs, times, step)
+    if case.external is not None:  # another program has a step of its own
+        return Simulator(system, inputs, times, TWIN_STEP)
+    accuracy = case.simulation.accuracy
+    return Simulator(system, inputs, times, LARGEST_STEP, located=True, accuracy=accuracy)
 
 
 def planned(case: Case, signals: Sequence[str] = ("vt",)) -> Experiment:

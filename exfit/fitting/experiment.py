@@ -187,7 +187,9 @@ class Experiment:
     def with_enough_substeps(self, values: Values) -> "Experiment":
         """Return the experiment with sub-steps enough all along the response to the values."""
         steps, delay = self.simulator.inputs.steps, self.simulator.delay
-        simulator = self.with_inputs(values).with_enough_substeps(self.parameters(values))
+        simulator = self.with_inputs(values).with_enough_substeps(
+            self.parameters(values), self.signals
+        )
         # moved back: what the values shift must not be shifted twice
         return replace(self, simulator=simulator.with_inputs(steps, delay))
 

@@ -123,7 +123,8 @@ def coarse_form(residuals: Residuals) -> Residuals:
     values, experiments = residuals.values(residuals.start), list[Experiment]()
     for experiment in residuals.experiments:
         own = experiment.simulator
-        coarse = own.remade(step=COARSENESS * own.step, least=1)
+        # where crossings are located the own grid is as coarse as the search can use
+        coarse = own if own.located else own.remade(step=COARSENESS * own.step, least=1)
         try:
             experiments.append(replace(experiment, simulator=coarse).with_enough_substeps(values))
         except SimulationError:

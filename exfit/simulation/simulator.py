@@ -37,6 +37,11 @@ POINTS_ALONG = 100  # of a response, where its sub-steps are checked
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 BESIDE_JUMP = 2.0  # steps: as far as the B-splines of a smooth jump reach on both grids
 REACH = 2.0  # of the fastest rate that a sub-step takes, where the step is chosen by its error
+LARGEST_STEP = 1e-2  # s, the first that is tried where an accuracy is asked for
+STEPS = tuple(k * 10.0**-n for n in (3, 4) for k in (5.0, 2.0, 1.0))  # s, the others
+SHORTEST_STEP, LARGEST_DIVISION = STEPS[-1], 10.0
+SAFE = 0.5  # of the accuracy: parameters move in a fit
+JUDGED = ("vt", "p", "q")  # signals by which a step is judged where none is compared
 READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
@@ -96,7 +101,8 @@ class Simulator:
     fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
     at ``times - delay``: before the start, where all is at rest, and after the end that there. A
     ``responder`` gives the response at these times in place of the equations, not that on the grid.
-    ``located``, the crossings of limits are found within a step, which starts anew from there.
+    ``located``, the crossings of limits are found within a step, which starts anew from there; with
+    an ``accuracy`` (pu) the step is one by which signals err by less, see ``with_enough_substeps``.
     """
 
     def __init__(
@@ -109,9 +115,11 @@ class Simulator:
         delay: float = 0.0,
         responder: Responder | None = None,
         located: bool = False,
+        accuracy: float | None = None,
     ) -> None:
         self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay, self.responder = step, least, delay, responder
+        self.accuracy = accuracy
         self._share = 1.0  # of the inputs
         self._course: tuple[tuple[int, int], LocatedCourse] | None = None
         self._located = LocatedTest(system.inputs, inputs, step, 1.0) if located else None
@@ -176,8 +184,12 @@ class Simulator:
         step: float | None = None,
         least: int | None = None,
         delay: float | None = None,
+        rough: bool = False,
     ) -> "Simulator":
-        """Make the simulator by equations of another system, test or grid; the rest stays."""
+        """Make the simulator by equations of another system, test or grid; the rest stays.
+
+        A ``rough`` one takes its step whatever its error.
+        """
         return Simulator(
             system or self.system,
             inputs or self.inputs,
@@ -186,6 +198,7 @@ class Simulator:
             least or self.least,
             self.delay if delay is None else delay,
             located=self.located,
+            accuracy=None if rough else self.accuracy,
         )
 
     def at_times(self, times: Array) -> "Simulator":
@@ -279,11 +292,31 @@ class Simulator:
         radius = float(spectral_radii(jacobians).max())
         return parts, substeps_for(system, self._reach, values, radius)
 
-    def with_enough_substeps(self, values: Values) -> "Simulator":
+    def with_enough_substeps(
+        self, values: Values, signals: tuple[str, ...] | None = None
+    ) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
 
-        Raises SimulationError where that response does not stay finite.
+        With an accuracy its step is divided until halving it would move no signal by more than
+        that. Raises SimulationError where that response does not stay finite.
         """
+        simulator = self._with_substeps(values)
+        if self.accuracy is None:
+            return simulator
+        judged = signals or tuple(name for name in JUDGED if name in self.system.outputs)
+        while simulator.step > SHORTEST_STEP:
+            errors = simulator.step_errors(values, judged or self.system.outputs, relative=True)
+            excess = max(errors.values()) / (SAFE * self.accuracy)
+            if not excess > 1.0:
+                break
+            # the error grows with the fourth power of the step
+            share = max(1.0 / LARGEST_DIVISION, min(0.5, excess**-0.25))
+            finer = max((s for s in STEPS if s <= share * simulator.step), default=SHORTEST_STEP)
+            finer_one = simulator.remade(step=finer, least=1).with_responder(self.responder)
+            simulator = finer_one._with_substeps(values)
+        return simulator
+
+    def _with_substeps(self, values: Values) -> "Simulator":
         simulator = self
         for _ in range(MOST_REPEATS):
             parts, required = simulator.substeps_along(values)
@@ -292,20 +325,34 @@ class Simulator:
             simulator = self.remade(least=required).with_responder(self.responder)
         return simulator
 
-    def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
+    def step_errors(
+        self, values: Values, outputs: tuple[str, ...], relative: bool = False
+    ) -> dict[str, float]:
         """Largest change of each output by halving every step, per unit.
 
-        At the points of the grid: a record with many more samples shows no more. Beside a smooth
-        jump of what is recorded the step itself is another there.
+        It is ``relative`` to the size of outputs that are larger than 1 pu.
+
+        With located crossings at the sample times, else at the points of the grid: a record with
+        many more samples shows no more. Beside a smooth jump of what is recorded the step itself is
+        another there.
         """
+        if self.located:
+            return self._changes(self.remade(), values, outputs, relative)
         times = distinct(np.concatenate([segment.times for segment in self._grid]))
         for change in self.inputs.steps:
             if change.smooth and change.signal not in REFERENCES:
                 times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
-        coarse = self.remade(times=times, delay=0.0)
+        return self._changes(self.remade(times=times, delay=0.0), values, outputs, relative)
+
+    @staticmethod
+    def _changes(
+        coarse: "Simulator", values: Values, outputs: tuple[str, ...], relative: bool
+    ) -> dict[str, float]:
         samples, parts = coarse.samples(values, outputs)
-        finer = coarse.remade(step=self.step / 2.0, least=parts)
+        finer = coarse.remade(step=coarse.step / 2.0, least=parts)
         moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
+        if relative:
+            moved /= np.maximum(np.max(np.abs(samples), axis=0), 1.0)
         return dict(zip(outputs, map(float, moved), strict=True))
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:

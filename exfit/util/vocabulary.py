@@ -19,11 +19,13 @@ PHASES: Mapping[str, str] = {
 FROM_FURTHER_STARTS = "search"  # in the history: the point that the search from them found
 WEIGHTED_BY_NOISE = "noise"  # in the history: the point where errors are weighted by its covariance
 COMPRESSED_ANEW = "samples"  # in the history: the point at which long records are compressed anew
+ON_FINER_GRID = "step"  # in the history: the point from which on the simulation takes shorter steps
 HISTORY_PHASES: Mapping[str, str] = {
     **PHASES,
     FROM_FURTHER_STARTS: "found from further starts",
     WEIGHTED_BY_NOISE: "weighted by the noise of the driving signals",
     COMPRESSED_ANEW: "long records compressed anew at the end of the search",
+    ON_FINER_GRID: "simulated with shorter steps, which the response found needs",
 }
 STRATEGIES: Mapping[str, str] = {
     "gn": "Gauss-Newton with full steps (a first one that fails is shortened once)",

@@ -32,6 +32,7 @@ from exfit.verdict.run_quality import (
     INVISIBLE,
     LARGEST_STEP_ERROR,
     other_levels,
+    step_remedy,
     typical_notes,
     unphysical_notes,
     unstable_rest_notes,
@@ -65,12 +66,12 @@ def notes(
             rmse = comparison.overlays[signal].rmse
             if change > min(max(COARSE * rmse, INVISIBLE), LARGEST_STEP_ERROR):
                 yield (
-                    f"halving the step of {case.simulation.step:g} s changes {signal} by "
-                    f"{change:.1e} pu, its error is {rmse:.1e} pu: reduce simulation.step"
+                    f"halving the step of {simulator.step:g} s changes {signal} by "
+                    f"{change:.1e} pu, its error is {rmse:.1e} pu: {step_remedy(simulator)}"
                 )
         used = simulator.substeps(at)
         if comparison.substeps > 2 * used:
-            step = case.simulation.step * used / comparison.substeps
+            step = simulator.step * used / comparison.substeps
             yield (
                 f"the response needs {comparison.substeps} sub-steps, {used} were taken: "
                 f"set simulation.step to {step:.2g}"

@@ -76,9 +76,17 @@ def step_error_notes(
         size = max(1.0, float(np.max(np.abs(simulated[signal]))))
         if errors[signal] > LARGEST_STEP_ERROR * size:
             yield (
-                f"halving the step of {case.simulation.step:g} s changes {signal} by "
-                f"{errors[signal]:.1e} pu: reduce simulation.step"
+                f"halving the step of {simulator.step:g} s changes {signal} by "
+                f"{errors[signal]:.1e} pu: {step_remedy(simulator)}"
             )
+
+
+def step_remedy(simulator: Simulator) -> str:
+    """What to do about a step that is too long; with located crossings it is the shortest one."""
+    accuracy = simulator.accuracy
+    if accuracy is None:
+        return "reduce simulation.step"
+    return f"no step reaches simulation.accuracy, {accuracy:g} pu"
 
 
 def switching_notes(setup: ExperimentSetup) -> Iterator[str]:

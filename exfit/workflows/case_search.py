@@ -44,7 +44,12 @@ from exfit.results.intervals.determination import (
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
 from exfit.util.arrays import Array
 from exfit.util.text import digits
-from exfit.util.vocabulary import COMPRESSED_ANEW, FROM_FURTHER_STARTS, WEIGHTED_BY_NOISE
+from exfit.util.vocabulary import (
+    COMPRESSED_ANEW,
+    FROM_FURTHER_STARTS,
+    ON_FINER_GRID,
+    WEIGHTED_BY_NOISE,
+)
 from exfit.workflows.responses import aligned, validation_of
 
 Values = Mapping[str, float]
@@ -171,7 +176,23 @@ def descents(state: SearchState) -> SearchState:
         judge = judge_of(case, problem, state.setups, state.unseen)
     settings = state.counter, state.options, judge, state.program
     found = search(case, problem, state.method, state.on_line, state.watch, *settings)
-    return on_all_samples(replace(state, searched=found))
+    return on_all_samples(on_finer_grid(replace(state, searched=found)))
+
+
+def on_finer_grid(state: SearchState) -> SearchState:
+    """Search on with shorter steps where the response found needs them for its accuracy."""
+    if state.program is not None or state.interrupted:
+        return state
+    x, fitted = state.found.best.x, state.fitted
+    values = state.problem.residuals.values(x)
+    fine = tuple(setup.with_enough_substeps(values) for setup in fitted)
+    steps = [[setup.experiment.simulator.step for setup in setups] for setups in (fitted, fine)]
+    if steps[0] == steps[1]:
+        return state
+    residuals = with_setups(state.problem, fine).residuals
+    problem = FitProblem(residuals, compressed(residuals, x))
+    searched = state.continued(problem, state.found, x, ON_FINER_GRID)
+    return replace(state, setups=fine, problem=problem, searched=searched)
 
 
 def on_all_samples(state: SearchState) -> SearchState:

@@ -212,7 +212,17 @@ class Estimate(Section):
 class SimulationSection(Section):
     """The grid of the simulation."""
 
-    step: Positive = Field(default=0.001, description="Step of the integration, s.")
+    step: Positive | Literal["auto"] = Field(
+        default="auto",
+        description="Step of the integration by Runge-Kutta, s; auto: one by which the compared "
+        "signals are accurate enough, with crossings of limits located.",
+    )
+    accuracy: float = Field(
+        default=1e-6,
+        ge=1e-9,
+        le=1e-3,
+        description="Largest error of the compared signals by the steps, pu, where step is auto.",
+    )
     output_step: Positive = Field(
         default=0.005, description="Spacing of the output if there is no record, s."
     )

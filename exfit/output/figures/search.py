@@ -35,6 +35,7 @@ from exfit.util.vocabulary import (
     COMPRESSED_ANEW,
     FROM_FURTHER_STARTS,
     HISTORY_PHASES,
+    ON_FINER_GRID,
     PHASES,
     WEIGHTED_BY_NOISE,
 )
@@ -51,6 +52,7 @@ COLOURS: Mapping[str, str] = {
     FROM_FURTHER_STARTS: LIMIT,
     WEIGHTED_BY_NOISE: LIMIT,
     COMPRESSED_ANEW: LIMIT,
+    ON_FINER_GRID: LIMIT,
 }
 WAYS = {
     "strategy": ("the case's start", "D"),
