@@ -118,6 +118,7 @@ OF_CURRENT_PHASOR = ("p", "q", "it")  # and those that one of the current adds
 OF_PHASORS = (*OF_VOLTAGE_PHASOR, *OF_CURRENT_PHASOR)
 PHASOR_COLUMNS = "phasors."  # how the columns begin that are computed of phasors
 COMPARED_IN_EVENT = ("p", "q", "efd", "ifd", "speed")  # what a record of an event mostly holds
+OF_STEP = ("vt", "p", "q")  # what shows whether steps are short enough where nothing is compared
 OF_FLAT_RUN = ("efd", "p", "q")  # what shows whether a unit rests where nothing is compared
 OF_BUMP_TEST = ("vt", "efd", "ifd")  # what a record of a bump test mostly holds
 TERMINALS, FIELDS = ("p", "q", "vt"), ("ifd", "efd")  # what is read of a unit at rest on load

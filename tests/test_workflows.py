@@ -148,7 +148,10 @@ def test_a_simulation_without_a_record_is_the_one_with_it(tmp_path):
     ] = "  vt0: 1.0\n  duration: 10.0"
     kept = kept[: kept.index("validate:")]
     path = tmp_path / "case.yaml"
-    path.write_text("\n".join([*kept, "simulation: {output_step: 0.01}"]))
+    kept[next(k for k, line in enumerate(kept) if line.startswith("simulation:"))] = (
+        "simulation: {step: 0.001, output_step: 0.01}"
+    )
+    path.write_text("\n".join(kept))
     without = simulate(load_case(path), {})
     count = min(len(without.response.time), len(with_record.response.time))
     for signal, samples in with_record.response.signals.items():
@@ -199,7 +202,7 @@ def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
     path = tmp_path / "case.yaml"
     told = []
     for step in (0.1, 0.001):
-        path.write_text(f"{text}simulation: {{step: {step}}}\n")
+        path.write_text(text.replace("{step: 0.001}", f"{{step: {step}}}"))
         told.append(any("halving the step" in note for note in fit(path, search="local").notes))
     assert told == [True, False]
 

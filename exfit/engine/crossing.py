@@ -11,8 +11,8 @@ TOLERANCE = 1e-10  # pu: a mode holds until its margin is passed by more,
 AIM, ENOUGH = 3e-10, 1e-9  # and a crossing is where it is passed by so much, or up to that
 CLOSE = 1e-10  # of a step: as near as a crossing is located
 MOST_TRIALS = 60.0  # steps that locate one crossing
-MOST_CROSSINGS = 12.0  # in a sub-step; the rest of it goes in MINI parts, each with its own modes
-MINI = 1.0 / 16.0
+MOST_CROSSINGS = 12.0  # in a sub-step; each part of the rest begins with its own modes
+MINI = 1.0 / 8.0  # of a sub-step: the parts of one in which there is a crossing
 
 
 class CrossingSearch(Lanes):
@@ -30,6 +30,7 @@ class CrossingSearch(Lanes):
             self.slot(self.truth, self.true) for _ in range(3)
         )
         self.still, self.going, self.ended = (self.slot(self.truth, self.false) for _ in range(3))
+        self.fine = self.slot(self.truth, self.false)
         self.end = self.slot("double", share)
 
     def shrink(self) -> None:
@@ -43,7 +44,11 @@ class CrossingSearch(Lanes):
         bad = self.both(self.test("ugt", g, self.number(TOLERANCE)), self.get(self.alive))
         over = self.both(self.no(locating), self.test("oge", met, self.number(MOST_CROSSINGS)))
         bad = self.both(bad, self.no(over))
+        fine = self.get(self.fine)
         new, above = self.both(bad, self.no(locating)), self.both(bad, locating)
+        # a crossing is located within a short part, at whose end the slopes are more exact
+        self.put(self.fine, self.either(fine, new))
+        new = self.both(new, fine)
         below = self.both(locating, self.no(bad))
         shifted = self.op("fsub", g, self.number(AIM))
         start = self.op("fsub", self.get(self.g0), self.number(AIM))
@@ -112,12 +117,11 @@ class CrossingSearch(Lanes):
         w = self.w
         w.label("advance")
         last = self.splat(self.get(self.end))
-        over = self.test("oge", self.get(self.met), self.number(MOST_CROSSINGS))
         m = w.let("sitofp i64 %m to double")
         mini = self.splat(w.let(f"fdiv double {ONE.number(MINI)}, {m}"))
         short = self.op("fadd", self.get(self.tb), mini)
         short = self.pick(self.test("olt", short, last), short, last)
-        end = self.pick(over, short, last)
+        end = self.pick(self.get(self.fine), short, last)
         self.put(self.te, self.pick(self.get(self.going), self.get(self.next), end))
         done = self.get(self.committed)
         self.put(self.count, self.pick(done, self.number(0.0), self.get(self.count)))

@@ -545,4 +545,5 @@ class _Run(CrossingSearch):
         self.put(self.te, self.splat(end))
         for slot in (self.count, self.met):
             self.put(slot, self.number(0.0))
+        self.put(self.fine, self.false)
         w.put("br label %attempt")

@@ -16,6 +16,7 @@ from exfit.util.arrays import Array, median_step
 
 DENSEST = 1e-3  # s: a recorded input with closer samples is averaged over steps as long
 SAME = 1e-9  # of a step
+AFTER_JUMP = np.array([1 / 16, 1 / 8, 1 / 4, 1 / 2, 3 / 4, 1, 1.5, 2.0])  # steps behind a jump
 
 
 class SamplePlaces(NamedTuple):
@@ -57,6 +58,9 @@ class LocatedTest:
                 continue
             inside = recorded.time[(recorded.time > start) & (recorded.time < end)]
             points = np.union1d(points, inside)
+        if start > self.inputs.start:
+            # a jump moves what is fast, which has come to rest after some steps
+            points = np.union1d(points, [t for t in start + length * AFTER_JUMP if t < end])
         lengths = np.diff(points)
         counts = np.maximum(np.ceil(lengths / length - ON_GRID), 1.0).astype(int)
         parts = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -13,6 +13,7 @@ from exfit.engine.located_runs import LocatedCourse, located_kernel
 from exfit.engine.sampling import Course, Courses, Segment
 from exfit.engine.system import System
 from exfit.plants import REFERENCES
+from exfit.signals import OF_STEP
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
 from exfit.simulation.located_test import LocatedTest, SamplePlaces, exact
@@ -36,12 +37,12 @@ Values = Mapping[str, float]
 POINTS_ALONG = 100  # of a response, where its sub-steps are checked
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 BESIDE_JUMP = 2.0  # steps: as far as the B-splines of a smooth jump reach on both grids
+JUMP = 1e-3  # s
 REACH = 2.0  # of the fastest rate that a sub-step takes, where the step is chosen by its error
 LARGEST_STEP = 1e-2  # s, the first that is tried where an accuracy is asked for
 STEPS = tuple(k * 10.0**-n for n in (3, 4) for k in (5.0, 2.0, 1.0))  # s, the others
 SHORTEST_STEP, LARGEST_DIVISION = STEPS[-1], 10.0
 SAFE = 0.5  # of the accuracy: parameters move in a fit
-JUDGED = ("vt", "p", "q")  # signals by which a step is judged where none is compared
 READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
@@ -266,6 +267,14 @@ class Simulator:
         return p, np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
 
     @property
+    def jump(self) -> float:
+        """How near (s) a sample is to a step so that it may show the value on either side of it.
+
+        On the literal grid a step whose instant is found takes one step of it.
+        """
+        return JUMP if self.located else self.step
+
+    @property
     def _reach(self) -> float:
         """Step (s) of the rule for sub-steps: of its unit that of the literal grid is."""
         return self.step / REACH if self.located else self.step
@@ -303,7 +312,7 @@ class Simulator:
         simulator = self._with_substeps(values)
         if self.accuracy is None:
             return simulator
-        judged = signals or tuple(name for name in JUDGED if name in self.system.outputs)
+        judged = signals or tuple(name for name in OF_STEP if name in self.system.outputs)
         while simulator.step > SHORTEST_STEP:
             errors = simulator.step_errors(values, judged or self.system.outputs, relative=True)
             excess = max(errors.values()) / (SAFE * self.accuracy)

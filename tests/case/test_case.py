@@ -175,7 +175,7 @@ def test_what_may_be_missing_has_a_default(case_file):
     assert estimate.tolerance.gradient_absolute is estimate.difference_step is estimate.stop is None
     assert (estimate.armijo, estimate.dgn.step, estimate.dgn.cut) == (1e-4, "capped", "parabola")
     assert (estimate.lm.update, estimate.lm.nu_min) == ("radius", 1e-3)
-    assert (case.simulation.step, case.simulation.output_step) == (0.001, 0.005)
+    assert (case.simulation.step, case.simulation.output_step) == ("auto", 0.005)
     assert case.validations == ()
 
 

@@ -42,6 +42,7 @@ def content(form, curve):
             "parameters": {"Tpd0": TPD0, "Xd": 1.8, "Xpd": 0.3, "S10": 0.0, "S12": 0.0},
         },
         "test": {"vt0": 1.0, "duration": 4.0, "vref": [{"at": 0.0, "step": STEP}]},
+        "simulation": {"step": 0.001},
         "parameters": {
             "fixed": {
                 "KA": KA, "TA": TA, "TE": TE, "KF": KF, "TF": TF, "KC": 0.0, "KD": KD, "KE": KE,
@@ -170,6 +171,7 @@ def test_two_points_of_zero_are_no_saturation_wherever_they_lie(case):
     name, form = case
     content = yaml.safe_load((CONFIGS / "models" / f"{name.lower()}.yaml").read_text())
     content |= {"saturation": form, "test": {**content["test"], "duration": 2.0}}
+    content["simulation"] = {"step": 0.001}
     fixed = content["parameters"].setdefault("fixed", {})
 
     def response(E1, E2):

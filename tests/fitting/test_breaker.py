@@ -205,6 +205,7 @@ def test_a_rejection_may_be_a_record_of_a_case_with_an_exciter():
     content["records"][0]["record"] = {"channels": {"vt": {}}}
     case = Case.from_dict(content, {"up": bump, "rejection": rejection})
     step, opening = build_experiments(case)
+    opening = opening.with_enough_substeps(case.values())
     assert "breaker" not in step.experiment.simulator.system.inputs
     response = opening.response(case.values()).signals
     assert np.abs(response["vt"] - shown["vt"]).max() < 1e-6

@@ -5,7 +5,7 @@ import pytest
 from places import ROOT
 from records import case_of, config
 
-from exfit.case.load import load_case
+from exfit.case.case import Case
 from exfit.fitting.further_starts import COARSENESS, coarse_form, linear_form
 from exfit.fitting.search import fitted
 
@@ -20,7 +20,8 @@ MOST_MOVED = 0.25  # standard errors: the case with the ramp has 0.19
 
 
 def residuals(name):
-    _, problem = fitted(load_case(ROOT / "configs" / f"{name}.yaml"))
+    content = {**config(name), "simulation": {"step": 0.001}}
+    _, problem = fitted(Case.from_dict(content, folder=ROOT / "configs"))
     return problem.residuals
 
 

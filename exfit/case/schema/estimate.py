@@ -19,6 +19,7 @@ from exfit.case.schema.values import (
     Section,
     Sources,
     StdErrors,
+    Step,
     nothing,
     section_or_number,
 )
@@ -212,7 +213,7 @@ class Estimate(Section):
 class SimulationSection(Section):
     """The grid of the simulation."""
 
-    step: Positive | Literal["auto"] = Field(
+    step: Step = Field(
         default="auto",
         description="Step of the integration by Runge-Kutta, s; auto: one by which the compared "
         "signals are accurate enough, with crossings of limits located.",

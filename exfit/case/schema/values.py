@@ -145,6 +145,10 @@ Start = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[Literal["auto"], Tag("[text]")],
     Discriminator(_text_or_number),
 ]
+Step = Annotated[
+    Annotated[Positive, Tag("[number]")] | Annotated[Literal["auto"], Tag("[text]")],
+    Discriminator(_text_or_number),
+]
 Spread = Annotated[
     Annotated[Positive, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[text]")],
     Discriminator(_text_or_number),

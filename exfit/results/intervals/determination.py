@@ -39,7 +39,7 @@ POINTS = 3  # of a side: only its end is asked for
 REFUTING = 1e-3  # of the rise: a minimum lower by more refutes the solution
 
 INTERVALS = 3  # between samples on either side, in which an instant is tried
-BESIDE_SAMPLE = 0.5  # steps of the simulation: where descents begin, as a jump takes one step
+BESIDE_SAMPLE = 0.5  # of the width of a jump: where descents begin
 MOST_ITERATIONS = 30  # of a descent there: it begins next to its end
 DECIDING = 0.8  # of what the record shows of an instant: samples that show so much decide it
 MOST_DECIDING = 2  # samples
@@ -385,7 +385,7 @@ def minima_between_samples(problem: FitProblem, x: Array) -> list[FoundMinimum]:
                 max_iterations=MOST_ITERATIONS,
                 x_scale=problem.residuals.units,
             )
-            beside = BESIDE_SAMPLE * instant.experiment.simulator.step
+            beside = BESIDE_SAMPLE * instant.experiment.simulator.jump
             for value in (first + beside, last - beside):
                 start = x.copy()
                 start[k] = np.clip(parameter.scaled(value), within_low[k], within_high[k])

@@ -26,7 +26,7 @@ from exfit.util.arrays import Array
 
 Rows = NDArray[np.intp]
 
-AT_GIVEN_INSTANT = 1e-3  # of a step of the simulation: so near, rounding decides on the side
+AT_GIVEN_INSTANT = 1e-3  # of the width of a jump: so near, rounding decides on the side
 CONTRADICTING = 1e-6  # probability: samples that are less likely contradict all others
 NEGLIGIBLE_ERROR = 1e-6  # pu: where a record has no noise, errors of the simulation are as large
 NEGLIGIBLE_SINGULAR_VALUE = 1e-10  # of the largest: the record does not determine that direction
@@ -72,7 +72,7 @@ def _samples_at_steps(problem: FitProblem, x: Array) -> Iterator[ChannelSamples]
         times, at_step = simulator.times - simulator.delay, np.zeros(len(simulator.times), bool)
         for step in simulator.inputs.steps:
             if not step.ramp:
-                reach = simulator.step * (1.0 if step.smooth else AT_GIVEN_INSTANT)
+                reach = simulator.jump * (1.0 if step.smooth else AT_GIVEN_INSTANT)
                 at_step |= np.abs(times - step.at) <= reach
         for k, channel in enumerate(experiment.channels):
             if SIGNALS[channel.signal].jumps and channel.plain:

@@ -66,9 +66,7 @@ def state_of(folder, model, signals, true_instant, at, seed=0):
 
 
 CONTRADICTIONS = [
-    ("st1a", ("vt", "efd"), SAMPLE, FOUND),  # the sample has the value before the step
-    ("st1a", ("efd",), SAMPLE - 1e-8, FOUND),  # and here that behind it
-    ("ac8b", ("vt", "efd"), SAMPLE, FOUND),  # efd has a kink, which a found instant rounds off
+    ("st1a", ("efd",), SAMPLE - 1e-8, FOUND),  # the sample has the value behind the step
     ("st1a", ("vt", "efd"), SAMPLE - 1e-8, SAMPLE),  # given as a round number
 ]
 
@@ -100,6 +98,7 @@ def test_a_sample_that_contradicts_all_others_is_left_out(
     [
         (("vt", "efd"), SAMPLE + 0.0035, FOUND),  # between two samples
         (("vt",), SAMPLE, FOUND),  # vt does not jump
+        (("vt", "efd"), SAMPLE, FOUND),  # before the step, at which a search ends
         (("vt",), SAMPLE - 1e-8, SAMPLE),
         (("vt", "efd"), SAMPLE, SAMPLE),  # before the step, as the simulation has it
     ],
@@ -113,11 +112,10 @@ def test_where_nothing_contradicts_the_problem_stays_the_same(tmp_path, signals,
 
 
 def test_a_sample_that_agrees_in_another_minimum_stays():
-    # a local search ends beside a sample that is not at the instant, 4.9 ms later
+    # a local search ends beside a sample that is not at the instant, 4.4 ms later
     case, setups, problem = noisy("st6b_instant", np.random.default_rng([1, 1]))
     options = case.estimate.model_copy(update={"search": "local"})
     state = SearchState(case, setups, (), problem, options.strategy, options)
     state = in_turn(SEARCHED, state)
-    problem, found = state.problem, state.found
-    assert abs(problem.residuals.values(found.best.x)["vref.at"] - 1.0) < 1e-3
-    assert found.notes == ()
+    assert state.found.notes == ()
+    assert all(channel.kept.all() for channel in state.problem.residuals.channels)
