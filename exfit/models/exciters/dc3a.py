@@ -12,13 +12,14 @@ VR ─►(+)─►[  1  ]─┬─► efd
       │    VEMIN  │
       └── VFE ◄───┘
 
-VFE = KE EFD + VX(EFD). The limits of the rheostat VRH and of EFD are
-non-windup; the rheostat keeps moving while a contact bypasses it. The contacts
-make VR jump: on a literal grid the derivatives of the response do not include
-the shift of the jumps. KE is used as given, also 0 (the standard computes none). Not modelled: stabiliser, OEL and UEL, which are not in the
-drawing of the standard. PSLF's ESDC3A has another record; IEEET4 has no lag TR,
-and a dead band. The typical data are not the standard's sample (KV .05, TRH 20,
-KE .05, VR 1/0): with those the rheostat hunts on open circuit.
+VFE = KE EFD + VX(EFD). The limits of the rheostat VRH and of EFD are non-
+windup; the rheostat keeps moving while a contact bypasses it. The contacts make
+VR jump: on a literal grid the derivatives of the response do not include the
+shift of the jumps. KE is used as given, also 0 (the standard computes none).
+Not modelled: stabiliser, OEL and UEL, which are not in the drawing of the
+standard. PSLF's ESDC3A has another record; IEEET4 has no lag TR, and a dead
+band. The typical data are not the standard's sample (KV .05, TRH 20, KE .05, VR
+1/0): with those the rheostat hunts on open circuit.
 """
 
 from exfit.models.blocks import Signal, exciter, exciter_demand, lag, limited_integrator, where
