@@ -53,6 +53,9 @@ class Robust(NamedTuple):
     scale: float
 
 
+SHORT_RUNS = 5000  # steps, of the simulations of all records together
+
+
 @dataclass(frozen=True, eq=False)
 class Residuals:
     """Residuals of all records, one behind the other, over the scaled parameters (N,).
@@ -91,6 +94,17 @@ class Residuals:
     def samples(self) -> int:
         """Number of samples that are compared: as many, unless they are compressed."""
         return sum(channel.samples for channel in self.channels)
+
+    @property
+    def threads(self) -> int | None:
+        """Number of threads that advance searches: None for as many as there are processors.
+
+        One where the simulations are short: what surrounds them holds the interpreter's lock, and
+        searches that advance together share more blocks of sets.
+        """
+        tests = [experiment.simulator for experiment in self.experiments]
+        alone = all(test.responder is None for test in tests)
+        return 1 if alone and sum(test.steps for test in tests) <= SHORT_RUNS else None
 
     @property
     def of_records(self) -> dict[str, Nuisance]:

@@ -227,6 +227,7 @@ class CaseSearches:
             starts.legs,
             first_legs=starts.first_legs,
             merged=starts.merged,
+            workers=self.residuals.threads,
             watch=self.progress,
             earlier=earlier,
         )

@@ -146,6 +146,13 @@ class Simulator:
             return self._located.reading(times, self.delay)
         return Interpolation(self._grid, times, self.delay)
 
+    @property
+    def steps(self) -> int:
+        """Number of steps of the grid."""
+        if self._located is not None:
+            return sum(map(len, self._located.grids))
+        return sum(segment.steps for segment in self._grid)
+
     def with_responder(self, responder: Responder | None) -> "Simulator":
         """Make the simulator of the same test whose response another gives, or the equations."""
         result = copy(self)

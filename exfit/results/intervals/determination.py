@@ -286,6 +286,7 @@ def profiles_about(
             residuals.bounds,
             beside=known,  # an interval that need not be found again
             points=points,
+            workers=residuals.threads,
             x_scale=residuals.units,
             watch=progress,
         )
@@ -391,7 +392,11 @@ def minima_between_samples(problem: FitProblem, x: Array) -> list[FoundMinimum]:
                 start[k] = np.clip(parameter.scaled(value), within_low[k], within_high[k])
                 descents.append(descent.begin(start))
     minima: dict[int, FoundMinimum] = {}
-    finish_all(descents, None, lambda k, end: minima.update({k: FoundMinimum(end.x, end.cost)}))
+    finish_all(
+        descents,
+        problem.residuals.threads,
+        lambda k, end: minima.update({k: FoundMinimum(end.x, end.cost)}),
+    )
     return [minima[k] for k in sorted(minima)]
 
 
