@@ -214,6 +214,11 @@ def _located_tangents(
     code = located_tangent_kernel(system, outputs, moves.free, tuple(moves.shapes), width)
     tangents, rates = moves.tangents(system, directions), moves.rates(directions)
     samples, driven, change = code.samples(p, tangents, courses, parts, np.array(instants), rates)
+    share = first.share
+    if share != 1.0:
+        samples = samples[:, :1] + (samples - samples[:, :1]) / share
+        driven = driven[:, :1] + (driven - driven[:, :1]) / share
+    samples, driven, change = map(first.as_asked, (samples, driven, change))
     slopes = driven
     if len(moves.columns) < count:
         slopes = np.zeros((*samples.shape, count))
@@ -222,10 +227,6 @@ def _located_tangents(
         delays = np.array([own[k].delay for own in directions])
         moved = np.where([simulator.still for simulator in simulators], 0.0, 1.0)
         slopes[..., k] -= delays[:, None, None] * moved[:, :, None] * change
-    share = first.share
-    if share != 1.0:
-        samples = samples[:, :1] + (samples - samples[:, :1]) / share
-        slopes = slopes[:, :1] + (slopes - slopes[:, :1]) / share
     return samples, slopes
 
 

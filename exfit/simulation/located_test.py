@@ -23,10 +23,16 @@ class SamplePlaces(NamedTuple):
     """The samples of a run: in each segment their ``positions``, in steps from its start.
 
     ``still`` (M,) are the samples before the start and after the end, which a delay does not move.
+    ``places`` (M,) are those of the samples as they were asked for, None where they are in order.
     """
 
     positions: tuple[Array, ...]
     still: NDArray[np.bool_]
+    places: NDArray[np.intp] | None = None
+
+    def as_asked(self, samples: Array) -> Array:
+        """Samples (K, M, ...) in the order in which they were asked for."""
+        return samples if self.places is None else samples[:, self.places]
 
 
 class LocatedTest:
@@ -93,6 +99,12 @@ class LocatedTest:
 
         At the instant of a jump a sample is before it; of two at one time the second is behind it.
         """
+        if np.any(np.diff(times) < 0.0):
+            order = np.argsort(times, kind="stable")
+            places = np.empty(len(order), np.intp)
+            places[order] = np.arange(len(order))
+            sorted_ones = self.reading(times[order], delay)
+            return SamplePlaces(sorted_ones.positions, sorted_ones.still[places], places)
         wanted = times - delay
         read = np.clip(wanted, self.bounds[0], self.bounds[-1])
         near = ON_GRID * self.step if delay == 0.0 else 0.0
@@ -159,7 +171,8 @@ class LocatedTest:
             s = (positions - k)[:, None]
             c = u[k]
             parts.append(((c[..., 3] * s + c[..., 2]) * s + c[..., 1]) * s + c[..., 0])
-        return np.concatenate(parts)
+        inputs: Array = reading.as_asked(np.concatenate(parts)[None])[0]
+        return inputs
 
 
 def exact(inputs: Inputs) -> Inputs:

@@ -456,7 +456,8 @@ class Simulator:
         p, parts = self.prepared(sets)
         if len(sets) == 1 and tests is None and self._share == 1.0 and parts[0] != NO_SUBSTEPS:
             course = [self.located_course()]
-            return located_kernel(self.system, outputs, 1).samples(p, course, parts), parts
+            alone = located_kernel(self.system, outputs, 1).samples(p, course, parts)
+            return self.as_asked(alone), parts
         every = tests or [self]
         alike = {(id(test._located), id(test._sampling)) for test in every}
         courses = [test.located_course() for test in (every if len(alike) > 1 else every[:1])]
@@ -467,7 +468,12 @@ class Simulator:
             samples[group] = code.samples(p[group], own, parts[group])
         if self._share != 1.0:
             samples = samples[:, :1] + (samples - samples[:, :1]) / self._share
-        return samples, parts
+        return self.as_asked(samples), parts
+
+    def as_asked(self, samples: Array) -> Array:
+        """Samples (K, M, ...) of machine code with located crossings, in the order of the times."""
+        assert isinstance(self._sampling, SamplePlaces)
+        return self._sampling.as_asked(samples)
 
     def located_course(self, moves: "Moves | None" = None) -> LocatedCourse:
         """Segments for machine code with located crossings, with the inputs that move."""

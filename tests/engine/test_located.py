@@ -73,10 +73,12 @@ def test_derivatives_are_exact_across_crossings(model):
     test, at, names = unit(model, 2e-3), values(model), free(model)
     _, slopes = test.tangents(at, ("vt",), each(names))
     for name, column in zip(names, slopes[:, 0].T, strict=True):
-        change = 1e-5 * at[name]
+        # a contact that jumps shows how exactly its instant is located
+        size, bound = (1e-4, 5e-4) if model == "DC3A" else (1e-5, 5e-5)
+        change = size * at[name]
         ends = [test.samples(at | {name: at[name] + k * change}, ("vt",))[0] for k in (1, -1)]
         difference = (ends[0] - ends[1])[:, 0] / (2.0 * change)
-        assert np.abs(column - difference).max() <= 5e-5 * np.abs(difference).max() + 1e-12
+        assert np.abs(column - difference).max() <= bound * np.abs(difference).max() + 1e-12
 
 
 def test_instants_sizes_ramps_and_the_delay_of_a_recorder_have_exact_derivatives():
@@ -129,3 +131,20 @@ def test_every_choice_has_a_mode_also_one_that_only_an_output_makes(model):
     symbols = {node for node in in_order(computed) if node.op == "symbol" and node.varies}
     known = {*traced.x, *traced.u, *run.v, *run.signs, *run.modes.bits}
     assert symbols <= known
+
+
+def test_samples_may_be_asked_for_in_any_order():
+    rng = np.random.default_rng(2)
+    places = rng.permutation(len(TIMES))
+    directions = (*each(("KA",)), Direction(delay=1.0))
+    ordered, mixed = unit("AC1A", 5e-3), unit("AC1A", 5e-3, times=TIMES)
+    mixed = mixed.at_times(TIMES[places])
+    pairs = zip(
+        ordered.tangents(values("AC1A"), ("vt",), directions),
+        mixed.tangents(values("AC1A"), ("vt",), directions),
+        strict=True,
+    )
+    for sorted_ones, unsorted_ones in pairs:
+        assert np.array_equal(sorted_ones[places], unsorted_ones)
+    samples, _ = ordered.samples(values("AC1A"), ("vt",))
+    assert np.array_equal(samples[places], mixed.samples(values("AC1A"), ("vt",))[0])
