@@ -27,7 +27,7 @@ from exfit.output.blocks import (
 from exfit.output.validations import comparisons, in_a_line, played, rejections
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.util.text import percentage
+from exfit.util.text import listed, percentage
 from exfit.util.vocabulary import by_source
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def whole(
             f"rmse {errors} pu",
             f"parameters_{end.phase}.yaml",
         )
-    yield paragraph(f"sub-steps: {result.substeps}")
+    yield paragraph(f"sub-steps: {result.substeps}{_of_steps(result)}")
     if result.sources:
         counts = by_source(result.sources, result.sources).items()
         text = ", ".join(f"{len(names)}{NO_BREAK}{source}" for source, names in counts)
@@ -241,3 +241,9 @@ def profiles(result: "Profiles") -> Iterator[Block]:
         if end and not result.verdict.misfit
     )
     yield from notes(result.notes)
+
+
+def _of_steps(result: FitResult) -> str:
+    """Word the steps of the simulation that are divided."""
+    steps = sorted({match.step for match in result.comparisons if match.step})
+    return f" in each step of {listed([f'{step:g}' for step in steps])} s" if steps else ""

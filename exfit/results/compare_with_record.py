@@ -72,6 +72,7 @@ def compare_with_record(
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
         substeps=substeps,
+        step=setup.experiment.simulator.step,
         time=setup.record.time,
         overlays=overlays,
         played=_played(setup, overlays, samples) if setup.driving else None,

@@ -212,8 +212,9 @@ class Comparison:
     plant. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
     (pu) that is accepted, ``reason`` why it is not accepted, and ``of_record`` what was found about
     the record itself; ``steps`` are those of a record that was given by hand, ``notes`` what must
-    be known of it. ``limiters`` are those of excitation that acted. ``rmse``, ``max_error`` and
-    ``fit_percent`` are those of vt, or of the first signal where there is no vt.
+    be known of it. ``step`` is that of the simulation, s. ``limiters`` are those of excitation that
+    acted. ``rmse``, ``max_error`` and ``fit_percent`` are those of vt, or of the first signal where
+    there is no vt.
     """
 
     DERIVED: ClassVar = {
@@ -236,6 +237,7 @@ class Comparison:
     of_record: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
     sha256: str = field(default="", metadata=IN_FILE)
     substeps: int = field(default=0, metadata=IN_FILE)
+    step: float = field(default=0.0, metadata=IN_FILE)
     time: Array = field(default_factory=lambda: np.zeros(0), metadata=IN_FILE)
     overlays: Mapping[str, Overlay] = field(default_factory=dict, metadata=IN_FILE)
     iteration_responses: IterationResponses | None = field(default=None, metadata=IN_FILE)

@@ -429,6 +429,12 @@ FORM = {
         ["50.5 is not a whole number"],
     ),
     "no iteration": ("ns: 50", "ns: 0", "estimate.iterations", ["0 is below 1"]),
+    "an accuracy of a literal step": (
+        "step: 0.002",
+        "step: 0.002, accuracy: 1.0e-7",
+        "simulation.accuracy",
+        ["only with simulation.step: auto"],
+    ),
     "step of no length": ("step: 0.002", "step: 0.0", "simulation.step", ["0 is not above 0"]),
     "weight of nothing": ("2.0}", "-2}", "record.channels.efd.weight", ["-2 is not above 0"]),
     "negative tolerance": ("1.0e-7", "-1e-7", "estimate.tolerance.gradient", ["-1e-07 is below 0"]),
@@ -892,6 +898,7 @@ def test_the_schema_is_a_json_schema_and_takes_sound_cases():
 # what only the exact reading of numbers, or more than one value, can tell
 BEYOND_THE_SCHEMA = {
     "clock in a number",
+    "an accuracy of a literal step",
     "endless digits",
     "infinite",
     "key twice",

@@ -178,6 +178,9 @@ def _recording_faults(
 def _estimate_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     """Yield settings that nothing uses, and bounds that are missing where starts are spread."""
     estimate = content.at("estimate")
+    simulation = content.at("simulation")
+    if simulation.at("accuracy").value is not None and simulation.at("step").number is not None:
+        yield simulation.at("accuracy").fault("only with simulation.step: auto")
     for place, (deciding, idle, others) in NEEDS.items():
         given = estimate.at(*deciding).value or USUAL[deciding[-1]]
         if estimate.at(*place).value is not None and given in idle:
