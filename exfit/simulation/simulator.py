@@ -42,6 +42,7 @@ REACH = 2.0  # of the fastest rate that a sub-step takes, where the step is chos
 LARGEST_STEP = 1e-2  # s, the first that is tried where an accuracy is asked for
 STEPS = tuple(k * 10.0**-n for n in (3, 4) for k in (5.0, 2.0, 1.0))  # s, the others
 SHORTEST_STEP, LARGEST_DIVISION = STEPS[-1], 10.0
+LARGEST_GROWTH = 35.0  # logarithm: of a rounding of 1e-16 to about 1 pu
 SAFE = 0.5  # of the accuracy: parameters move in a fit
 READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
@@ -314,10 +315,11 @@ class Simulator:
         """Return a simulator whose sub-steps are enough all along the response to these values.
 
         With an accuracy its step is divided until halving it would move no signal by more than
-        that. Raises SimulationError where that response does not stay finite.
+        that, but where the rest is so unstable that rounding alone would. Raises SimulationError
+        where that response does not stay finite.
         """
         simulator = self._with_substeps(values)
-        if self.accuracy is None:
+        if self.accuracy is None or self._rounding_grows(values):
             return simulator
         judged = signals or tuple(name for name in OF_STEP if name in self.system.outputs)
         while simulator.step > SHORTEST_STEP:
@@ -331,6 +333,11 @@ class Simulator:
             finer_one = simulator.remade(step=finer, least=1).with_responder(self.responder)
             simulator = finer_one._with_substeps(values)
         return simulator
+
+    def _rounding_grows(self, values: Values) -> bool:
+        """Whether an unstable rest lets rounding grow to 1 pu within the test: no step helps."""
+        length = float(self.times[-1] - self.times[0])
+        return bool(np.max(self.rates_at_rest(values).real, initial=0.0) * length > LARGEST_GROWTH)
 
     def _with_substeps(self, values: Values) -> "Simulator":
         simulator = self
