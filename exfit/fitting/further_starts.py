@@ -6,19 +6,22 @@ for the next one: docs/methods.md has what was measured.
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from exfit.errors import SimulationError
 from exfit.estimate import Descent, spread
 from exfit.fitting.compression import compressed
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import Way
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import Residuals, SimulationCounter
+from exfit.fitting.residuals import UNSTABLE, Residuals, SimulationCounter
 from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
+DRAWN = 8  # times the starts that are taken
 MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did
 LINEAR_ITERATIONS = 40  # with 25 of them one start in fifty ends elsewhere
 COARSENESS = 5  # times the step: it moves minima by 0.2 standard errors at most in sample cases
@@ -67,7 +70,10 @@ def further_starts(
     linear: tuple[Way, ...] = ("linear",)
     direct: tuple[Way, ...] = ("direct",)
     if why_direct:
-        points = spread(residuals.bounds, count)
+        # a unit that a record shows was stable: of more points those with a stable rest come first
+        points = spread(residuals.bounds, DRAWN * count)
+        growing = [residuals.growth(point) > UNSTABLE for point in points]
+        points = points[np.argsort(growing, kind="stable")[:count]]
         return FurtherStarts(points, legs, direct * count, why_direct)
     ways = (linear * (DIRECT - 1) + direct) * count
     points = spread(residuals.bounds, count, residuals.start)

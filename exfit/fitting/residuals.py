@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
+UNSTABLE = 3.0  # logarithm by which a deviation from an unstable rest grows within a test
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
 MOST_NUMBERS_AT_ONCE = 1 << 21  # of Jacobians that are made together: 16 MB
 
@@ -280,6 +281,17 @@ class Residuals:
         """
         nothing = np.full(self.count + len(self.priors), np.inf)
         return [nothing.copy() if own is None else own for own in self._of_many(points)]
+
+    def growth(self, theta: Array) -> float:
+        """Logarithm by which a deviation from the rest grows in a test, infinite without a rest."""
+        try:
+            values = self.values(theta)
+            return max(
+                experiment.with_inputs(values).growth(experiment.parameters(values))
+                for experiment in self.experiments
+            )
+        except UNREACHABLE:
+            return float("inf")
 
     def costs(self, points: Sequence[Array]) -> Array:
         """Return half the sum of squares at each of points (N,), infinite where there are none."""

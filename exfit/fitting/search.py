@@ -27,7 +27,13 @@ from exfit.fitting.global_search import (
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.program import Program
-from exfit.fitting.residuals import CENTRAL_STEP, ONE_SIDED_STEP, Residuals, SimulationCounter
+from exfit.fitting.residuals import (
+    CENTRAL_STEP,
+    ONE_SIDED_STEP,
+    UNSTABLE,
+    Residuals,
+    SimulationCounter,
+)
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.util.arrays import Array
@@ -40,6 +46,7 @@ from exfit.util.vocabulary import (
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
+UNSTABLE_ITERATIONS = 10  # from a start whose response has little to do with the record
 ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
 JACOBIANS: Mapping[str, Callable[[Residuals, Array], Array]] = {
     "exact": Residuals.exact,
@@ -176,6 +183,11 @@ class CaseSearches:
             share = (residuals.samples + priors) / (residuals.count + priors)
             match = float(options.good_enough.rmse * np.sqrt(share))
 
+        most = options.most_iterations
+        follow = options.search != "local" and program is None  # further starts, the better ones
+        if follow and residuals.growth(residuals.start) > UNSTABLE:
+            most = min(most, UNSTABLE_ITERATIONS)
+
         def jacobian(theta: Array) -> Array:
             try:
                 return JACOBIANS[options.jacobian](residuals, theta)
@@ -186,7 +198,7 @@ class CaseSearches:
             own = self._descent(functions, method)
             own = replace(
                 own,
-                max_iterations=options.most_iterations,
+                max_iterations=most,
                 jacobian_error=jacobian_error(options.jacobian, options.difference_step),
                 good_enough=match,
                 searches=searches_of(options),

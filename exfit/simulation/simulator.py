@@ -42,6 +42,8 @@ REACH = 2.0  # of the fastest rate that a sub-step takes, where the step is chos
 LARGEST_STEP = 1e-2  # s, the first that is tried where an accuracy is asked for
 STEPS = tuple(k * 10.0**-n for n in (3, 4) for k in (5.0, 2.0, 1.0))  # s, the others
 SHORTEST_STEP, LARGEST_DIVISION = STEPS[-1], 10.0
+# states of systems whose sets gain from lanes; with 34 and 41 a set takes up to 3.5 times as long
+MOST_STATES = 20
 LARGEST_GROWTH = 35.0  # logarithm: of a rounding of 1e-16 to about 1 pu
 SAFE = 0.5  # of the accuracy: parameters move in a fit
 READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
@@ -319,7 +321,7 @@ class Simulator:
         where that response does not stay finite.
         """
         simulator = self._with_substeps(values)
-        if self.accuracy is None or self._rounding_grows(values):
+        if self.accuracy is None or self.growth(values) > LARGEST_GROWTH:
             return simulator
         judged = signals or tuple(name for name in OF_STEP if name in self.system.outputs)
         while simulator.step > SHORTEST_STEP:
@@ -334,10 +336,13 @@ class Simulator:
             simulator = finer_one._with_substeps(values)
         return simulator
 
-    def _rounding_grows(self, values: Values) -> bool:
-        """Whether an unstable rest lets rounding grow to 1 pu within the test: no step helps."""
+    def growth(self, values: Values) -> float:
+        """Logarithm by which a deviation from the rest grows within the test, 0 at a stable rest.
+
+        Raises SimulationError where the start is no rest.
+        """
         length = float(self.times[-1] - self.times[0])
-        return bool(np.max(self.rates_at_rest(values).real, initial=0.0) * length > LARGEST_GROWTH)
+        return length * float(np.max(self.rates_at_rest(values).real, initial=0.0))
 
     def _with_substeps(self, values: Values) -> "Simulator":
         simulator = self
@@ -469,13 +474,18 @@ class Simulator:
         alike = {(id(test._located), id(test._sampling)) for test in every}
         courses = [test.located_course() for test in (every if len(alike) > 1 else every[:1])]
         samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-        for lanes, group in groups(parts, SIDE_BY_SIDE if len(courses) == 1 else 1):
+        for lanes, group in groups(parts, self._lanes if len(courses) == 1 else 1):
             own = courses if len(courses) == 1 else [courses[k] for k in group]
             code = located_kernel(self.system, outputs, lanes)
             samples[group] = code.samples(p[group], own, parts[group])
         if self._share != 1.0:
             samples = samples[:, :1] + (samples - samples[:, :1]) / self._share
         return self.as_asked(samples), parts
+
+    @property
+    def _lanes(self) -> int:
+        """Sets side by side with located crossings: many limits part the ways of lanes."""
+        return SIDE_BY_SIDE if len(self.system.states) <= MOST_STATES else 1
 
     def as_asked(self, samples: Array) -> Array:
         """Samples (K, M, ...) of machine code with located crossings, in the order of the times."""

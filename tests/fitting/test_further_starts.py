@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 from cases import local_case
+from event_sets import recorded, set_case
 
+from exfit.case.load import load_case
+from exfit.estimate import spread
 from exfit.fitting.further_starts import further_starts
+from exfit.fitting.residuals import UNSTABLE
 from exfit.fitting.search import fitted
 from exfit.util.text import rounded_value
 from exfit.workflows import fit
@@ -119,3 +123,15 @@ def test_a_minimum_that_the_record_does_not_refute_is_named():
     ends = sorted(minimum.values["KPR"] for minimum in likely)
     assert f"KPR {rounded_value(ends[0])} ... {rounded_value(ends[1])}" in note
     assert f"(here {rounded_value(result.values['KPR'])})" in note
+
+
+def test_starts_for_a_recorded_event_have_a_stable_rest_where_the_bounds_hold_one(tmp_path):
+    recorded(tmp_path, lengths=(8.0,))
+    case = load_case(set_case(tmp_path, count=1))
+    problem = fitted(case)[1]
+    residuals = problem.residuals
+    assert residuals.growth(residuals.start) > UNSTABLE  # TB and TC are exchanged
+    drawn = [residuals.growth(point) > UNSTABLE for point in spread(residuals.bounds, COUNT)]
+    assert sum(drawn) > 0
+    points = further_starts(problem, COUNT, None).points
+    assert sum(residuals.growth(point) > UNSTABLE for point in points) < sum(drawn)
