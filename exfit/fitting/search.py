@@ -185,7 +185,7 @@ class CaseSearches:
 
         most = options.most_iterations
         follow = options.search != "local" and program is None  # further starts, the better ones
-        if follow and residuals.growth(residuals.start) > UNSTABLE:
+        if follow and isinstance(most, int) and residuals.growth(residuals.start) > UNSTABLE:
             most = min(most, UNSTABLE_ITERATIONS)
 
         def jacobian(theta: Array) -> Array:

@@ -33,8 +33,7 @@ def main(names: list[str]) -> None:
             )
             for name, value in own.items()
         }  # fmt: skip
-        rows = zip(result.parameters, result.values, result.std_errors, strict=True)
-        off = {n: (value - truth[n]) / error for n, value, error in rows if n in truth}
+        off = {n: (own.value - truth[n]) / own.std_error for n, own in result.parameters.items()}
         worst = max(off, key=lambda name: abs(off[name]))
         print(f"{exciter}: {spent:.0f} s, cost {result.cost:.4e}, {worst} {off[worst]:+.1f} errors")
 
