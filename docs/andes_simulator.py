@@ -4,7 +4,7 @@
       type: external
       command: [python, andes_simulator.py, SEXS]
       twin: infinite-bus
-      swing: torque
+      dialect: andes
 
 The argument is the exciter's model as ANDES names it; its parameters are those of the request
 without a dot in their names. Steps may be those of vref and E. It was run with ANDES 2.0.0.

@@ -17,6 +17,7 @@ from exfit.plants import (
     REFERENCES,
     SATURATION,
     SPEED,
+    Dialect,
     Equipment,
     SaturationForm,
     Stabilised,
@@ -35,6 +36,7 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
     signal that drives it.
     """
     kind, parts = case.kind, case.parts
+    dialect: Dialect = getattr(case.plant, "dialect", "standard")
     if kind.has_exciter and parts.exciter is None:
         raise CaseError(f"{case.path}: model: missing")
     if parts.exciter is not None:
@@ -45,14 +47,14 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
         stabiliser = Stabilised(parts.stabiliser, listens_to)
     records = [{*file.channels} for file in _record_files(case).values()]
     equipment = Equipment(
-        exciter=parts.exciter,
+        exciter=None if parts.exciter is None else parts.exciter.in_dialect(dialect),
         machine=parts.machine,
         saturation=SATURATION[case.saturation],
         inputs=inputs_of(case, recording),
         recorded=frozenset(set.intersection(*records) if records else ()),
         given=frozenset(case.plant.given),
         stabiliser=stabiliser,
-        swing=getattr(case.plant, "swing", "power"),
+        dialect=dialect,
         power_at=getattr(case.plant, "power_at", "recorded-voltage"),
         governor=parts.governor,
         limiters=parts.limiters,

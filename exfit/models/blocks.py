@@ -170,6 +170,23 @@ def pid(
     return clip(y, low, high), where(outward, 0.0, slope), washed
 
 
+def pi_and_derivative(
+    u: Signal,
+    integral: Signal,
+    derivative: Signal,
+    KP: Signal,
+    KI: Signal,
+    KD: Signal,
+    TD: Signal,
+    low: Signal,
+    high: Signal,
+) -> tuple[Signal, Signal, Signal]:
+    """Do as a PID that limits KP + KI / s by itself, and its sum with the derivative again."""
+    steep, washed = washout(u, derivative, KD, TD)
+    y, slope = pi(u, integral, KP, KI, low, high)
+    return clip(y + steep, low, high), slope, washed
+
+
 def pi(
     u: Signal, integral: Signal, KP: Signal, KI: Signal, low: Signal = -inf, high: Signal = inf
 ) -> tuple[Signal, Signal]:

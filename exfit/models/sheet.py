@@ -369,7 +369,8 @@ class Model:
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
     its PSS/E records, its own one first, ``pslf_records`` those of PSLF; ``inputs`` the signals
     that a stabiliser or a limiter listens to, ``places`` where a limiter may act on an exciter, the
-    usual one first; ``doubt`` what is not settled about its diagram, to be read behind its name.
+    usual one first; ``doubt`` what is not settled about its diagram, to be read behind its name;
+    ``dialects`` the equations of programs that have others.
 
     A governor's output is the turbine's power Pm, its reference ``pref``; it sees ``dw``, the speed
     less 1, and ``p``, the electrical power, all per unit on the machine's base.
@@ -389,6 +390,11 @@ class Model:
     pslf_records: Records = ()
     places: tuple[str, ...] = ()
     doubt: str = ""
+    dialects: tuple[tuple[str, Callable[..., Any]], ...] = ()
+
+    def in_dialect(self, dialect: str) -> "Model":
+        """Return the model with the equations that another program has for it, where it has."""
+        return replace(self, equations=dict(self.dialects).get(dialect, self.equations))
 
 
 def documented(
@@ -405,6 +411,7 @@ def documented(
     inputs: str = "",
     places: str = "",
     doubt: str = "",
+    dialects: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
 ) -> Model:
     """Return the model that the docstring of its equations names and draws, or a ``text``.
 
@@ -427,6 +434,7 @@ def documented(
         pslf_records=pslf_records,
         places=tuple(places.split()),
         doubt=doubt,
+        dialects=tuple(dialects.items()),
     )
 
 

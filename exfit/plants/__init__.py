@@ -38,7 +38,7 @@ GATES = {"takeover": "", "takeover-output": "_out"}  # how the inputs of an exci
 SUMMING = "summing"
 PLACES = (*GATES, SUMMING)
 Requirement = Literal["exciter", "machine", "network"]
-Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
+Dialect = Literal["standard", "powerworld", "andes"]  # whose equations of a unit are solved
 PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
 
 
@@ -92,7 +92,7 @@ class Equipment(NamedTuple):
 
     ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
     ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
-    ``swing`` is the form of the equation of the speed, ``power_at`` the place of recorded powers.
+    ``dialect`` says whose equations are solved, ``power_at`` is the place of recorded powers.
     """
 
     exciter: Model | None
@@ -102,7 +102,7 @@ class Equipment(NamedTuple):
     recorded: frozenset[str] = frozenset()
     given: frozenset[str] = frozenset()
     stabiliser: Stabilised | None = None
-    swing: Swing = "power"
+    dialect: Dialect = "standard"
     power_at: PowerAt = "recorded-voltage"
     governor: Model | None = None
     limiters: tuple[Attached, ...] = ()

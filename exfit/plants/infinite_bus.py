@@ -15,11 +15,11 @@ from exfit.plants import (
     MEASURED,
     NETWORK,
     VT0,
+    Dialect,
     Equipment,
     PlantKind,
     SaturationForm,
     Stabilised,
-    Swing,
     compared,
 )
 from exfit.plants.limiting import Limiters, signals_of
@@ -76,14 +76,14 @@ def infinite_bus(
     inputs: tuple[str, ...] = ("vref",),
     given: Given = "Q",
     stabiliser: Stabilised | None = None,
-    swing: Swing = "power",
+    dialect: Dialect = "standard",
     governor: Model | None = None,
     limiters: Limiters = (),
 ) -> System:
     """Return an exciter on a machine behind R + jX to a stiff source.
 
     Its power Pm is constant unless there is a governor. 2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as
-    in PSS/E; the other form of ``swing`` has a torque. Parameters are the exciter's, those of
+    in PSS/E; another ``dialect`` has it otherwise. Parameters are the exciter's, those of
     machine, network, stabiliser and governor under their prefixes (``network.X``), and the initial
     voltage ``vt0``. The inputs are changes: of the references ``vref`` and ``pref``, of ``vs``
     beside the stabiliser, of ``vc1``, the voltage that the exciter measures, of ``E`` and its
@@ -93,7 +93,7 @@ def infinite_bus(
     as it is, in rad, ``speed`` 1 when rated.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
-    unit = UnitOnLoad(model, machine, saturation, stabiliser, swing, governor, limiters)
+    unit = UnitOnLoad(model, machine, saturation, stabiliser, dialect, governor, limiters)
     network = flow_sheet(given)
 
     def rest(p: Signals) -> Rest:
@@ -108,14 +108,15 @@ def infinite_bus(
         n = named_parameters(p, NETWORK, network)
         changed = Names(**{name: u.get(name, 0.0) for name in OFTEN_STILL})
         fluxes = values_named(x, machine.states)
-        at = machine.source(fluxes, of_machine)
         E, R, X = r["source"] + changed.E, n.R + changed.R, n.X + changed.X
         delta, dw, factor = x["delta"] - changed.angle, x["dw"], 1.0
-        closed = current(at, E, R, X, delta)
-        i = closed
         breaker = breaker_of(u, dw) if BREAKER in inputs else None
         if breaker is not None:
-            i, dw, factor = breaker.current(closed), breaker.dw, breaker.factor
+            dw = breaker.dw
+            factor = 1.0 if dialect == "powerworld" else breaker.factor  # which the source has
+        at = unit.source(fluxes, dw, of_machine)
+        closed = current(at, E, R, X, delta)
+        i = closed if breaker is None else breaker.current(closed)
         terminals = Terminals(fluxes, voltage(at, i, factor), i, dw)
         it = modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]
@@ -148,7 +149,7 @@ def _build(equipment: Equipment) -> System:
         equipment.inputs,
         "E" if "E" in equipment.given else "Q",
         equipment.stabiliser,
-        equipment.swing,
+        equipment.dialect,
         equipment.governor,
         equipment.limiters,
     )

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from exfit.engine.system import Rest, Signals
 from exfit.engine.trace import Signal
-from exfit.models.machines import Machine
+from exfit.models.machines import Axes, Machine, Source
 from exfit.models.sheet import Model
-from exfit.plants import GOVERNOR, MACHINE, STABILISER, SaturationForm, Stabilised, Swing
+from exfit.plants import GOVERNOR, MACHINE, STABILISER, Dialect, SaturationForm, Stabilised
 from exfit.plants.controls import listening
 from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
 from exfit.plants.loaded_machine import Flow, Terminals, compensated, loaded_at_rest
@@ -30,15 +30,23 @@ ROTOR = ("delta", "dw")
 
 
 class UnitOnLoad(NamedTuple):
-    """The models of a unit on load, and the form of its swing equation."""
+    """The models of a unit on load, and the program whose equations connect them."""
 
     exciter: Model
     machine: Machine
     saturation: SaturationForm
     stabiliser: Stabilised | None = None
-    swing: Swing = "power"
+    dialect: Dialect = "standard"
     governor: Model | None = None
     limiters: Limiters = ()
+
+    def source(self, fluxes: Names, dw: Signal, p: Names) -> Source:
+        """Return the voltage behind the stator; in PowerWorld it follows the speed."""
+        at = self.machine.source(fluxes, p)
+        if self.dialect != "powerworld":
+            return at
+        speed = 1.0 + dw
+        return at._replace(voltage=Axes(speed * at.voltage.d, speed * at.voltage.q))
 
     @property
     def added(self) -> tuple[tuple[str, Model], ...]:
@@ -140,7 +148,8 @@ def unit_motion(
     """Write the slopes of a unit's states but delta into ``d``, and return what it shows.
 
     ``state`` holds its states, and the setpoints that held it at rest. The speed follows from
-    2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power; as a torque Pm is not divided.
+    2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power; in ANDES Pm is a torque, not divided,
+    and in PowerWorld, where the stator's voltage follows the speed, Te is the power by the speed.
     """
     of_machine = named_parameters(p, MACHINE, unit.machine.sheet)
     ifd = unit.machine.field(at.fluxes, at.i, of_machine)
@@ -160,8 +169,10 @@ def unit_motion(
     efd, signals = limited_exciter(unit.exciter, unit.saturation, unit.limiters, u, p, state, d)
     unit.machine.slopes(at.fluxes, efd, ifd, at.i, of_machine, d)
     unit.machine.q_slopes(at.fluxes, at.i, of_machine, d)
-    driving = Pm - of_machine.D * state["dw"]
-    if unit.swing == "power":
+    driving, braking = Pm - of_machine.D * state["dw"], power
+    if unit.dialect != "andes":
         driving = driving / (1.0 + state["dw"])
-    d.dw = (driving - power) / (2.0 * of_machine.H)
+    if unit.dialect == "powerworld":
+        braking = braking / (1.0 + state["dw"])
+    d.dw = (driving - braking) / (2.0 * of_machine.H)
     return Excited(efd, ifd, vc1, signals)

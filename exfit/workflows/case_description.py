@@ -34,9 +34,10 @@ from exfit.util.files import on_disk
 from exfit.util.text import rounded_value, show
 
 RESTING = ("vt", *COMPARED_IN_EVENT)  # in the order in which a rest is described
-SWING = {
-    "power": "swing equation: Pm is a power, its torque (Pm - D dw) / (1 + dw)",
-    "torque": "swing equation: Pm is a torque, less D dw",
+DIALECTS = {
+    "standard": "equations of PSS/E: Pm is a power, its torque (Pm - D dw) / (1 + dw)",
+    "powerworld": "equations of PowerWorld: the stator's voltage follows the speed",
+    "andes": "equations of ANDES: Pm is a torque, less D dw",
 }
 
 
@@ -54,7 +55,7 @@ def _played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Iter
         )
         yield f"at rest until {setup.test.steady:.4g} s" + (f" with {levels}" if levels else "")
     if view.kind.has_machine and view.kind.has_exciter:
-        yield SWING[getattr(view.plant, "swing", "power")]
+        yield DIALECTS[getattr(view.plant, "dialect", "standard")]
     masks = (*recording.record.mask, *(switching.masked for switching in setup.switchings))
     if masks:
         left_out = ", ".join(f"{start:.4g} ... {end:.4g} s" for start, end in masks)

@@ -91,7 +91,7 @@ model: AC8B
 plant:
   type: grid-playback
   machine: GENROU
-  swing: torque
+  dialect: andes
   parameters: {Tpd0: 6.27, Tppd0: 0.059, Tpq0: 0.7, Tppq0: 0.096, D: 0, Xd: 2.014, Xq: 1.96,
     Xpd: 0.331, Xpq: 0.466, Xppd: 0.2059, Xl: 0.129, S10: 0.14, S12: 0.56}
   free: {H: {start: 4, min: 2, max: 9}}

@@ -88,7 +88,7 @@ def unit_of(told):
         values |= {GOVERNOR + symbol: value for symbol, value in of_governor.items()}
     multiplied = times_speed(model) if exciter["model"] in TIMES_SPEED else model
     quadratic = SATURATION["quadratic"]
-    unit = UnitOnLoad(multiplied, machine, quadratic, stabiliser, "torque", governor)
+    unit = UnitOnLoad(multiplied, machine, quadratic, stabiliser, "andes", governor)
     return unit, values
 
 
@@ -108,7 +108,7 @@ def in_a_dip(name):
     values |= {NETWORK + symbol: value for symbol, value in network.items()}
     system = infinite_bus(
         unit.exciter, unit.machine, unit.saturation, ("vref", "E"), "Q",
-        unit.stabiliser, unit.swing, unit.governor,
+        unit.stabiliser, unit.dialect, unit.governor,
     )  # fmt: skip
     # the other one's rule averages over the short step behind a jump
     late = 0.5 * told["provenance"]["first_step_after_event"]

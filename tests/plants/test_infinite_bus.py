@@ -54,9 +54,9 @@ OF_EXCITER = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("swing", "angle"), [("power", 5e-4), ("torque", 1e-4)])
+@pytest.mark.parametrize(("dialect", "angle"), [("standard", 5e-4), ("andes", 1e-4)])
 @pytest.mark.parametrize(("name", "power"), [("ieee", 0.8), ("openipsl", 0.4)])
-def test_a_step_on_load_is_that_of_another_simulator(name, power, swing, angle):
+def test_a_step_on_load_is_that_of_another_simulator(name, power, dialect, angle):
     """The start agrees to the printed digits.
 
     The other one rounds the rectifier's constants, steps just after 1 s, and writes the swing
@@ -70,7 +70,7 @@ def test_a_step_on_load_is_that_of_another_simulator(name, power, swing, angle):
     values |= {MACHINE + symbol: value for symbol, value in OF_MACHINE.items()}
     values |= {NETWORK + symbol: value for symbol, value in network.items()}
     simulator = Simulator(
-        system(MACHINES["GENROU"], "E", inputs=("vref",), swing=swing),
+        system(MACHINES["GENROU"], "E", inputs=("vref",), dialect=dialect),
         Inputs(0.0, columns["t"][-1], (InputStep(1.0, 0.02),)),
         columns["t"],
         1e-3,

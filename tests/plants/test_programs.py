@@ -1,7 +1,7 @@
 """Units of planners' files behind a fault, against the programs that simulate such files."""
 
 import pytest
-from two_buses import TwoBuses, cases, differences
+from two_buses import TwoBuses, cases, differences, reference
 
 from exfit.models import GOVERNORS
 from exfit.models.sheet import typical
@@ -9,7 +9,8 @@ from exfit.models.sheet import typical
 SHORT = ("powerworld_st3c",)
 # pu: what the steps of the programs leave; a block that is left out or wrong is 1e-4 at least
 AGREES = {"vt": 5e-6, "p": 5e-5, "q": 5e-5}
-DRIFTS = {"psse_pss7c": 4.0}  # what is small behind the fault grows with its swing
+# what is small behind the fault grows with its swing; a limiter acts in DC4B
+DRIFTS = {"psse_pss7c": 4.0, "powerworld_dc4b": 1.5}
 
 
 @pytest.mark.parametrize(
@@ -20,6 +21,15 @@ def test_a_unit_of_a_file_moves_as_in_the_program_that_the_file_is_for(name):
     share = DRIFTS.get(name, 1.0)
     for signal, difference in differences(name, AGREES).items():
         assert difference < share * AGREES[signal], signal
+
+
+def test_a_unit_of_another_dialect_moves_otherwise():
+    """The exciter DC4B of PowerWorld limits P + I by itself; the stator's voltage has the speed."""
+    told, rows = reference("powerworld_dc4b")
+    got = TwoBuses(told | {"program": "PSS/E"}).shown([row["t"] for row in rows])
+    assert (
+        max(abs(ours["vt"] - theirs["vt"]) for ours, theirs in zip(got, rows, strict=True)) > 1e-4
+    )
 
 
 def test_a_turbine_of_another_rating_than_the_machine_rests_as_in_powerworld():

@@ -71,7 +71,7 @@ def content(free, search="local", record="event.csv"):
     return {
         "model": "AC8B",
         "plant": {
-            "type": "grid-playback", "machine": "GENROU", "swing": "torque",
+            "type": "grid-playback", "machine": "GENROU", "dialect": "andes",
             "parameters": {name: own for name, own in machine.items() if name not in freed},
             "free": freed, "network": {"f0": 60},
         },

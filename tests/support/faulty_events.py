@@ -66,8 +66,8 @@ def governed(name):
 
 # what the unit has, what its case has: sections, and keys of the plant
 KINDS = {
-    "swing torque": ({"swing": "torque"}, {}, "swing: torque"),
-    "swing power": ({}, {"swing": "torque"}, "swing: power"),
+    "dialect andes": ({"dialect": "andes"}, {}, "dialect: andes"),
+    "dialect standard": ({}, {"dialect": "andes"}, "dialect: standard"),
     "TGOV1": (governed("TGOV1"), {}, "a governor that the case lacks"),
     "IEEEG1": (governed("IEEEG1"), {}, "a governor that the case lacks"),
     "HYGOV": (governed("HYGOV"), {}, "a governor that the case lacks"),
@@ -110,7 +110,7 @@ def playback_content(has: Content, file: str) -> Content:
     """Return the case of a grid event of a unit, of which K and TE are fitted."""
     plant = {
         "type": "grid-playback", "machine": "GENROU", "parameters": machine(has),
-        "network": {"f0": 60, "X": has.get("X", 0.0)}, "swing": has.get("swing", "power"),
+        "network": {"f0": 60, "X": has.get("X", 0.0)}, "dialect": has.get("dialect", "standard"),
         "power_at": has.get("power_at", "recorded-voltage"),
     }  # fmt: skip
     free = {k: {"start": v, "min": v / 10, "max": v * 10} for k, v in START.items()}
@@ -126,7 +126,7 @@ def recorded(path: Path, has: Content, level: Content, rng: np.random.Generator)
     """Write the record of a unit in an event, at its terminals or behind its transformer."""
     plant = {
         "type": "infinite-bus", "machine": "GENROU", "parameters": machine(has),
-        "network": {**LINE, **level}, "swing": has.get("swing", "power"),
+        "network": {**LINE, **level}, "dialect": has.get("dialect", "standard"),
     }  # fmt: skip
     content = {
         "model": "SEXS", "plant": plant, **sections(has),

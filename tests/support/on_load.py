@@ -22,6 +22,8 @@ def values_on_load(machine, given="Q", exciter="AC8B", **changes):
     return values | {symbol.replace("_", ".", 1): value for symbol, value in changes.items()}
 
 
-def system(machine, given="Q", exciter="AC8B", inputs=ALL_INPUTS, swing="power", governor=None):
-    kinds = {"swing": swing, "governor": governor}
+def system(
+    machine, given="Q", exciter="AC8B", inputs=ALL_INPUTS, dialect="standard", governor=None
+):
+    kinds = {"dialect": dialect, "governor": governor}
     return infinite_bus(MODELS[exciter], machine, QUADRATIC, inputs, given, **kinds)

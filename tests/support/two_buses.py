@@ -68,15 +68,17 @@ class TwoBuses:
         if added := told.get("governor"):
             governor = GOVERNORS[added["model"]]
             values |= prefixed(GOVERNOR, added["parameters"])
+        dialect = "powerworld" if told["program"] == "PowerWorld" else "standard"
         self.unit = UnitOnLoad(
-            parts.exciter.definition.model,
+            parts.exciter.definition.model.in_dialect(dialect),
             parts.machine.definition.model,
             SATURATION["quadratic"],
             stabiliser,
             governor=governor,
+            dialect=dialect,
         )
         self.values, self.pulse = values | changes, told.get("vref", 0.0)
-        self.by_speed, self.draws_power = told["program"] == "PowerWorld", "load" in told
+        self.draws_power = "load" in told
         current = P - 1j * Q
         at_load = 1.0 - LINE * current
         self.drawn = (LOAD / at_load).conjugate() / at_load
@@ -101,9 +103,9 @@ class TwoBuses:
         unit, d = self.unit, Names()
         p = named_parameters(self.values, MACHINE, unit.machine.sheet)
         fluxes, dw = values_named(state, unit.machine.states), state["dw"]
-        at, speed = unit.machine.source(fluxes, p), 1.0 + dw if self.by_speed else 1.0
+        at = unit.source(fluxes, dw, p)
         turned = exp(1j * state["delta"])
-        inner = speed * (at.voltage.q - 1j * at.voltage.d)
+        inner = at.voltage.q - 1j * at.voltage.d
         i = self.current(inner * turned, at.xd, disturbed and not self.pulse) / turned
         v = inner - 1j * at.xd * i
         terminals = Terminals(fluxes, Axes(-v.imag, v.real), Axes(-i.imag, i.real), dw)
@@ -111,7 +113,6 @@ class TwoBuses:
         held = {**self.held, **state}
         shown = unit_motion(unit, terminals, controls, self.values, held, UNCOMPENSATED, d)
         d.delta = 2.0 * pi * 60.0 * dw
-        d.dw = d.dw + terminals.p * (1.0 - 1.0 / speed) / (2.0 * p.H)  # the torque is p over speed
         signals = {"vt": terminals.vt, "p": terminals.p, "q": terminals.q, "efd": shown.efd}
         return vars(d), {**state, **signals, "speed": 1.0 + dw}
 

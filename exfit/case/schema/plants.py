@@ -22,7 +22,7 @@ from exfit.case.schema.values import (
     nothing,
 )
 from exfit.models import MACHINE_NAMES
-from exfit.plants import HEARD, PLACES, PowerAt, Swing
+from exfit.plants import HEARD, PLACES, Dialect, PowerAt
 
 if TYPE_CHECKING:
     Heard = str
@@ -31,9 +31,9 @@ else:
     Heard = Literal[HEARD]
     Place = Literal[PLACES]
 
-SWING = (
-    "What drives the speed in 2H d(dw)/dt: power, (Pm - D dw) / (1 + dw) - Te, as in PSS/E, or "
-    "torque, Pm - D dw - Te, as in ANDES."
+DIALECT = (
+    "Whose equations are solved: standard, which are those of PSS/E, powerworld or andes; see "
+    "[On load](../plants.md#on-load)."
 )
 LOAD = Field(description="P and Q until the breaker opens, pu on the base of the machine.")
 
@@ -84,6 +84,7 @@ class OpenCircuit(WithMachine):
     """A machine with its breaker open, at rated speed."""
 
     type: Literal["open-circuit"] = Field(description="Kind of plant.")
+    dialect: Dialect = Field(default="standard", description=DIALECT)
 
 
 class InfiniteBus(WithMachine, WithNetwork):
@@ -94,7 +95,7 @@ class InfiniteBus(WithMachine, WithNetwork):
         description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
         "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
     )
-    swing: Swing = Field(default="power", description=SWING)
+    dialect: Dialect = Field(default="standard", description=DIALECT)
 
 
 class GridPlayback(WithMachine, WithNetwork):
@@ -109,7 +110,7 @@ class GridPlayback(WithMachine, WithNetwork):
         "recorded on its other side; P and Q at the start where p or q is not recorded; Rc and Xc "
         "of the load compensation; pu on the base of the machine."
     )
-    swing: Swing = Field(default="power", description=SWING)
+    dialect: Dialect = Field(default="standard", description=DIALECT)
     power_at: PowerAt = Field(
         default="recorded-voltage",
         description="Where p and q are recorded, and given: at the recorded voltage, or at the "
@@ -176,7 +177,7 @@ class PlantElsewhere(WithData):
     network: Frozen[Number] = Field(
         default_factory=nothing, description="Network of the twin infinite-bus."
     )
-    swing: Swing = Field(default="power", description=SWING)
+    dialect: Dialect = Field(default="standard", description=DIALECT)
 
     @property
     def plant(self) -> "OpenCircuit | InfiniteBus | Self":
@@ -281,7 +282,7 @@ class OnLine(WithNetwork):
     network: Frozen[Number] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
     )
-    swing: Swing = Field(default="power", description=SWING)
+    dialect: Dialect = Field(default="standard", description=DIALECT)
     sources: Sources = STATED
 
 

@@ -111,7 +111,8 @@ def grid_playback(
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
         n = named_parameters(p, NETWORK, network)
         fluxes = values_named(x, machine.states)
-        at, recorded, delta = machine.source(fluxes, of_machine), p[VT0] + u["vt"], x["delta"]
+        at = unit.source(fluxes, x["dw"], of_machine)
+        recorded, delta = p[VT0] + u["vt"], x["delta"]
         delta = delta - u["angle"]
         i = current(at, recorded, n.R, n.X, delta)
         terminals = Terminals(fluxes, voltage(at, i), i, x["dw"])
@@ -146,7 +147,7 @@ def _build(equipment: Equipment) -> System:
         present(equipment.machine),
         equipment.saturation,
         equipment.stabiliser,
-        equipment.swing,
+        equipment.dialect,
         equipment.governor,
         equipment.limiters,
     )

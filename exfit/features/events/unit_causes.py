@@ -39,13 +39,13 @@ MOST_LEFT = 0.5  # of the error beyond the noise, by a stand-in that is like the
 LIKELIER_THAN_MODEL = 1.0  # log-likelihood
 INERTIA, DAMPING, REACTANCE = f"{MACHINE}H", f"{MACHINE}D", f"{NETWORK}X"
 FORMS = {
-    "power": "the mechanical power is constant, (Pm - D dw) / (1 + dw)",
-    "torque": "the mechanical torque is constant, Pm - D dw",
+    "standard": "the mechanical power is constant, (Pm - D dw) / (1 + dw)",
+    "andes": "the mechanical torque is constant, Pm - D dw",
 }
 
 
 def with_plant_keys(case: Case, **keys: Any) -> Case:
-    """Return a case with other keys of its plant, such as ``swing``; they are not checked."""
+    """Return a case with other keys of its plant, such as ``dialect``; they are not checked."""
     return replace(case, plant=case.plant.model_copy(update=keys))
 
 
@@ -85,13 +85,13 @@ def of_case(evidence: Evidence, other: Case) -> Residuals:
 
 def other_swing(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the form of the equation of the speed."""
-    own = getattr(evidence.case.plant, "swing", "power")
-    form = "torque" if own == "power" else "power"
+    own = getattr(evidence.case.plant, "dialect", "standard")
+    form = "standard" if own == "andes" else "andes"
     cause = Cause(
-        f"the equation of the speed: swing: {form} would match (the case has {own})",
-        f"where the record is that of a simulator in which {FORMS[form]}, write swing: {form}",
+        f"the equation of the speed: dialect: {form} would match (the case has {own})",
+        f"where the record is that of a simulator in which {FORMS[form]}, write dialect: {form}",
     )
-    residuals = of_case(evidence, with_plant_keys(evidence.case, swing=form))
+    residuals = of_case(evidence, with_plant_keys(evidence.case, dialect=form))
     yield from tried(evidence, residuals, cause)
 
 

@@ -8,7 +8,7 @@ from exfit.case.yaml import Fault
 from exfit.plants import KINDS
 from exfit.util.text import near
 
-OF_TWIN = ("machine", "parameters", "free", "network", "swing")
+OF_TWIN = ("machine", "parameters", "free", "network", "dialect")
 
 
 def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
@@ -34,10 +34,8 @@ def _twin_faults(plant: ContentNode) -> Iterator[Fault]:
     if "machine" not in plant:
         yield plant.at("machine").fault("is missing")
     twin = KINDS.get(str(plant.at("twin").value))
-    if twin is not None and not twin.on_load:
-        for key in ("network", "swing"):
-            if key in plant:
-                yield plant.at(key).fault(f"not allowed with twin {twin.name}")
+    if twin is not None and not twin.on_load and "network" in plant:
+        yield plant.at("network").fault(f"not allowed with twin {twin.name}")
 
 
 def _named_faults(content: ContentNode, plant: ContentNode, parts: Parts) -> Iterator[Fault]:

@@ -1,5 +1,9 @@
 """Commutator exciters with a PID: DC4B and DC4C."""
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 from exfit.models.blocks import (
     Signal,
     clip,
@@ -7,6 +11,7 @@ from exfit.models.blocks import (
     exciter,
     exciter_demand,
     limited_lag,
+    pi_and_derivative,
     pi_rest,
     pid,
 )
@@ -44,11 +49,20 @@ def dc4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     (SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
     setpoints KE0, VRMAX0, VRMIN0.
     (For DC4B that is OpenIPSL's KE and InterPSS's KE and VRMAX; the standard
-    computes neither.) Not modelled: UEL or OEL at the summing point.
+    computes neither.) PowerWorld 24 limits P + I by itself, and its sum with the
+    derivative again: so it is with dialect: powerworld (vt within 6e-6 pu over a
+    fault, otherwise 2e-4). Not modelled: UEL or OEL at the summing point.
     """
+    return dc4b_limiting(pid, s, u, p, d)
+
+
+def dc4b_limiting(
+    limited: Callable[..., Any], s: Signal, u: Signal, p: Signal, d: Signal
+) -> Signal:
+    """DC4B with a form of its PID that says what VRMAX / KA and VRMIN / KA limit."""
     error = error_less_feedback(p.TF, s, u, p, d)
     low, high = s.VRMIN0 / p.KA, s.VRMAX0 / p.KA
-    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD, low, high)
+    vpid, d.VI, d.VD = limited(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD, low, high)
     fed = u.vt * clip(vpid, u.vuel, u.voel)
     vr, d.VR = limited_lag(fed, s.VR, p.KA, p.TA, u.vt * s.VRMIN0, u.vt * s.VRMAX0)
     efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, p.VEMIN)
@@ -79,6 +93,7 @@ DC4B = documented(
         places={2: "takeover"},
     ),
     setpoints="KE0 VRMAX0 VRMIN0",
+    dialects={"powerworld": partial(dc4b_limiting, pi_and_derivative)},
 )
 
 

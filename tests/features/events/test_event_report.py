@@ -58,7 +58,7 @@ def test_unit_and_test_say_from_which_rest_and_what_is_left_out(page):
     (_, fitted, validated) = page.tables["Tests and their records"]
     done = fitted[4]
     assert done.startswith("recorded vt and angle played in; at rest until 2 s with vt 1 pu, p 0.8")
-    assert "swing equation: Pm is a power" in done
+    assert "equations of PSS/E: Pm is a power" in done
     assert "left out of the comparison: 9 ... 9.5 s" in done
     assert done.endswith("q below 8 Hz")
     assert "p 0.5 pu, q -0.1 pu" in validated[4]

@@ -109,7 +109,7 @@ def test_an_event_is_that_of_another_simulator(exciter, most, governor):
     """
     columns = recorded("playback_ac8b" if governor is None else "playback_ac8b_tgov1")
     time, turbine = columns["t"], None if governor is None else GOVERNORS[governor]
-    unit = UnitOnLoad(exciter, GENROU, QUADRATIC, swing="torque", governor=turbine)
+    unit = UnitOnLoad(exciter, GENROU, QUADRATIC, dialect="andes", governor=turbine)
     inputs = played(time, columns["vt"], columns["angle"])
     values = {GOVERNOR + symbol: value for symbol, value in OF_GOVERNOR.items()}
     got = response(grid_playback(unit), inputs, time, values_of(columns) | values, 0.5 * STEP)
@@ -183,9 +183,9 @@ def test_a_transformer_is_a_line_to_the_recorded_voltage(power_at):
     assert np.abs(again["efd"] - got["efd"]).max() < 1e-5
 
 
-@pytest.mark.parametrize("swing", ["power", "torque"])
-def test_a_unit_whose_record_rests_stays_at_rest_for_a_minute(swing):
-    made = grid_playback(UnitOnLoad(MODELS["AC8B"], GENROU, QUADRATIC, swing=swing))
+@pytest.mark.parametrize("dialect", ["standard", "powerworld", "andes"])
+def test_a_unit_whose_record_rests_stays_at_rest_for_a_minute(dialect):
+    made = grid_playback(UnitOnLoad(MODELS["AC8B"], GENROU, QUADRATIC, dialect=dialect))
     columns = {"vt": np.full(2, 1.01), "p": [0.8], "q": [0.1]}
     time = np.linspace(0.0, 60.0, 61)
     inputs = Inputs(0.0, 60.0, ())
