@@ -3,7 +3,7 @@
 import re
 from math import exp, log
 
-from exfit.features.planner.records import contradictions, unused_of
+from exfit.features.planner.records import contradictions, unused_of, with_exchanged
 from exfit.models.sheet import typical
 
 TRIES = 500
@@ -72,6 +72,7 @@ def loose(definition, values, random, bus=1, machine_id="1"):
     """Return a record in the free format, as anyone may have typed it."""
     ignored = {symbol: float(random.normal()) for symbol in definition.record.ignored}
     given = {**values, **ignored, **dict(definition.record.absent)}
+    given = with_exchanged(definition.record, given)
     name = definition.record.name
     name = name.lower() if random.integers(4) == 0 else name
     fields = [str(bus), quoted(name, random), quoted(machine_id, random)]

@@ -1,6 +1,7 @@
 """The commands import and export."""
 
 import os
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -125,6 +126,10 @@ def _report_import(imported: "ImportedUnits", folder: Path) -> None:
     echo(f"written to {folder}; {counts}; all units: {UNITS}")
     for path in first_texts([str(path) for path in plan.others]):
         echo(f"no unit for {path}: its name does not begin with a bus", err=True)
+    left_out = Counter(name for unit in plan.units.units for name in unit.unknown)
+    if left_out:
+        counts = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items()))
+        echo(f"left out, no model of exfit (units): {counts}", err=True)
     for line in first_texts(lines[NO_MODEL]):
         echo(f"no model: {line}", err=True)
     if plan.units.classical:

@@ -18,6 +18,7 @@ from exfit.features.planner.records import (
     RATING,
     SHARE,
     Reading,
+    fields_of,
     idle_lags,
     read_values,
 )
@@ -159,7 +160,7 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[Reading, 
     Raises ExfitError where a record is of another model, or is not as it was found.
     """
     exciter = None if result.model == result.machine_model else result.model
-    models = (
+    models: tuple[tuple[str | None, Reading | None, str], ...] = (
         (exciter, unit.exciter, ""),
         (result.machine_model, unit.machine, "machine."),
         (result.stabiliser_model, unit.stabiliser, "stabiliser."),
@@ -167,10 +168,15 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[Reading, 
     )
     if "model" in result.inputs:
         raise ExfitError(not_of_catalogue(result, unit.exciter.definition.program))
-    prefixes = tuple(f"{kind}." for kind in result.limiter_models)
-    fitted = [name for name in result.parameters if name.startswith(prefixes)]
-    if fitted:
-        raise ExfitError(f"records of limiters cannot be changed: fitted: {', '.join(fitted)}")
+    limiters = {part.definition.prefix: part for part in unit.limiters}
+    for kind, name in result.limiter_models.items():
+        prefix = f"{kind}."
+        fitted = [name for name in result.parameters if name.startswith(prefix)]
+        if prefix in limiters:
+            models += ((name, limiters[prefix], prefix),)
+        elif fitted:
+            names = ", ".join(fitted)
+            raise ExfitError(f"{file}: the unit has no record of {name}: fitted: {names}")
     for model, part, prefix in models:
         if model is None:
             continue
@@ -212,7 +218,7 @@ def _edits(result: FitResult, part: Reading, prefix: str, file: str) -> Iterator
     definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
     changed = _changed(result, part, prefix, values)
-    fields = dict(zip(definition.names, part.fields, strict=True))
+    fields = fields_of(part)
     of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}
     if of_curve and result.saturation != "quadratic":
         raise ExfitError(as_quadratic(result, definition.program))
@@ -242,8 +248,8 @@ def _changed(
         and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
     }
     # lags that a record may have as 0 as long as their gains are 0
-    named = zip(definition.names, part.fields, strict=True)
-    idle = idle_lags(definition.model.sheet, {name: number(field) for name, field in named})
+    numbers = {name: number(field) for name, field in fields_of(part).items()}
+    idle = idle_lags(definition.model.sheet, numbers)
     return changed | {row.symbol for row in idle if row.search and row.search.needs in changed}
 
 
@@ -268,7 +274,7 @@ def _changes(
 ) -> Iterator[ChangedValue]:
     """Yield the rows of the table for the edits of a record."""
     rows = {row.symbol: row for row in part.definition.model.sheet}
-    names = dict(zip(part.fields, part.definition.names, strict=True))
+    names = {field: name for name, field in fields_of(part).items()}
     for field, text in edits:
         symbol = names[field]
         fitted = fit.result.parameters.get(prefix + symbol)

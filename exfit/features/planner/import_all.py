@@ -75,6 +75,7 @@ class ImportedUnit(NamedTuple):
     exciter: str
     stabiliser: str
     governor: str
+    limiters: str
     status: str
     case: str
     records: str
@@ -209,6 +210,7 @@ def _row(
         exciter=unit.exciter.definition.record.name,
         stabiliser=added.get("stabiliser", ""),
         governor=added.get("governor", ""),
+        limiters=" ".join(part.definition.record.name for part in unit.limiters),
         status=status,
         case=case,
         records="; ".join(map(str, records)),
@@ -220,7 +222,7 @@ def _refused(unit: RefusedUnit) -> ImportedUnit:
     """Make the row of a unit that has no case."""
     status = REFUSED if unit.modelled else NO_MODEL
     text = "; ".join(f"line {fault.line}: {fault.text}" for fault in unit.faults)
-    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", "", status, "", "", text)
+    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", "", "", status, "", "", text)
 
 
 def _made(

@@ -62,6 +62,11 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
         inputs = inputs_section(part.definition.model, part.inputs)
         section = {"model": _named(part), **inputs, **_parameters(part)}
         sections[part.definition.kind] = section
+    if unit.limiters:
+        sections["limiters"] = [
+            {"model": _named(part), "place": part.place, **_parameters(part)}
+            for part in unit.limiters
+        ]
     values = _parameters(exciter)
     fixed = Noted(values.pop("parameters"), "move what is to be fitted to free")
     sections |= {
@@ -107,11 +112,13 @@ def unit_data(unit: Unit, file: str) -> UnitData:
         absent = dict.fromkeys(part.definition.absent, TYPICAL)
         origin = f"those of {Path(file).name}"
         model, times_speed = part.definition.model, part.times_speed
-        return PartData(model, part.values, absent, origin, part.inputs, times_speed)
+        return PartData(model, part.values, absent, origin, part.inputs, times_speed, part.place)
 
     added = {part.definition.kind: data(part) for part in unit.added}
     exciter, machine = data(unit.exciter), data(unit.machine)
-    return UnitData(exciter.model.name, exciter, machine, added, as_found(unit, file))
+    limiters = tuple(map(data, unit.limiters))
+    found = as_found(unit, file)
+    return UnitData(exciter.model.name, exciter, machine, added, limiters, found)
 
 
 def as_found(unit: Unit, file: str) -> Section:
@@ -120,9 +127,8 @@ def as_found(unit: Unit, file: str) -> Section:
     ``unused`` are values there that the planner's program ignores.
     """
     values, unused = dict[str, float](), dict[str, float]()
-    for part in (unit.exciter, unit.machine, *unit.added):
-        definition = part.definition
-        prefix = "" if definition.kind == "exciter" else f"{definition.kind}."
+    for part in (unit.exciter, unit.machine, *unit.added, *unit.limiters):
+        definition, prefix = part.definition, part.definition.prefix
         for row in definition.model.sheet:
             if row.symbol in definition.names:
                 values[prefix + row.symbol] = part.values[row.symbol]

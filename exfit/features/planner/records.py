@@ -2,16 +2,17 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from exfit.features.planner.fields import DynamicsFault, Field, number, whole
-from exfit.models import GOVERNORS, MODELS, STABILISERS, sheet
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import DynamicsRecord, Model, Parameter, Sheet, typical
 from exfit.util.text import rounded, show, show_value
 
 PSSE, PSLF = "PSS/E", "PSLF"
+LIMITER = "limiter"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
 RATING, SHARE = "Trate", "Trate_Mbase"  # of a turbine: MW, and over the machine's base
 SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
@@ -25,6 +26,7 @@ LONGEST_ID = 2
 LONGEST_BUS = 10  # digits that are looked at
 MOST_BUSES = 10**6
 
+Value = TypeVar("Value")
 Texts = Iterable[tuple[str, str]]  # (symbol, what is wrong or must be known)
 
 
@@ -32,13 +34,20 @@ Texts = Iterable[tuple[str, str]]  # (symbol, what is wrong or must be known)
 class Definition:
     """A record of a program and the model that it gives the data of.
 
-    ``kind``: machine, exciter, stabiliser, governor.
+    ``kind``: machine, exciter, stabiliser, governor, limiter.
     """
 
     kind: str
     model: Model | Machine
     record: DynamicsRecord
     program: str = PSSE
+
+    @property
+    def prefix(self) -> str:
+        """Beginning of the names of its parameters in a case; of a limiter that of its kind."""
+        if self.kind == "exciter":
+            return ""
+        return f"{self.model.name[:3].lower() if self.kind == LIMITER else self.kind}."
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,6 +136,7 @@ def definitions(program: str = PSSE) -> list[Definition]:
         ("exciter", MODELS),
         ("stabiliser", STABILISERS),
         ("governor", GOVERNORS),
+        (LIMITER, LIMITERS),
     )
     return [
         Definition(kind, model, record, program)
@@ -169,7 +179,8 @@ class Reading:
     It begins on ``line``; ``fields`` are those behind the id, one for each name of the definition;
     ``inputs`` are the signals of a stabiliser whose record has codes of them; ``times_speed`` says
     that efd is multiplied by the speed; ``unused`` are the file's values of what is 0 in
-    ``values``, since its program ignores them, or not there: the rating of a turbine.
+    ``values``, since its program ignores them, or not there: the rating of a turbine; ``place`` is
+    where a limiter acts.
     """
 
     definition: Definition
@@ -181,6 +192,7 @@ class Reading:
     inputs: tuple[str, ...] = ()
     times_speed: bool = False
     unused: tuple[tuple[str, float], ...] = ()
+    place: str = ""
 
 
 def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
@@ -333,7 +345,13 @@ def _without_effect(
         yield RATING, f"{text}case, {show(rating)} over that base (1 is taken)"
 
 
-def with_exchanged(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:
+def fields_of(part: Reading) -> dict[str, Field]:
+    """Return the field of each symbol of a record that has no faults."""
+    fields = dict(zip(part.definition.names, part.fields, strict=True))
+    return with_exchanged(part.definition.record, fields)
+
+
+def with_exchanged(record: DynamicsRecord, values: Mapping[str, Value]) -> dict[str, Value]:
     """Return values of which two have changed places, where they do so in a record."""
     pairs = zip(record.exchanged, reversed(record.exchanged), strict=True)
     return {**values, **{name: values[other] for name, other in pairs if other in values}}

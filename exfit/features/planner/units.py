@@ -10,6 +10,7 @@ from exfit.features.planner.pslf import PSLF_FILES
 from exfit.features.planner.psse import PSSE_FILES
 from exfit.features.planner.records import (
     FLAGS,
+    LIMITER,
     SHARE,
     FileFormat,
     Head,
@@ -18,13 +19,14 @@ from exfit.features.planner.records import (
     definitions,
     read_values,
 )
-from exfit.models import LIMITERS
+from exfit.models.sheet import Model
+from exfit.plants import GOVERNOR, MACHINE, STABILISER, Attached, inputs_at
+from exfit.plants.limiting import inputs_for_limiters
 from exfit.util.text import closest, near, show
 
 FORMATS = {files.suffix.removeprefix("."): files for files in (PSSE_FILES, PSLF_FILES)}
 NEARLY_THE_NAME = 0.8  # of two names alike: a typing error, not another model
 NEEDED = ("machine", "exciter")
-LIMITER = "excitation limiter"
 MOST_LISTED = 20  # units in a message
 OTHERS: Mapping[str, str] = {
     name: kind
@@ -35,7 +37,7 @@ OTHERS: Mapping[str, str] = {
             WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
         "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PTIST1 PTIST3
             STAB3 STAB4 STABNI STBSVC""",
-        LIMITER: "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL4C UEL2",
+        "excitation limiter": "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL4C UEL2",
         "compensator": "COMP COMPCC IEEEVC REMCMP",
     }.items()
     for name in names.split()
@@ -51,7 +53,10 @@ def format_of(file: str | Path) -> FileFormat:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit; ``warnings`` say, by line, what of the file its models do not represent."""
+    """A unit; ``warnings`` say, by line, what of the file its models do not represent.
+
+    ``unknown`` are the names of its records that exfit has no model of, which are left out.
+    """
 
     bus: int
     id: str
@@ -59,7 +64,9 @@ class Unit:
     exciter: Reading
     stabiliser: Reading | None
     governor: Reading | None
+    limiters: tuple[Reading, ...]
     warnings: tuple[DynamicsFault, ...]
+    unknown: tuple[str, ...] = ()
 
     @property
     def added(self) -> tuple[Reading, ...]:
@@ -71,7 +78,8 @@ class Unit:
 class RefusedUnit:
     """A unit that cannot be imported: its records by name, and why.
 
-    ``modelled``: it has a machine and an exciter that exfit knows, so that its values are at fault.
+    ``modelled``: it is a unit of which exfit lacks a model or its values are at fault, not a load
+    or a machine without an exciter.
     """
 
     bus: int
@@ -119,7 +127,8 @@ def read_units(text: str, file: str | Path) -> DynamicsUnits:
                 first.id,
                 first.line,
                 tuple(head.name for head in own),
-                not missing,
+                not missing
+                or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
                 tuple(sorted(wrong, key=lambda fault: fault.line)),
             )
         )
@@ -191,48 +200,94 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     It is None, too, where it has no machine or exciter that exfit knows.
     """
     faults, warnings = list[DynamicsFault](), list[DynamicsFault]()
+    parts = _parts(heads, faults, warnings)
+    if faults or not parts.keys() >= {MACHINE, ""}:
+        return None, faults
+    exciter, governor = parts[""], parts.get(GOVERNOR)
+    unknown = [head for head in heads if head.definition is None]
+    warnings += [DynamicsFault(head.line, _left_out(head.name)) for head in unknown]
+    unit = Unit(
+        heads[0].bus,
+        heads[0].id,
+        parts[MACHINE],
+        exciter,
+        parts.get(STABILISER),
+        None if governor is None else _on_its_base(governor, heads, warnings),
+        tuple(_attached(parts.values(), exciter, warnings)),
+        tuple(sorted(warnings, key=lambda warning: warning.line)),
+        tuple(head.name for head in unknown),
+    )
+    return unit, []
+
+
+def _parts(
+    heads: Iterable[Head], faults: list[DynamicsFault], warnings: list[DynamicsFault]
+) -> dict[str, Reading]:
+    """Return the records that exfit has models of, by the beginnings of their parameters' names.
+
+    A unit cannot do without its machine and its exciter, whose faults are added. Others that have
+    faults are left out with a warning.
+    """
     parts: dict[str, Reading] = {}
     for head in heads:
         definition = head.definition
         if definition is None:
             continue
-        kind, name = definition.kind, head.name
-        if kind in parts:
-            first = parts[kind]
-            other = f"{first.definition.record.name} is on line {first.line}"
-            faults.append(DynamicsFault(head.line, f"{name}: a second {kind}; {other}"))
-            continue
         reading = read_values(definition, head.line, head.fields)
-        if kind == "governor" and reading.faults and not head.faults:
-            # a unit whose governor cannot be simulated can be verified without it
-            warnings += [
-                fault._replace(text=f"governor {name} is left out: {fault.text}")
-                for fault in reading.faults
-            ]
+        wrong = [*(head.faults or reading.faults)]
+        first = parts.setdefault(definition.prefix, reading)
+        if first is not reading:
+            kind = definition.prefix.removesuffix(".") or definition.kind
+            other = f"{first.definition.record.name} is on line {first.line}"
+            wrong = [DynamicsFault(head.line, f"{head.name}: a second {kind}; {other}")]
+        if not wrong:
+            warnings += reading.warnings
+        elif definition.kind in NEEDED:
+            faults += wrong
+        else:
+            what = f"{definition.kind} {head.name} is left out"
+            texts = "; ".join(
+                fault.text.removeprefix(f"{definition.record.name}: ") for fault in wrong
+            )
+            warnings.append(DynamicsFault(wrong[0].line, f"{what}: {texts}"))
+            if first is reading:
+                del parts[definition.prefix]
+    return parts
+
+
+def _attached(
+    parts: Iterable[Reading], exciter: Reading, warnings: list[DynamicsFault]
+) -> Iterator[Reading]:
+    """Yield the limiters with their places at an exciter; add those without one, which are left.
+
+    The place is that of the flag of the exciter's record, else the usual one of the limiter.
+    """
+    record, model = exciter.definition.record, exciter.definition.model
+    values = dict(zip(exciter.definition.names, exciter.fields, strict=True))
+    assert isinstance(model, Model)
+    for limiter in parts:
+        own = limiter.definition.model
+        if limiter.definition.kind != LIMITER or not isinstance(own, Model):
             continue
-        faults += head.faults or reading.faults
-        warnings += reading.warnings
-        parts[kind] = reading
-    if "governor" in parts:
-        parts["governor"] = _on_its_base(parts["governor"], heads, warnings)
-    if faults or not parts.keys() >= {*NEEDED}:
-        return None, faults
-    exciter = parts["exciter"]
-    warnings += [
-        DynamicsFault(head.line, _left_out(head, exciter))
-        for head in heads
-        if head.definition is None
-    ]
-    unit = Unit(
-        heads[0].bus,
-        heads[0].id,
-        parts["machine"],
-        exciter,
-        parts.get("stabiliser"),
-        parts.get("governor"),
-        tuple(sorted(warnings, key=lambda warning: warning.line)),
-    )
-    return unit, []
+        name, flag = limiter.definition.record.name, limiter.definition.prefix[:3].upper()
+        fed = inputs_for_limiters(model)
+        places = [
+            place
+            for place in own.places
+            if fed.issuperset(inputs_at(Attached(own, place)).values())
+        ]
+        code = int(number(values[flag])) if flag in FLAGS and flag in values else None
+        stated = dict(record.places).get(code) if code is not None else None
+        if not places:
+            text = f"limiter {name} is left out: {record.name} has no input for it"
+            warnings.append(DynamicsFault(limiter.line, text))
+            continue
+        place = stated if stated in places else places[0]
+        if place != stated:
+            why = "does not state its place" if code is None else f"has {flag} = {code}"
+            text = f"{name}: {record.name} {why}; {place} is taken"
+            warnings.append(DynamicsFault(limiter.line, text))
+        yield replace(limiter, place=place)
 
 
 def _on_its_base(
@@ -269,8 +324,8 @@ def _missing(missing: Sequence[str], chosen: Sequence[Head]) -> Iterator[Dynamic
     for kind in missing:
         names = _names_of(kind, chosen[0].program)
         candidates = []
-        for head in _unknown(chosen):  # PSS/E's machines are GENROU, GENSAL, GENCLS ...
-            looks_like = "machine" if head.name.upper().startswith("GEN") else "exciter"
+        for head in _unknown(chosen):
+            looks_like = "machine" if _is_machine(head.name) else "exciter"
             candidates += [head] if len(missing) == 1 or looks_like == kind else []
         for head in candidates:
             text = f"exfit has no {kind} of that name; {near(head.name, names)}"
@@ -295,10 +350,15 @@ def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[Dynamics
             yield DynamicsFault(head.line, f"{head.name}: did you mean {meant}?")
 
 
+def _is_machine(name: str) -> bool:
+    """Whether a name is that of a machine: GENROU, GENSAL, GENTPJ ..., of which none is a load."""
+    return name.upper().startswith("GEN") and name.upper() not in CLASSICAL
+
+
 def _unknown(heads: Iterable[Head]) -> list[Head]:
     """Return the records whose names do not show what they are."""
     left_out = (head for head in heads if head.definition is None)
-    return [head for head in left_out if _kind_left_out(head.name) is None]
+    return [head for head in left_out if head.name.upper() not in OTHERS]
 
 
 def _classical_machines(heads: Iterable[Head]) -> list[DynamicsFault]:
@@ -324,27 +384,8 @@ def _names_of(kind: str, program: str) -> list[str]:
     )
 
 
-def _kind_left_out(name: str) -> str | None:
-    """Guess the kind of a record that is left out, None where its name does not show it."""
-    return LIMITER if name.upper() in LIMITERS else OTHERS.get(name.upper())
-
-
-def _left_out(head: Head, exciter: Reading) -> str:
-    kind, name = _kind_left_out(head.name), head.name.upper()
-    if kind is None:
-        return f"{head.name} is left out: not a known model"
-    if name not in LIMITERS:
-        return f"{kind} {name} is left out"
-    how = "give it under limiters"
-    # its place by the flag of its exciter's record
-    record, flag = exciter.definition.record, name[:3]
-    values = dict(zip(exciter.definition.names, exciter.fields, strict=True))
-    if flag in FLAGS and flag in values:
-        code = int(number(values[flag]))
-        place = dict(record.places).get(code)
-        if place in LIMITERS[name].places:
-            how += f", place: {place} ({record.name} has {flag} = {code})"
-    for own in LIMITERS[name].records:
-        if own.exchanged:
-            how += f", {' and '.join(own.exchanged)} exchanged"
-    return f"{kind} {name} is left out: {how}"
+def _left_out(name: str) -> str:
+    kind = OTHERS.get(name.upper())
+    return (
+        f"{name} is left out: not a known model" if kind is None else f"{kind} {name} is left out"
+    )

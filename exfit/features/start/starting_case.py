@@ -63,7 +63,7 @@ class PartData:
 
     A value without a source is not stated; ``origin`` says in a comment where the data are from;
     ``inputs`` are the signals of a stabiliser, () for those of its model; ``times_speed`` says that
-    the speed multiplies the efd of an exciter.
+    the speed multiplies the efd of an exciter; ``place`` is where a limiter acts on it.
     """
 
     model: Model | Machine
@@ -72,6 +72,7 @@ class PartData:
     origin: str = ""
     inputs: tuple[str, ...] = ()
     times_speed: bool = False
+    place: str = ""
 
     @classmethod
     def typical(cls, model: Model | Machine) -> "PartData":
@@ -83,14 +84,15 @@ class PartData:
 class UnitData:
     """The exciter, behind the ``name`` that the case gives it, its machine, and what is ``added``.
 
-    That are the stabiliser and the governor, each under the key of its section; ``as_found``
-    is the section of what was in the planner's base.
+    That are the stabiliser and the governor, each under the key of its section, and the
+    ``limiters``; ``as_found`` is the section of what was in the planner's base.
     """
 
     name: str
     exciter: PartData
     machine: PartData
     added: Mapping[str, PartData] = field(default_factory=dict)
+    limiters: tuple[PartData, ...] = ()
     as_found: Section = field(default_factory=dict)
 
 
@@ -158,6 +160,7 @@ def starting_case(
         **({"efd_times_speed": True} if unit.exciter.times_speed else {}),
         "plant": _plant(unit, first.inspection, event),
         **{key: added_section(part) for key, part in unit.added.items()},
+        **({"limiters": [*map(added_section, unit.limiters)]} if unit.limiters else {}),
         **recordings,
         "parameters": _parameters(unit.exciter),
         **weights_section(first.inspection),
@@ -168,10 +171,12 @@ def starting_case(
 
 
 def added_section(part: PartData) -> Section:
-    """Make the section of a stabiliser or a governor."""
+    """Make the section of a stabiliser, a governor or a limiter."""
     values = {row.symbol: parameter(row, part.values[row.symbol]) for row in part.model.sheet}
     model = Noted(part.model.name, part.origin)
     section = {"model": model, **inputs_section(part.model, part.inputs), "parameters": values}
+    if part.place:
+        section["place"] = part.place
     return with_sources(section, part.sources)
 
 

@@ -31,6 +31,7 @@ from exfit.features.planner.records import (
 )
 from exfit.features.planner.units import read_units
 from exfit.models.sheet import typical
+from exfit.plants import LIMITER_KINDS
 from exfit.results.comparisons import AsFound
 from exfit.results.model import FittedParameter
 from exfit.util.vocabulary import FITTED, TYPICAL
@@ -48,12 +49,6 @@ PARTNERS = {
 }
 FILES = {PSSE: "units.dyr", PSLF: "units.dyd"}
 WRITTEN = 5e-6  # of a value: half of the sixth digit
-PREFIXES = {
-    "exciter": "",
-    "machine": "machine.",
-    "stabiliser": "stabiliser.",
-    "governor": "governor.",
-}
 ENCODINGS = ("utf-8", "latin-1", "utf-8-sig", "utf-16", "utf-16-be")
 
 
@@ -76,8 +71,8 @@ def unit_of(data, bus, machine_id="1", program=PSSE):
 
 def parts_of(unit):
     """Return the records of a unit by the beginnings of the names of their parameters."""
-    parts = (unit.exciter, unit.machine, *unit.added)
-    return {PREFIXES[part.definition.kind]: part for part in parts}
+    parts = (unit.exciter, unit.machine, *unit.added, *unit.limiters)
+    return {part.definition.prefix: part for part in parts}
 
 
 def values_of(unit):
@@ -110,6 +105,8 @@ def verified(fit, unit, values, sources=None, **others):
             "stabiliser_model": model.get("stabiliser."),
             "governor": of_part.get("governor.", {}),
             "governor_model": model.get("governor."),
+            "limiters": {p[:-1]: of_part[p] for p in of_part if p[:-1] in LIMITER_KINDS},
+            "limiter_models": {p[:-1]: model[p] for p in model if p[:-1] in LIMITER_KINDS},
             "sources": dict.fromkeys(changed, FITTED) | (sources or {}),
             "as_found": AsFound("", model[""], found, bus=unit.bus, machine_id=unit.id),
             "saturation": "quadratic",
@@ -150,6 +147,8 @@ def rounded(value):
 def partners(definition, random):
     """Return the records of a unit, one of them of a kind: (definition, values)."""
     chosen = {**PARTNERS[definition.program], definition.kind: definition}
+    if definition.kind == "limiter":  # this exciter has all places for one
+        chosen["exciter"] = DEFINITIONS["AC1C"]
     records = [(own, sound(own, random)) for own in chosen.values()]
     random.shuffle(records)
     return records
@@ -265,7 +264,9 @@ REFUSED = {
 }
 
 
-def test_fitted_values_of_a_limiter_are_refused_and_those_of_its_unit_with_them(fit):
+def test_fitted_values_of_a_limiter_without_a_record_are_refused_with_those_of_its_unit(
+    fit,
+):
     data = THREE.encode()
     unit = unit_of(data, 9)
     at_work = {"limiter_models": {"oel": "OEL3C"}, "limiters": {"oel": {"ITFPU": 1.1}}}
@@ -276,7 +277,7 @@ def test_fitted_values_of_a_limiter_are_refused_and_those_of_its_unit_with_them(
     assert written.data == data
     (left,) = written.left
     assert left.verified
-    assert left.reason == "records of limiters cannot be changed: fitted: oel.ITFPU"
+    assert left.reason == "f: the unit has no record of OEL3C: fitted: oel.ITFPU"
 
 
 @pytest.mark.parametrize("case", REFUSED)
@@ -348,7 +349,7 @@ def test_what_its_program_does_without_is_0_in_a_case_and_stays_in_the_file(name
     ((symbol, _),) = own.record.unused
     values[own.kind][symbol] = 0.4
     text = "\n".join(record_text(of, values[kind], 7, "1") for kind, of in partners.items()) + "\n"
-    unit, full = unit_of(text.encode(), 7), PREFIXES[own.kind] + symbol
+    unit, full = unit_of(text.encode(), 7), own.prefix + symbol
     (warning,) = [w.text for w in unit.warnings if f"{name}: {symbol}: PSS/E ignores 0.4" in w.text]
     assert warning.endswith("; 0 is taken")
     case = imported_case(unit, "units.dyr").text

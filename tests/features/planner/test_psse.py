@@ -24,6 +24,7 @@ from exfit.features.planner.records import (
     definition_of,
     definitions,
     read_values,
+    with_exchanged,
 )
 from exfit.features.planner.units import read_unit
 from exfit.models import MODELS
@@ -110,7 +111,8 @@ def partners(definition, random):
     if definition.kind != "machine":
         records.append((GENROU, sound(GENROU, random)))
     if definition.kind != "exciter":
-        records.append((ESAC1A, sound(ESAC1A, random)))
+        exciter = definition_of("AC1C") if definition.kind == "limiter" else ESAC1A
+        records.append((exciter, sound(exciter, random)))
     random.shuffle(records)
     return records
 
@@ -125,6 +127,7 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
     assert max(map(len, case.splitlines())) <= 100
     mine, theirs = read_yaml(case, Path("case.yaml"))[0].value, yaml.safe_load(case)
     places = {"machine": ("plant", "parameters"), "exciter": ("parameters", "fixed")}
+    places["limiter"] = ("limiters", 0, "parameters")
     for one, values in records:
         for data in (mine, theirs):
             for key in places.get(one.kind, (one.kind, "parameters")):
@@ -351,11 +354,11 @@ def test_what_other_units_and_devices_hold_is_no_fault():
     [
         ("1 IEEEG2 1 0 0 /", "governor IEEEG2 is left out"),
         ("1 'MAXEX2' 1 0 0 /", "excitation limiter MAXEX2 is left out"),
-        ("1 'UEL1' 1 0 0 /", "excitation limiter UEL1 is left out: give it under limiters"),
         (
-            "1 'OEL2C' 1 0 0 /",
-            "excitation limiter OEL2C is left out: give it under limiters, FIXEDRU and FIXEDRD "
-            "exchanged",
+            "1 'OEL3C' 1 0 1 1 x /",
+            "limiter OEL3C is left out: 4 values after the id, but the record has 12 (1 integers "
+            "and 11 constants): OELINPUT ITFPU KSCALE TF K1 KOEL TOEL KPOEL VOELMAX1 VOELMIN1 "
+            "VOELMAX2 VOELMIN2; 'x' is not a number",
         ),
         ("1 'XYZ' 1 0 0 /", "XYZ is left out: not a known model"),
         ("1 'USRMDL' 1 'MYGOV' 5 0 0 /", "USRMDL MYGOV is left out: not a known model"),
@@ -371,37 +374,41 @@ def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
 
 
 @pytest.mark.parametrize(
-    ("exciter", "flags", "limiter", "place"),
+    ("exciter", "flags", "limiter", "place", "why"),
     [
-        ("AC1C", {"OEL": 2.0}, "OEL2C", ", place: takeover (AC1C has OEL = 2)"),
-        ("AC7C", {"OEL": 1.0, "UEL": 3.0}, "UEL2C", ", place: takeover-output (AC7C has UEL = 3)"),
+        ("AC1C", {"OEL": 1.0}, "OEL2C", "summing", ""),
+        ("AC1C", {"OEL": 2.0}, "OEL2C", "takeover", ""),
+        ("AC7C", {"OEL": 1.0, "UEL": 3.0}, "UEL2C", "takeover-output", ""),
         # 4 is a gate behind the PI, 0 no place; OEL3C has no gate; ESAC1A and ST6C say nothing
-        ("AC7C", {"OEL": 4.0}, "OEL2C", ""),
-        ("AC1C", {"OEL": 0.0}, "OEL2C", ""),
-        ("AC1C", {"OEL": 2.0}, "OEL3C", ""),
-        ("ESAC1A", {}, "OEL2C", ""),
-        ("ST6C", {"OEL": 2.0}, "OEL2C", ""),
+        ("AC7C", {"OEL": 4.0}, "OEL2C", "takeover", "AC7C has OEL = 4"),
+        ("AC1C", {"OEL": 0.0}, "OEL2C", "takeover", "AC1C has OEL = 0"),
+        ("AC1C", {"OEL": 2.0}, "OEL3C", "summing", "AC1C has OEL = 2"),
+        ("ESAC1A", {}, "OEL2C", "takeover", "ESAC1A does not state its place"),
+        ("ST6C", {}, "OEL2C", "takeover", "ST6C has OEL = 1"),
     ],
 )
-def test_the_place_of_a_limiter_left_out_is_that_of_its_exciter_s_flag(
-    exciter, flags, limiter, place
+def test_a_limiter_acts_where_its_exciter_s_flag_says_else_at_its_usual_place(
+    exciter, flags, limiter, place, why
 ):
-    parts = ((GENROU, {}), (definition_of(exciter), flags))
+    parts = ((GENROU, {}), (definition_of(exciter), flags), (definition_of(limiter), {}))
     records = [
         record_text(part, typical(part.model.sheet) | changes, 7, "1") for part, changes in parts
     ]
-    unit = read_unit("\n".join([*records, f"7 '{limiter}' 1 0 0 /"]), "unit.dyr")
-    (text,) = (warning.text for warning in unit.warnings if "limiter" in warning.text)
-    exchanged = ", FIXEDRU and FIXEDRD exchanged" if limiter == "OEL2C" else ""
-    how = f"give it under limiters{place}{exchanged}"
-    assert text == f"excitation limiter {limiter} is left out: {how}"
+    unit = read_unit("\n".join(records), "unit.dyr")
+    (own,) = unit.limiters
+    assert own.place == place
+    told = [warning.text for warning in unit.warnings if warning.text.endswith("is taken")]
+    assert told == ([f"{limiter}: {why}; {place} is taken"] if why else [])
+    case = parse_case(imported_case(unit, "unit.dyr").text, Path("unit.yaml"))
+    (attached,) = case.parts.limiters
+    assert (attached.model.name, attached.place) == (limiter, place)
 
 
 def test_a_governor_that_cannot_be_simulated_is_left_out_with_the_reason():
     for text, reason in (
-        ("1 TGOV1 1 0.05 0.5 1 0 3 10 /", "TGOV1: 6 values after the id"),
-        ("1 TGOV1 1 0 0.5 1 0 3 10 0 /", "TGOV1: R: 0 lies outside 0.001 ... 10 pu"),
-        ("1 HYGOV 1 .05 .3 5 .05 .5 .2 0 1 1 1.2 .5 .1 /", "HYGOV: GMIN: 1 is not below GMAX = 0"),
+        ("1 TGOV1 1 0.05 0.5 1 0 3 10 /", "6 values after the id"),
+        ("1 TGOV1 1 0 0.5 1 0 3 10 0 /", "R: 0 lies outside 0.001 ... 10 pu"),
+        ("1 HYGOV 1 .05 .3 5 .05 .5 .2 0 1 1 1.2 .5 .1 /", "GMIN: 1 is not below GMAX = 0"),
     ):
         unit = read_unit(SOUND + text, "unit.dyr")
         assert unit.governor is None
@@ -442,4 +449,4 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         listed = (*definition.names, *dict(record.held))
         for row in definition.model.sheet:
             assert (row.symbol in listed) != (f"{row.symbol}: not in the record" in told)
-        assert read.values == {**own, **dict(record.held)}
+        assert read.values == with_exchanged(record, {**own, **dict(record.held)})

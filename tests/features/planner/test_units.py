@@ -54,6 +54,40 @@ def test_a_record_without_an_end_leaves_the_other_units(damaged):
     assert "has no '/' before the next one" in units.faults[0].text
 
 
+FOREIGN = (
+    "{bus} 'IEEEG2' 1 0 0 0.05 /\n", "{bus} 'USRMDL' 1 'HYG3' 5 0 0 1 2*3.5 /\n",
+    "{bus} TGOV1 1 x y /\n", "{bus} 'PSS1A' 1 1 /\n", "{bus} 'UEL1' 1 -9E9 /\n",
+    "{bus} 'OEL9' 1 /\n", "{bus} IEELBL 1 1 0 /\n", "{bus} TGOV1 1 .05 .5 1 0 3 10 0 /\n",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", few_of(range(20), 5))
+def test_no_record_beside_machine_and_exciter_stops_a_unit_and_each_left_out_is_named_once(seed):
+    random = np.random.default_rng(seed)
+    text = ""
+    for bus in BUSES:
+        records = [at_bus(bus), *(own.format(bus=bus) for own in random.permutation(FOREIGN))]
+        text += "".join(random.permutation(records))
+    units = read_units(text, "f")
+    assert ([unit.bus for unit in units.units], units.refused) == ([*BUSES], ())
+    for unit in units.units:
+        assert unit.governor.values["R"] == 0.05
+        assert {*unit.unknown} == {"IEEEG2", "USRMDL HYG3", "OEL9", "IEELBL"}
+        left = [warning.text for warning in unit.warnings if "is left out" in warning.text]
+        names = ("IEEEG2", "USRMDL HYG3", "OEL9", "IEELBL", "TGOV1", "PSS1A", "UEL1")
+        assert [sum(name in words for words in left) for name in names] == [1] * len(names)
+
+
+def test_a_unit_with_an_unknown_machine_or_exciter_is_refused_by_that_record():
+    text = at_bus(101) + at_bus(102).replace("ESAC1A", "ESAC77") + at_bus(103)
+    text += at_bus(104).replace("GENROU", "GENXYZ")
+    units = read_units(text, "f")
+    assert [unit.bus for unit in units.units] == [101, 103]
+    assert [(unit.bus, unit.modelled) for unit in units.refused] == [(102, True), (104, True)]
+    for unit, name in zip(units.refused, ("ESAC77", "GENXYZ"), strict=True):
+        assert name in unit.faults[0].text
+
+
 def test_a_unit_without_a_model_is_named_with_its_records():
     text = SOUND + "8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
     no_model = {unit.bus: unit for unit in read_units(text, "f").refused}
