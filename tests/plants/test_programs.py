@@ -1,9 +1,13 @@
 """Units of planners' files behind a fault, against the programs that simulate such files."""
 
+import re
+
 import pytest
+from places import ROOT
 from two_buses import TwoBuses, cases, differences, reference
 
-from exfit.models import GOVERNORS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 
 SHORT = ("powerworld_st3c",)
@@ -30,6 +34,20 @@ def test_a_unit_of_another_dialect_moves_otherwise():
     assert (
         max(abs(ours["vt"] - theirs["vt"]) for ours, theirs in zip(got, rows, strict=True)) > 1e-4
     )
+
+
+def test_the_documentation_lists_each_model_and_all_curves():
+    page = (ROOT / "docs" / "verification.md").read_text("utf-8")
+    table = page.split("<!-- programs -->")[1].split("<!-- /programs -->")[0]
+    rows = re.findall(r"^\| (\w+) \| ([^|]+?) [\d.]+ \| (\d+) \|", table, re.MULTILINE)
+    without = set(re.findall(r"\w+", table.split("No curve on load: ")[1].split(". ")[0]))
+    listed = {model for model, _, _ in rows}
+    catalogue = {*MODELS, *STABILISERS, *GOVERNORS, *LIMITERS, *MACHINES}
+    assert listed | without == catalogue
+    assert not listed & without
+    for program, prefix in (("PowerWorld", "powerworld_"), ("PSS/E", "psse_")):
+        shown = sum(int(n) for model, of, n in rows if of == program and model in MACHINES)
+        assert shown == sum(name.startswith(prefix) for name in cases()), program
 
 
 def test_a_turbine_of_another_rating_than_the_machine_rests_as_in_powerworld():

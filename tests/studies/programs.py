@@ -1,0 +1,87 @@
+"""Which curve of which program each model is compared with, and by how much vt differs.
+
+Run it as ``python tests/studies/programs.py``: it writes the table into docs/verification.md.
+Limits act where the response changes with all of them a thousand times as wide.
+"""
+
+import re
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "plants"))
+
+from test_andes import UNITS, in_a_dip, read, unit_of
+from two_buses import TwoBuses, cases, reference
+
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models.machines import MACHINES
+
+PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
+MARKS = "<!-- programs -->", "<!-- /programs -->"
+CATALOGUES = (MODELS, STABILISERS, GOVERNORS, LIMITERS, MACHINES)
+NO_LIMIT, WIDE, ACTS = 900.0, 1e3, 1e-8
+
+
+def models_of(unit):
+    """Return the names of the models of a unit."""
+    stabiliser = None if unit.stabiliser is None else unit.stabiliser.model
+    parts = (unit.exciter, unit.machine, stabiliser, unit.governor)
+    return [part.name for part in parts if part is not None]
+
+
+def widened(values):
+    """Return the limits among values that are some, a thousand times as wide."""
+    limits = (name for name in values if re.search(r"(MAX|MIN)\d?$", name))
+    return {name: WIDE * values[name] for name in limits if 0.0 < abs(values[name]) < NO_LIMIT}
+
+
+def compared(name):
+    """Return the models of a case of a program, its difference in vt, and whether limits act."""
+    told, rows = reference(name)
+    times, case = [row["t"] for row in rows], TwoBuses(told)
+    got = [row["vt"] for row in case.shown(times)]
+    free = [row["vt"] for row in TwoBuses(told, **widened(case.values)).shown(times)]
+    apart = max(abs(ours - row["vt"]) for ours, row in zip(got, rows, strict=True))
+    acts = max(abs(a - b) for a, b in zip(got, free, strict=True)) > ACTS
+    return models_of(case.unit), f"{told['program']} {told['version']}", apart, acts
+
+
+def table():
+    """Return the rows of the table: model, program, vt, limits."""
+    found = defaultdict(list)
+    for name in cases():
+        models, *row = compared(name)
+        for model in models:
+            found[model].append(row)
+    for name in UNITS:
+        apart, _ = in_a_dip(name)
+        for model in models_of(unit_of(read(f"andes_load_{name}")[0])[0]):
+            found[model].append(["ANDES 2.0.0", float(apart["vt"]), False])
+    yield "| model | program | curves | vt differs by, pu | limits act |"
+    yield "|---|---|---|---|---|"
+    without = []
+    for model in sorted(name for catalogue in CATALOGUES for name in catalogue):
+        programs = defaultdict(list)
+        for program, *row in found[model]:
+            programs[program].append(row)
+        for program, rows in programs.items():
+            worst = max(apart for apart, _ in rows)
+            acts = "yes" if any(acts for _, acts in rows) else "no"
+            yield f"| {model} | {program} | {len(rows)} | {worst:.1e} | {acts} |"
+        without += [] if programs else [model]
+    yield ""
+    yield f"No curve on load: {', '.join(without)}. These rest on block diagrams."
+
+
+def main():
+    """Write the table."""
+    before, rest = PAGE.read_text("utf-8").split(MARKS[0])
+    after = rest.split(MARKS[1])[1]
+    text = "\n".join([MARKS[0], "", *table(), "", MARKS[1]])
+    PAGE.write_text(before + text + after, "utf-8")
+
+
+if __name__ == "__main__":
+    main()
