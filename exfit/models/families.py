@@ -21,6 +21,7 @@ SIMPLIFIED: dict[str, Family] = {
     "IEEET1": "DC",
     "IEEET2": "AC",
     "IEEET3": "ST",
+    "IEEET4": "DC",
     "IEEEX1": "DC",
     "REXS": "AC",
     "SCRX": "ST",

@@ -22,7 +22,8 @@ from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import StateSpace, linearised, margins, poles_of, small_signal
 
 ALONE = "FIRST_ORDER"
-WITH_LOOP = [name for name in MODELS if name != ALONE]
+DEAF = "IEEET4"  # answers nothing that stays in its dead band
+WITH_LOOP = [name for name in MODELS if name not in (ALONE, DEAF)]
 TALL = 1e-7  # pu: a disturbance that is linear
 
 
@@ -388,7 +389,16 @@ def test_frequencies_that_are_requested_are_reported_and_change_no_figure():
     )
 
 
+def test_a_dead_band_leaves_no_loop():
+    found = small_signal(system_of(DEAF), lively_values(DEAF))
+    assert not found.open.response.any()
+    assert not found.closed.response.any()
+    assert found.margins == (None, None, None, None)
+
+
 def test_the_peak_and_the_bandwidth_are_those_of_a_denser_grid(model):
+    if model == DEAF:
+        pytest.skip("a response of zero has neither")
     system, values = system_of(model), drawn_values(model, 7)
     found = small_signal(system, values)
     frequency = found.closed.frequency

@@ -170,7 +170,8 @@ def _near_rest(key: str, of_tests: SmallSignalView) -> Iterator[Block]:
         f"Gain and phase from {source} to {output} over the frequency: peak {view.peak:.2f} dB, "
         f"bandwidth {width}."
     )
-    yield _bode(f"{key}-closed", title, text, view.closed, ((LEVEL,), ()))
+    if np.any(view.closed.response):
+        yield _bode(f"{key}-closed", title, text, view.closed, ((LEVEL,), ()))
 
 
 def _poles(view: SmallSignal, title: str) -> Table:

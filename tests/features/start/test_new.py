@@ -82,7 +82,8 @@ def test_every_model_becomes_a_case_that_loads_as_it_stands(model, record, tmp_p
         assert values[row.symbol] == pytest.approx(row.typical, rel=1e-6)
     others = [name for name in case.rows() if name not in case.free()]
     assert case.typical() == tuple(others)
-    (step,) = case.test.vref
+    step, *others = case.test.vref
+    assert not others or model == "IEEET4"  # its contact opens as quickly as it closes
     assert step.at.start == pytest.approx(AT, abs=0.05)
     assert step.at.min < AT < step.at.max
     assert case.record.channels["vt"].noise is None  # the residuals show what counts
