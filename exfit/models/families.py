@@ -17,6 +17,7 @@ EDITIONS = {"A": 2005, "B": 2005, "C": 2016}  # A and B: what the edition of 200
 SIMPLIFIED: dict[str, Family] = {
     "BBSEX1": "ST",
     "ESURRY": "AC",
+    "EXELI": "ST",
     "EXPIC1": "ST",
     "IEEET1": "DC",
     "IEEET2": "AC",

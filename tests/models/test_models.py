@@ -71,7 +71,8 @@ def test_each_exciter_marks_what_a_bump_test_is_fitted_for(model):
         assert row.typical > 0.0, row.symbol
         assert not row.symbol.endswith(("MIN", "MAX")), row.symbol
         assert row.symbol not in {"E1", "SE1", "E2", "SE2", "TR", "KE"}, row.symbol
-        assert row.unit == "s" or row.symbol[0] in "Kka" or "lead" in row.meaning, row.symbol
+        named = any(word in row.meaning for word in ("lead", "gain"))
+        assert row.unit == "s" or row.symbol[0] in "Kka" or named, row.symbol
 
 
 def test_a_lead_is_fitted_only_where_its_lag_does_not_cancel_it(model):
@@ -292,6 +293,8 @@ def test_what_acts_on_load_only_does_so_there(exciter):
     """In the equations, and in the rest that they have."""
     found = MODELS[exciter]
     symbols = [row.symbol for row in found.sheet if ON_LOAD in row.meaning]
+    if exciter == "EXELI":
+        pytest.skip("its stabiliser washes a power at rest out")
     values = lively_values(exciter)
     # the angle between voltage and current acts only where both take part
     values |= {symbol: values[symbol] or 0.5 for symbol in symbols}

@@ -175,7 +175,7 @@ def test_closed_is_open_over_one_plus_open_behind_the_transducer(name, values_of
     values = values_of(name)
     found = small_signal(system_of(name), values)
     s = 2j * np.pi * found.closed.frequency
-    seen = found.closed.response / (1.0 + s * values.get("TR", 0.0))
+    seen = found.closed.response / (1.0 + s * values.get("TR", values.get("TFV", 0.0)))
     loop = found.open.response / (1.0 + found.open.response)
     assert np.abs(seen - loop).max() < 1e-9 * np.abs(loop).max()
 
@@ -245,7 +245,7 @@ def test_unstable_poles_are_those_of_a_run_that_grows(model):
     gain = next(
         (
             symbol
-            for symbol in ("KA", "K", "KPR", "KPA", "KV", "KVP", "K10", "KR", "k")
+            for symbol in ("KA", "K", "KPR", "KPA", "KV", "KVP", "K10", "KR", "VPU", "k")
             if symbol in typical_values(model)
         ),
         None,
