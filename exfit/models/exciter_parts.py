@@ -87,13 +87,20 @@ def alternator_rest(efd: Signal, u: Signal, p: Signal) -> tuple[Signal, Signal]:
     return ve, field_demand(ve, u.ifd, p)
 
 
-def supply(load: Signal, u: Signal, p: Signal) -> Signal:
-    """Return VB, what a loaded rectifier behind a source gives, at most VBMAX.
+def bridge(ve: Signal, load: Signal, ceiling: Signal) -> Signal:
+    """Return what a loaded rectifier behind a source of VE gives, at most a ceiling."""
+    return smaller(rectifier(ve, load), ceiling)
 
-    The source is fed from the terminals (SW1 = 1) or does not depend on them (SW1 = 2).
-    """
-    terminals = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
-    return smaller(rectifier(where(p.SW1 < 1.5, terminals, p.KP), load), p.VBMAX)
+
+def first_source(KI: Signal, u: Signal, p: Signal) -> Signal:
+    """Return the VE of a source: of the terminals (SW1 = 1), or independent of them (SW1 = 2)."""
+    terminals = compound_source(u.vt, u.p, u.q, p.KP, KI, p.XL, p.THETAP)
+    return where(p.SW1 < 1.5, terminals, p.KP)
+
+
+def supply(load: Signal, u: Signal, p: Signal) -> Signal:
+    """Return VB, what a loaded rectifier behind the source gives, at most VBMAX."""
+    return bridge(first_source(p.KI, u, p), load, p.VBMAX)
 
 
 def compound_supply(u: Signal, p: Signal) -> Signal:

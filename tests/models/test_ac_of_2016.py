@@ -40,9 +40,13 @@ LIVELY = {
     "AC6C": {"TR": 0.02, "VFELIM": 2.5, "KH": 3.0},
     "AC7C": {"TR": 0.02, "KDR": 0.2, "TDR": 0.05, "KF2": 0.05, "KF3": 0.02},
     "AC8C": {"TR": 0.02, "TA": 0.03, "VFEMAX": 9.0},
+    "AC9C": {"TR": 0.02, "VFEMAX": 9.0},
 }
 SOURCE = {"KI": 0.4, "XL": 0.1, "THETAP": 20.0, "VBMAX": 99.0, "KC1": 0.2}
 INDEPENDENT = SOURCE | {"SW1": 2.0}
+SOURCES = {"KI1": 0.4, "XL": 0.1, "THETAP": 20.0, "VBMAX1": 99.0, "KC1": 0.1}
+SOURCES |= {"KI2": 0.3, "KC2": 0.03}
+CHOPPER = SOURCES | {"SCT": 0.0}
 
 
 def parameters(name, **changes):
@@ -93,12 +97,16 @@ def ac6c(s, p):
     return solved(s, p, forward, limiter)
 
 
-def source(vt, vfe, p):
-    """Return VB of a machine with constant powers, by phasors."""
+def first_source(vt, p, KI):
+    """Return VE1 of a machine with constant powers, by phasors."""
     current = (P - 1j * Q) / vt
     gain = cmath.rect(p.KP, np.radians(p.THETAP))
-    ve1 = abs(gain * vt + 1j * (p.KI + gain * p.XL) * current) if p.SW1 == 1.0 else p.KP
-    return min(rectified(ve1, p.KC1 * vfe), p.VBMAX)
+    return abs(gain * vt + 1j * (KI + gain * p.XL) * current) if p.SW1 == 1.0 else p.KP
+
+
+def source(vt, vfe, p):
+    """Return VB."""
+    return min(rectified(first_source(vt, p, p.KI), p.KC1 * vfe), p.VBMAX)
 
 
 class Supplied:
@@ -130,6 +138,26 @@ def ac8c(s, p):
     return solved(s, p, at.vs * regulator, -at.va * at.of_vfe, 0.0, at.va * at.of_vt)
 
 
+def ac9c(s, p):
+    """VFD = VR VB1 + what the power stage adds."""
+    vfe = around(p).vfe
+
+    def vb1(vt, vfe):
+        return min(rectified(first_source(vt, p, p.KI1), p.KC1 * vfe), p.VBMAX1)
+
+    def added(vt, vfe):
+        if p.SCT == 1.0 or p.VLIM1 < 0.1:
+            return min(rectified(p.KI2 * abs(P - 1j * Q) / vt, p.KC2 * vfe), p.VBMAX2)
+        return 0.0 if p.VLIM2 < 0.1 else -p.KFW * vfe
+
+    vr = (vfe - added(VT, vfe)) / vb1(VT, vfe)
+    by_vt = slope(lambda vt: vr * vb1(vt, vfe) + added(vt, vfe), VT)
+    by_vfe = slope(lambda x: vr * vb1(VT, x) + added(VT, x), vfe)
+    inner = vb1(VT, vfe) * pid(s, p.KPA, p.KIA, 0.0, 0.0) * p.KA / (1.0 + s * p.TA)
+    regulator = pid(s, p.KPR, p.KIR, p.KDR, p.TDR)
+    return solved(s, p, inner * regulator, inner * p.KF / (1.0 + s * p.TF) - by_vfe, 0.0, by_vt)
+
+
 FUNCTIONS = {
     "AC1C": ac1c,
     "AC2C": ac2c,
@@ -139,6 +167,7 @@ FUNCTIONS = {
     "AC6C": ac6c,
     "AC7C": ac7c,
     "AC8C": ac8c,
+    "AC9C": ac9c,
 }
 CASES = [
     *((name, {}) for name in FUNCTIONS),
@@ -146,6 +175,11 @@ CASES = [
     ("AC6C", {"VFELIM": 99.0}),  # its field current limiter does not act
     *((name, changes) for name in ("AC7C", "AC8C") for changes in (SOURCE, INDEPENDENT)),
     ("AC7C", {"SW2": 2.0}),
+    ("AC9C", SOURCES),
+    ("AC9C", SOURCES | {"SW1": 2.0}),
+    ("AC9C", CHOPPER),  # it conducts,
+    ("AC9C", CHOPPER | {"VLIM1": 2.0}),  # is blocked,
+    ("AC9C", CHOPPER | {"VLIM1": 2.0, "VLIM2": 1.0}),  # and reversed
 ]
 
 
@@ -229,6 +263,9 @@ LIMITS = [
         held_by(lambda efd, vfe, p: p.VRMAX * supplied(efd, vfe, p)),
     ),
     ("AC8C", {"VFEMAX": 6.0}, BY_VFE),
+    ("AC9C", {"VRMAX": 6.0}, held_by(lambda efd, vfe, p: p.VRMAX * rectified(VT, p.KC1 * vfe))),
+    ("AC9C", {"VBMAX1": 0.6}, held_by(lambda efd, vfe, p: p.VRMAX * p.VBMAX1)),
+    ("AC9C", {"VFEMAX": 5.0}, BY_VFE),
 ]
 
 
@@ -253,7 +290,7 @@ def test_a_large_step_down_drives_the_exciter_to_its_floor(name):
 
 TAKEN_OVER = {
     **dict.fromkeys(("AC1A", "AC1C", "AC2C", "AC5C", "AC6C"), ("vuel", "voel")),
-    "AC8C": ("vuel_out", "voel_out"),
+    **dict.fromkeys(("AC8C", "AC9C"), ("vuel_out", "voel_out")),
 }
 
 
@@ -265,7 +302,7 @@ def test_a_gate_takes_the_exciter_over(name):
     under, over = TAKEN_OVER[name]
     for share, gate, vref in ((1.1, over, 0.5), (0.9, under, -0.5)):
         vfe = share * around(p).vfe
-        supply = p.KA * supplied(0.0, vfe, p) if name == "AC8C" else 1.0
+        supply = p.KA * rectified(p.KP * VT, p.KC1 * vfe) if name in ("AC8C", "AC9C") else 1.0
         efd = after(name, p, vref, {gate: vfe / supply})
         assert efd[-1] == pytest.approx(field_voltage(lambda _, vfe=vfe: vfe)(p), rel=1e-6)
 
@@ -286,6 +323,18 @@ def test_the_second_gates_of_ac7c_take_the_reference_of_the_inner_loop_over():
     p = parameters("AC7C", KF2=0.0)
     for x, gate, vref in ((0.45, "voel_out", 0.5), (0.5, "vuel_out", -0.5)):
         assert after("AC7C", p, vref, {gate: x})[-1] == pytest.approx(x / p.KF1, rel=1e-6)
+
+
+def test_the_inner_loop_of_ac9c_holds_the_field_current_at_the_limit_of_the_pid():
+    p = parameters("AC9C", VPIDMAX=4.5)
+    expected = field_voltage(lambda p: p.VPIDMAX / p.KF)(p)
+    assert after("AC9C", p, 0.5)[-1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_first_gates_of_ac9c_hold_the_error_of_its_inner_loop():
+    p = parameters("AC9C")
+    assert after("AC9C", p, 0.01, {"voel": 0.0}, 0.5)[-1] == pytest.approx(EFD, abs=1e-9)
+    assert after("AC9C", p, -0.01, {"vuel": 0.0}, 0.5)[-1] == pytest.approx(EFD, abs=1e-9)
 
 
 @pytest.mark.long

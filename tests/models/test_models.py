@@ -243,7 +243,11 @@ def awake_values(model):
 def switched_values(model):
     """Return awake data with every switch in its other position: what it selects acts there."""
     values = awake_values(model)
-    switches = {row.symbol: row.high for row in MODELS[model].sheet if row.symbol.startswith("SW")}
+    switches = {
+        row.symbol: row.low + row.high - row.typical
+        for row in MODELS[model].sheet
+        if row.symbol.startswith("SW") or row.symbol == "SCT"
+    }
     return [values | switches] if switches else []
 
 

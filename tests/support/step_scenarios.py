@@ -205,7 +205,7 @@ def _drawn(values, seed, spread):
         factor, bare = spread ** rng.uniform(-1.0, 1.0), name.rpartition(".")[2]
         joint = (name.startswith(MACHINE) and bare[0] in "XS") or bare in ("E1", "E2", "SE1", "SE2")
         fixed = name.startswith(NETWORK) or name in (VT0, "p0", "q0", "speed0")
-        fixed = fixed or bare in ("M", "N", "SW1", "Rselect", "Flag", "FBF", "VOS")
+        fixed = fixed or bare in ("M", "N", "SW1", "SCT", "Rselect", "Flag", "FBF", "VOS")
         result[name] = value * (1.0 if fixed else together if joint else factor)
     return result
 

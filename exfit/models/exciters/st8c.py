@@ -30,16 +30,13 @@ has it, has no KIA and no second source (KPR 6.6, KIR 30, KPA 2.38, KA 4.295, TA
 from exfit.models.blocks import (
     Signal,
     clip,
-    compound_source,
     lag,
     limited_lag,
     modulus,
     pi,
     pi_rest,
-    rectifier,
-    smaller,
-    where,
 )
+from exfit.models.exciter_parts import bridge, first_source
 from exfit.models.sheet import (
     FREE,
     GAIN,
@@ -92,11 +89,9 @@ STATES = "VC VI VA VR VF"
 
 def sources(u: Signal, p: Signal) -> tuple[Signal, Signal]:
     """Return VB1 and VB2, what the sources give behind their rectifiers."""
-    terminals = compound_source(u.vt, u.p, u.q, p.KP, p.KI1, p.XL, p.THETAP)
-    ve1 = where(p.SW1 < 1.5, terminals, p.KP)
+    vb1 = bridge(first_source(p.KI1, u, p), p.KC1 * u.ifd, p.VB1MAX)
     ve2 = p.KI2 * modulus(u.p / u.vt, u.q / u.vt)
-    vb1 = smaller(rectifier(ve1, p.KC1 * u.ifd), p.VB1MAX)
-    return vb1, smaller(rectifier(ve2, p.KC2 * u.ifd), p.VB2MAX)
+    return vb1, bridge(ve2, p.KC2 * u.ifd, p.VB2MAX)
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
