@@ -26,10 +26,11 @@ def rests_at(governor: Model, values: Mapping[str, float], power: float) -> bool
 def listening(stabiliser: Stabilised, heard: Names) -> Names:
     """Inputs of a stabiliser, ``vsi1`` and ``vsi2``; of the speed, its deviation.
 
-    The power ``p`` is there too: some are switched by it, whatever they listen to.
+    The power ``p`` and the voltage ``vt`` are there too: some are switched by one of them, whatever
+    they listen to.
     """
     inputs = {f"vsi{k}": getattr(heard, of) for k, of in enumerate(stabiliser.inputs, 1)}
-    return Names(p=heard.p, **inputs)
+    return Names(p=heard.p, vt=heard.vt, **inputs)
 
 
 def rests_with_output(stabiliser: Stabilised, values: Mapping[str, float]) -> bool:

@@ -32,7 +32,7 @@ SIDES = ("vsi1", "vsi2")
 # washouts that T = 0 leaves out: there the limit is the long time constant
 ACCELERATING = ("TW2", "TW4")
 LEFT_OUT = {
-    **dict.fromkeys(("PSS2B", "PSS2C", "PSS7C"), ACCELERATING),
+    **dict.fromkeys(("PSS2B", "PSS2C", "PSSSB", "PSS7C"), ACCELERATING),
     **dict.fromkeys(("PSS3B", "PSS3C"), ("TW3",)),
 }
 # what is zero beside a time constant that shrinks: the rest of its filter, which would resonate,
@@ -57,7 +57,7 @@ def stabiliser(request):
 
 def inputs(*vsi, p=1.0):
     """Return what a stabiliser sees of a unit with a power: of those with a switch, it is on."""
-    return Names(p=p, **dict(zip(SIDES, vsi, strict=False)))
+    return Names(p=p, vt=1.0, **dict(zip(SIDES, vsi, strict=False)))
 
 
 def lively(model):
@@ -147,6 +147,11 @@ def accelerating(s, p):
 def pss2b(s, p):
     shaped = p["KS1"] * lead(s, p["T1"], p["T2"]) * lead(s, p["T3"], p["T4"])
     return accelerating(s, p) * shaped * lead(s, p["T10"], p["T11"])
+
+
+def psssb(s, p):
+    shaped = p["KS1"] * lead(s, p["T1"], p["T2"]) * lead(s, p["T3"], p["T4"])
+    return accelerating(s, p) * shaped
 
 
 def pss2c(s, p):
@@ -249,6 +254,7 @@ FUNCTIONS = {
     "PSS1A": pss1a,
     "PSS2B": pss2b,
     "PSS2C": pss2c,
+    "PSSSB": psssb,
     "PSS3B": pss3b,
     "PSS3C": pss3b,
     "PSS4B": pss4b,
@@ -416,6 +422,9 @@ def test_no_parameter_is_inert(stabiliser):
     if "ON" in stabiliser.states:  # the last state: on its way, or there
         for k, (x, _, _) in enumerate(probes):
             x[-1] = 0.3 if k % 2 else 1.0
+    if "VT0" in stabiliser.states:  # the last state: at the start vt was higher, or as it is
+        for k, (x, _, _) in enumerate(probes):
+            x[-1] = 1.15 if k % 2 else 1.0
 
     def felt(changed):
         p = Names(**changed)
@@ -735,6 +744,17 @@ def test_from_the_states_of_psse_its_output_and_its_integrators_are_those_of_pss
         first, second, third = (getattr(d, name) for d in slopes[:3])
         moved = (rows[2]["t"] - rows[0]["t"]) * (first + 4.0 * second + third) / 6.0
         assert abs(rows[2][state] - rows[0][state] - moved) < 0.02 * abs(moved)
+
+
+def test_a_fall_of_the_voltage_beyond_its_setting_cuts_PSSSB_off():
+    model = STABILISERS["PSSSB"]
+    p = Names(**typical(model.sheet))
+    x = resting(model, p, inputs(0.0, 0.0))
+    x.V1 = x.V3 = 0.01
+    seen = {vt: Names(vsi1=0.0, vsi2=0.0, vt=vt) for vt in (1.3, 0.801, 0.799)}
+    above, near, below = (model.equations(x, u, p, Names()) for u in seen.values())
+    assert above == near != 0.0
+    assert below == 0.0
 
 
 SWITCHED = ("PSS2C", "PSS3C", "PSS6C", "PSS7C")

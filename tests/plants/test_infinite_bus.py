@@ -334,6 +334,7 @@ GAINS = {
     "PSS1A": ("KS",),
     "PSS2B": ("KS1",),
     "PSS2C": ("KS1",),
+    "PSSSB": ("KS1",),
     "PSS3B": ("KS1", "KS2"),
     "PSS3C": ("KS1", "KS2"),
     "PSS4B": ("KL", "KI", "KH"),

@@ -85,7 +85,10 @@ class TwoBuses:
         source = at_load + SOURCE * (self.drawn * at_load - current)
         self.E = abs(source)
         at = Flow(P, Q, source.real, source.imag)
+        self.boost = told.get("boost")
         self.rest, self.held = unit_at_rest(self.unit, 1.0, P, at, self.values, UNCOMPENSATED)
+        if self.boost:
+            self.rest["boost"] = self.boost["VK"]
 
     def current(self, voltage, x, faulted):
         """Return the current that a voltage behind jx drives, both to the source's angle."""
@@ -110,6 +113,10 @@ class TwoBuses:
         v = inner - 1j * at.xd * i
         terminals = Terminals(fluxes, Axes(-v.imag, v.real), Axes(-i.imag, i.real), dw)
         controls = Controls(self.held["vref"] + (self.pulse if disturbed else 0.0))
+        if self.boost:
+            d.boost = -state["boost"] / self.boost["TD2"]
+            cut = 1.0 - terminals.vt > self.boost["VCUTOFF"]
+            controls = controls._replace(vs=0.0 if cut else state["boost"])
         held = {**self.held, **state}
         shown = unit_motion(unit, terminals, controls, self.values, held, UNCOMPENSATED, d)
         d.delta = 2.0 * pi * 60.0 * dw

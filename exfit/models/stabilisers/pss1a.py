@@ -11,7 +11,7 @@ VCU and VCL, which some programs add.
 """
 
 from exfit.models.blocks import Signal, clip, lag, lead_lag, second_order, washout
-from exfit.models.sheet import SHORT_TIME, WASHOUT_TIME, WITHIN_10000, record, sheet
+from exfit.models.sheet import OF_A_LIST, SHORT_TIME, WASHOUT_TIME, WITHIN_10000, record, sheet
 from exfit.models.stabiliser_parts import of_stabiliser
 
 INPUTS = "speed"
@@ -32,6 +32,15 @@ RECORDS = record(
     icons={"ICS": 1, "REMBUS": 0},
     absent={"VCU": 0.0, "VCL": 0.0},
     doubt="whether REMBUS, VCU and VCL are in the record of PSS1A is not confirmed",
+)
+
+PSLF_RECORDS = record(
+    "pss1a",
+    "ICS REMBUS A1 A2 T1 T2 T3 T4 T5 T6 KS VSTMAX VSTMIN VCU VCL",
+    icons={"ICS": 1, "REMBUS": 0},
+    absent={"VCU": 0.0, "VCL": 0.0},
+    spelled={"ICS": "j", "REMBUS": "k", "VSTMAX": "lsmax", "VSTMIN": "lsmin"},
+    doubt=OF_A_LIST,
 )
 
 STATES = "V1 V2 V3 DV3 V4 V5"

@@ -1,6 +1,6 @@
-"""Dual input stabilisers of speed and power: PSS2B and PSS2C."""
+"""Dual input stabilisers of speed and power: PSS2B, PSS2C and PSSSB."""
 
-from exfit.models.blocks import Signal, clip, lead_lag
+from exfit.models.blocks import Signal, clip, lead_lag, where
 from exfit.models.sheet import MOST_LAGS, TIME, documented, limits, record, sheet
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
@@ -178,5 +178,67 @@ PSS2C = documented(
         "VSI2MIN VSTMAX VSTMIN T12 T13 PPSSON PPSSOFF XCOMP TCOMP",
         icons=FILTERED_SPEED_AND_POWER,
         ignored="XCOMP TCOMP",
+    ),
+)
+
+
+def psssb(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """PSSSB: dual input stabiliser with a voltage cut-off (PSLF, PowerWorld).
+
+          VSI1MAX                               ramp tracking
+    vsi1 ─►[clip]─►[ sTW1 ]─►[ sTW2 ]─►[  1  ]─►(+)─►[ 1 + sT8  ]─►(+)─► v
+           VSI1MIN [1+sTW1]  [1+sTW2]  [1+sT6]   ▲   [(1+sT9)^M ]  -▲
+                                                 │                  │
+                                                [KS3]               │
+          VSI2MAX                                ▲                  │
+    vsi2 ─►[clip]─►[ sTW3 ]─►[ sTW4 ]─►[ KS2 ]───┴──────────────────┘
+           VSI2MIN [1+sTW3]  [1+sTW4]  [1+sT7]
+                                      VSTMAX
+    v ─►[KS1]─►[1 + sT1]─►[1 + sT3]─►[clip]─►[cut-off]─► vs
+               [1 + sT2]  [1 + sT4]  VSTMIN
+
+    PSS2C without its third and fourth pair. vs is 0 while the terminal voltage is
+    more than VCUTOFF below that of the start. The ramp tracking filter is N of the
+    blocks that are drawn, M N at most 8. Its record has no limits of the inputs.
+    With the boost added it gives the curve of PowerWorld 24 over a fault that cuts
+    it off (vt 2e-6 pu).
+
+    Not modelled: the boost of SW1 (TD1, TD2, VTL, VK), a signal that an operator
+    gives by hand, and PowerWorld at the start of a simulation: at rest it is over.
+    Typical data are PSS2C's; VCUTOFF is that of a record of InterPSS.
+    """
+    v1, d.V1 = lead_lag(p.KS1 * accelerating(s, u, p, d, MOST_LAGS, p.N), s.V1, p.T1, p.T2)
+    v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
+    d.VT0 = 0.0
+    return where(s.VT0 - u.vt > p.VCUTOFF, 0.0, clip(v3, p.VSTMIN, p.VSTMAX))
+
+
+def psssb_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is then 0."""
+    accelerating_rest(u, p, x, MOST_LAGS)
+    x.V1 = x.V3 = 0.0
+    x.VT0 = u.vt
+
+
+PSSSB = documented(
+    psssb,
+    psssb_rest,
+    sheet(
+        *ACCELERATING,
+        *of_stabiliser(KS1=5.0, T1=0.16, T2=0.04, T3=0.16, T4=0.04, VSTMAX=0.1, VSTMIN=-0.1),
+        *INPUT_LIMITS,
+        ("VCUTOFF", 0.2, "pu", (0.0001, 10.0), "fall of the terminal voltage that cuts it off"),
+    ),
+    "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 V1 V3 VT0",
+    inputs="speed p",
+    records=record(
+        "PSSSB",
+        "TW1 TW2 TW3 TW4 T6 T7 KS2 KS3 KS4 T8 T9 KS1 T1 T2 T3 T4 VSTMAX VSTMIN SW1 TD1 TD2 VTL VK "
+        "VCUTOFF",
+        icons=FILTERED_SPEED_AND_POWER,
+        absent={"KS4": 1.0},
+        ignored="SW1 TD1 TD2 VTL VK",
+        held={name: PSS2A_HELD[name] for name in ("VSI1MAX", "VSI1MIN", "VSI2MAX", "VSI2MIN")},
+        doubt="PSS/E has no PSSSB: its order is that of a record that PowerWorld 24 ran",
     ),
 )
