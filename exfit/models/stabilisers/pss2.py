@@ -205,7 +205,7 @@ def psssb(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
     Not modelled: the boost of SW1 (TD1, TD2, VTL, VK), a signal that an operator
     gives by hand, and PowerWorld at the start of a simulation: at rest it is over.
-    Typical data are PSS2C's; VCUTOFF is that of a record of InterPSS.
+    Typical data are PSS2B's; VCUTOFF is that of a record of InterPSS.
     """
     v1, d.V1 = lead_lag(p.KS1 * accelerating(s, u, p, d, MOST_LAGS, p.N), s.V1, p.T1, p.T2)
     v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
@@ -225,7 +225,7 @@ PSSSB = documented(
     psssb_rest,
     sheet(
         *ACCELERATING,
-        *of_stabiliser(KS1=5.0, T1=0.16, T2=0.04, T3=0.16, T4=0.04, VSTMAX=0.1, VSTMIN=-0.1),
+        *of_stabiliser(KS1=20.0, T1=0.15, T2=0.025, T3=0.15, T4=0.025, VSTMAX=0.1, VSTMIN=-0.1),
         *INPUT_LIMITS,
         ("VCUTOFF", 0.2, "pu", (0.0001, 10.0), "fall of the terminal voltage that cuts it off"),
     ),
