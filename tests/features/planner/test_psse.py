@@ -436,7 +436,7 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         # a code that no signal stands for: the slope of the voltage
         of_icons = {name: value + ((name, value) in icons) for name, value in record.icons}
         of_icons |= dict.fromkeys(definition.codes, 6)
-        given = [*of_icons.values()]
+        given = [value for name, value in of_icons.items() if name not in record.cons]
         absent = dict(record.absent)
         given += [values[name] + (1 if name in absent else 0) for name in record.cons]
         text = f"1 {record.name} 1 " + " ".join(map(repr, given)) + " /"
