@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from exfit.case.case_draft import Noted, Remark, Section, in_braces
 from exfit.case.yaml import QUESTION
 from exfit.dsp.quality import SPIKE_LIMIT
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, RecordError
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.records.channel_inspection import InspectedChannel, InspectedPhases
 from exfit.records.channel_names import connection_of
@@ -26,6 +26,8 @@ from exfit.signals import COMPARED, OF_EVENT, RECORDED, SIGNALS
 from exfit.util.text import near
 
 BASE = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D.*)?")
+
+COLUMN = re.compile(r"(?P<column>.*?)\s*\[(?P<unit>[^]]+)\]")  # a column and its unit
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,8 @@ def rated_bases(bases: Mapping[str, Base], kv: float | None, mva: float | None) 
 class RecordSettings:
     """Columns of the time of a record and their unit, its sheet, the column of its voltage.
 
-    ``memory`` (GB) is what reading may take. What is empty or None is as the file shows it.
+    ``memory`` (GB) is what reading may take, ``channels`` are columns by signal, each with its
+    unit in brackets where the file does not show it. What is empty or None is as the file shows it.
     """
 
     clock: tuple[str, ...] = ()
@@ -89,12 +92,41 @@ class RecordSettings:
     sheet: str | None = None
     voltage: str | None = None
     memory: float | None = None
+    channels: Mapping[str, str] = field(default_factory=dict)
 
     def inspect(self, file: Path) -> Inspection:
-        """Inspect a recorder's file; raises RecordError where it is none."""
+        """Inspect a recorder's file.
+
+        Raises RecordError where it is none, and where it lacks a channel.
+        """
         table = open_table(file, self.sheet, self.memory)
         inspection = inspect(table, self.clock or None, self.unit)
-        return replace(inspection, sheet=self.sheet, memory=self.memory)
+        inspection = replace(inspection, sheet=self.sheet, memory=self.memory)
+        return inspection if not self.channels else self._with_channels(inspection)
+
+    def _with_channels(self, inspection: Inspection) -> Inspection:
+        """Return an inspection in which given columns are the channels of signals."""
+        channels = {channel.name: channel for channel in inspection.channels}
+        named, faults = dict[str, InspectedChannel](), list[str]()
+        for signal, text in self.channels.items():
+            column, unit = text, None
+            if text not in channels and (parts := COLUMN.fullmatch(text)):
+                column, unit = parts["column"], usual(parts["unit"])
+            if column not in channels or (unit is not None and unit_of(unit) is None):
+                what = f"{text}: no column with a unit of {inspection.path}"
+                faults.append(f"{signal}: {what}; {near(column, channels)}")
+                continue
+            own = replace(channels[column], signal=signal, sure=True, why="as given", question="")
+            named[column] = own if unit is None else replace(own, unit=unit, unit_from="file")
+        if faults:
+            raise RecordError("\n".join(faults))
+        others = (
+            replace(channel, signal=None) if channel.signal in self.channels else channel
+            for channel in inspection.channels
+        )
+        return replace(
+            inspection, channels=tuple(named.get(channel.name, channel) for channel in others)
+        )
 
 
 NO_BASES: Mapping[str, Base] = MappingProxyType({})

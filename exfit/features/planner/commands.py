@@ -10,6 +10,7 @@ import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import (
+    ABOVE_ZERO,
     ANY_PATH,
     file_option,
     force_option,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from exfit.features.planner.import_all import ImportedUnits
 
 MOST_BUSES = 999_999
+CONNECTIONS, ANGLE_UNITS = ("phase-to-ground", "phase-to-phase"), ("deg", "rad")
 BUSES = click.IntRange(1, MOST_BUSES)
 
 
@@ -49,6 +51,23 @@ BUSES = click.IntRange(1, MOST_BUSES)
 @time_option
 @unit_option
 @sheet_option
+@click.option(
+    "--raw",
+    type=click.Path(path_type=Path, exists=True),
+    metavar="FILE",
+    help="With --records: power flow file of PSS/E (.raw) with kV and MVA of the units.",
+)
+@click.option("--kv", type=ABOVE_ZERO, metavar="KV", help="With --records: rated voltage.")
+@click.option("--mva", type=ABOVE_ZERO, metavar="MVA", help="With --records: rated power.")
+@click.option("--connection", type=click.Choice(CONNECTIONS), help="Of recorded phasors.")
+@click.option("--angle-unit", type=click.Choice(ANGLE_UNITS), help="Of recorded angles.")
+@click.option(
+    "--channel",
+    "channels",
+    multiple=True,
+    metavar="SIGNAL=COLUMN",
+    help="Column of a signal, with its unit if not in the file: 'efd=Field [V]'.",
+)
 @output_option(help="File to write, with --all a folder; without it, to the terminal.")
 @force_option
 def import_(
@@ -62,6 +81,12 @@ def import_(
     clock: tuple[str, ...],
     unit: str | None,
     sheet: str | None,
+    raw: Path | None,
+    kv: float | None,
+    mva: float | None,
+    connection: str | None,
+    angle_unit: str | None,
+    channels: tuple[str, ...],
     output: Path | None,
     force: bool,
 ) -> None:
@@ -75,11 +100,12 @@ def import_(
     """
     from exfit.case.suggestion import relative
     from exfit.features.planner.fields import located
-    from exfit.features.planner.import_all import import_units
+    from exfit.features.planner.import_all import columns_by_signal, import_units
     from exfit.features.planner.import_case import import_unit, imported_case
 
-    in_table = (sizes, clock, unit, sheet)
-    given = any((bases, *in_table))
+    in_table = (sizes, clock, unit, sheet, channels)
+    ratings = (kv, mva, connection, angle_unit)
+    given = any((bases, raw, *ratings, *in_table))
     if every:
         if bus is not None or machine_id is not None:
             raise click.UsageError("--bus and --id: not allowed with --all.")
@@ -87,19 +113,22 @@ def import_(
             raise click.UsageError("Missing option '-o': the folder of the cases.")
         if records is None and given:
             raise click.UsageError(
-                "--step, --base, --time, --time-unit and --sheet: only with --records."
+                "--step, --base, --time, --time-unit, --sheet, --channel, --raw and ratings: only "
+                "with --records."
             )
         if records is not None and not records.is_dir() and any(in_table):
             raise click.UsageError(
-                "--step, --time, --time-unit and --sheet: not allowed with a table, which has "
-                "columns for them."
+                "--step, --time, --time-unit, --sheet and --channel: not allowed with a table, "
+                "which has columns for them."
             )
         given_as = (records, sizes, bases, clock, unit, sheet, force)
-        _report_import(import_units(dyr, output, *given_as), output)
+        columns = columns_by_signal(channels)
+        made = import_units(dyr, output, *given_as, *ratings, columns, raw)
+        _report_import(made, output)
         return
     if records is not None or given:
         raise click.UsageError(
-            "--records, --step, --base, --time, --time-unit and --sheet: only with --all; "
+            "--records, its options and ratings: only with --all; "
             "exfit new makes a case of one record."
         )
     if output is not None:

@@ -1,16 +1,19 @@
 """Cases of many units of dynamics files: of all of one file, or of a table of records."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from exfit.case.suggestion import Base, RecordSettings, bases_of, relative
-from exfit.errors import DynamicsError, ExfitError
+from exfit.errors import DynamicsError, ExfitError, FileError
 from exfit.features.planner.fields import located
 from exfit.features.planner.import_case import imported_case, unit_data, units_of_file
+from exfit.features.planner.power_flow import read_power_flow
 from exfit.features.planner.units import DynamicsUnits, RefusedUnit, Unit
+from exfit.features.start.ratings import NO_RATINGS, Ratings
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
 from exfit.features.start.starting_case import (
     MadeCase,
@@ -22,8 +25,9 @@ from exfit.features.start.starting_case import (
 from exfit.features.start.starting_tests import sizes_of
 from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
 from exfit.results.tables import csv_text
+from exfit.signals import RECORDED as SIGNALS
 from exfit.util.files import write, write_each
-from exfit.util.text import dotted, first_texts
+from exfit.util.text import dotted, first_texts, near
 
 WRITTEN, RECORDED, REFUSED, NO_MODEL = "written", "written with records", "refused", "no model"
 UNITS = "units.csv"
@@ -43,6 +47,18 @@ class ImportPlan:
     rows: Mapping[UnitKey, CaseOfTable]
     faults: tuple[str, ...]
     others: tuple[Path, ...]
+    power_flows: Mapping[Path | None, Mapping[UnitKey, Ratings]]
+
+    def ratings_of(self, unit: Unit, given: Ratings) -> Ratings:
+        """Return the ratings of a unit: those given, of a power flow file, of its own record."""
+        key = key_of(unit)
+        planned = self.rows.get(key)
+        files = (None,) if planned is None else (planned.raw, None)
+        found = (self.power_flows.get(file, {}).get(key, NO_RATINGS) for file in files)
+        ratings = given
+        for other in (*found, Ratings(unit.kv, unit.mva)):
+            ratings = ratings.over(other)
+        return ratings
 
     def name_of(self, unit: Unit) -> str:
         """Return the name of the file of a unit's case."""
@@ -58,11 +74,12 @@ class ImportPlan:
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """What is common to all records: sizes of steps, bases by signal, how they are read."""
+    """What is common to all: sizes of steps, bases by signal, how records are read, ratings."""
 
     sizes: Mapping[str, float] = field(default_factory=dict)
     bases: Mapping[str, Base] = field(default_factory=dict)
     settings: RecordSettings = field(default_factory=RecordSettings)
+    ratings: Ratings = NO_RATINGS
 
 
 class ImportedUnit(NamedTuple):
@@ -95,20 +112,25 @@ class ImportedUnits:
     plan: ImportPlan
 
 
-def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
+def plan_import(dyr: Path, records: Path | None = None, raw: Path | None = None) -> ImportPlan:
     """Plan an import: the units of a file, with records of a folder or a table.
+
+    ``raw`` is a power flow file, for units whose row of the table does not name another one.
 
     Raises DynamicsError where the file cannot be read, ExfitError where the folder or table cannot.
     """
     units = units_of_file(dyr)
     known = [key_of(unit) for unit in units.units]
     faults = located(units.faults, str(dyr))
+    flows: dict[Path | None, Mapping[UnitKey, Ratings]] = {}
+    if raw is not None:
+        flows[None] = read_power_flow(raw)
     if records is None:
-        return ImportPlan(dyr, units, {}, {}, tuple(faults), ())
+        return ImportPlan(dyr, units, {}, {}, tuple(faults), (), flows)
     if records.is_dir():
         joined = records_in(records, known)
         faults += joined.faults
-        return ImportPlan(dyr, units, joined.of_unit, {}, tuple(faults), joined.others)
+        return ImportPlan(dyr, units, joined.of_unit, {}, tuple(faults), joined.others, flows)
     rows: dict[UnitKey, CaseOfTable] = {}
     for case in read_case_table(records, dyr):
         assert case.bus is not None
@@ -121,7 +143,8 @@ def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
         if first is not case:
             other = f"also in {first.place}, under the name {first.name}"
             faults.append(f"{case.place}: {unit}: {other}")
-    return ImportPlan(dyr, units, {}, rows, tuple(faults), ())
+    flows |= {case.raw: read_power_flow(case.raw) for case in rows.values() if case.raw}
+    return ImportPlan(dyr, units, {}, rows, tuple(faults), (), flows)
 
 
 def import_units(
@@ -134,6 +157,12 @@ def import_units(
     time_unit: str | None = None,
     sheet: str | None = None,
     force: bool = False,
+    kv: float | None = None,
+    mva: float | None = None,
+    connection: str | None = None,
+    angle_unit: str | None = None,
+    channels: Mapping[str, str] = MappingProxyType({}),
+    raw: str | PathLike[str] | None = None,
 ) -> ImportedUnits:
     """Write a case for every unit of a planner's dynamics file, and units.csv with all units.
 
@@ -147,6 +176,12 @@ def import_units(
         time_unit: s, ms, us or min.
         sheet: of Excel files.
         force: replace files that exist.
+        kv: rated voltage of all units.
+        mva: rated power of all units.
+        connection: of their phasors: "phase-to-ground" or "phase-to-phase".
+        angle_unit: of their phasors: "deg" or "rad".
+        channels: columns of their records by signal: {"efd": "Field [V]"}.
+        raw: a power flow file of PSS/E (.raw) with ratings of the machines.
 
     Raises DynamicsError where the dynamics file cannot be read, ExfitError where records or options
     cannot be used. A unit that cannot be imported raises nothing: its ``status`` and ``notes`` say
@@ -156,15 +191,21 @@ def import_units(
         >>> imported = exfit.import_units("planner.dyr", "cases", records="records")
         >>> [unit.case for unit in imported.units]
     """
-    if any((steps, time, time_unit, sheet)) and not (records and Path(records).is_dir()):
-        raise ExfitError("steps, time, time_unit and sheet: only with a folder of records")
+    source = path_of(records)
+    of_folder = any((steps, time, time_unit, sheet, channels))
+    if of_folder and (source is None or not source.is_dir()):
+        raise ExfitError(
+            "steps, time, time_unit, sheet and channels: only with a folder of records"
+        )
     options = RecordOptions(
-        sizes_of(steps), bases_of(tuple(bases)), RecordSettings(tuple(time), time_unit, sheet)
+        sizes_of(steps),
+        bases_of(tuple(bases)),
+        RecordSettings(tuple(time), time_unit, sheet, channels=channels),
+        Ratings(kv, mva, connection, angle_unit),
     )
     folder = Path(folder)
-    plan = plan_import(Path(dyr), None if records is None else Path(records))
-    if not force:
-        _refuse_existing(folder / name for name in (*plan.names, UNITS))
+    plan = plan_import(Path(dyr), source, path_of(raw))
+    _refuse_existing([] if force else [folder / name for name in (*plan.names, UNITS)])
     rows, texts, doubts, used = list[ImportedUnit](), dict[str, str](), list[str](), set[str]()
     file = relative(plan.dyr, folder)
     for unit in plan.units.units:
@@ -183,12 +224,30 @@ def import_units(
             used.update(made.sizes)
         rows.append(_row(unit, status, name, files, notes))
     rows += map(_refused, plan.units.refused)
-    for size in steps:
-        if used.isdisjoint(sizes_of([size])):
-            raise ExfitError(f"--step {size}: no test of that name in any record")
+    _refuse_unused(steps, used)
     rows.sort(key=lambda row: row.line)
     write_each(folder, {**texts, UNITS: csv_text([ImportedUnit._fields, *rows])})
     return ImportedUnits(tuple(rows), texts, tuple(doubts), plan)
+
+
+def _refuse_unused(steps: Iterable[str], used: Set[str]) -> None:
+    """Raise FileError with the sizes of steps that no test has the names of."""
+    if unused := [size for size in steps if used.isdisjoint(sizes_of([size]))]:
+        raise FileError(f"--step {size}: no test of that name in any record" for size in unused)
+
+
+def columns_by_signal(texts: Iterable[str]) -> dict[str, str]:
+    """Return columns by signal from texts as "efd=Field [V]"; raises FileError with all faults."""
+    columns, faults = dict[str, str](), list[str]()
+    for text in texts:
+        signal, _, column = text.partition("=")
+        if signal not in SIGNALS or not column:
+            hint = near(signal, SIGNALS) if column else "give it as efd=Field"
+            faults.append(f"--channel {text}: not a signal and its column; {hint}")
+        columns[signal] = column
+    if faults:
+        raise FileError(faults)
+    return columns
 
 
 def _refuse_existing(files: Iterable[Path]) -> None:
@@ -230,12 +289,19 @@ def _made(
 ) -> MadeCase:
     """Return the case of a unit; raises ExfitError where a record of it cannot be used."""
     key, bases = key_of(unit), options.bases
+    ratings = plan.ratings_of(unit, options.ratings)
     if key in plan.rows:
-        return case_of_plan(plan.rows[key], unit_data(unit, file), folder, bases)
+        return case_of_plan(plan.rows[key], unit_data(unit, file), folder, bases, ratings)
     if key not in plan.files:
         return MadeCase(imported_case(unit, file), ())
     inspections = [options.settings.inspect(path) for path in plan.files[key]]
-    return case_of_records(inspections, unit_data(unit, file), folder, options.sizes, bases)
+    own = unit_data(unit, file)
+    return case_of_records(inspections, own, folder, options.sizes, bases, ratings)
+
+
+def path_of(file: str | PathLike[str] | None) -> Path | None:
+    """Return the path of a file, None without one."""
+    return None if file is None else Path(file)
 
 
 def key_of(unit: Unit) -> UnitKey:
@@ -247,17 +313,20 @@ def key_of(unit: Unit) -> UnitKey:
 class CaseMaker:
     """Makes a case of a table: called, it writes the file and returns "", or why there is none.
 
-    ``units`` are those of each planner's file, or why it cannot be read.
+    ``units`` are those of each planner's file, ``power_flows`` the ratings of each power flow file,
+    or why it cannot be read.
     """
 
     case: CaseOfTable
     file: Path
     units: Mapping[Path, DynamicsUnits | str]
+    power_flows: Mapping[Path, Mapping[UnitKey, Ratings] | str]
 
     def __call__(self) -> str:
         """Write the case, unless the file exists; return why it cannot be used, or ""."""
         try:
-            draft = case_of_plan(self.case, self._unit(), self.file.parent, {}).draft
+            unit, ratings = self._unit()
+            draft = case_of_plan(self.case, unit, self.file.parent, {}, ratings).draft
             if self.file.exists() and self.file.read_bytes() != draft.text.encode():
                 return (
                     f"{self.file} exists with other content than the table makes: remove it, or "
@@ -270,17 +339,22 @@ class CaseMaker:
         lacking = f"{self.case.place}: missing in the table ('?' in {self.file}): "
         return lacking + ", ".join(missing) if missing else ""
 
-    def _unit(self) -> UnitData:
-        """Return the data of the unit; raises ExfitError where its file has none."""
+    def _unit(self) -> tuple[UnitData, Ratings]:
+        """Return data and ratings of the unit; raises ExfitError where its file has none."""
         case, folder = self.case, self.file.parent
-        planner = None
+        planner, ratings = None, NO_RATINGS
         if case.dyr is not None:
             units = self.units[case.dyr]
             if isinstance(units, str):
                 raise ExfitError(units)
             unit = _unit_of(case, units, case.dyr)
             planner = unit_data(unit, relative(case.dyr, folder))
-        return unit_with(case.model, case.machine, planner, folder)
+            ratings = Ratings(unit.kv, unit.mva)
+            flow = {} if case.raw is None else self.power_flows[case.raw]
+            if isinstance(flow, str):
+                raise ExfitError(flow)
+            ratings = flow.get(key_of(unit), NO_RATINGS).over(ratings)
+        return unit_with(case.model, case.machine, planner, folder), ratings
 
 
 def cases_of_table(
@@ -304,7 +378,15 @@ def cases_of_table(
             units[file] = units_of_file(file)
         except DynamicsError as fault:
             units[file] = str(fault)
-    makers = (CaseMaker(case, Path(folder, CASES, f"{case.name}.yaml"), units) for case in cases)
+    flows: dict[Path, Mapping[UnitKey, Ratings] | str] = {}
+    for file in dict.fromkeys(case.raw for case in cases if case.raw is not None):
+        try:
+            flows[file] = read_power_flow(file)
+        except DynamicsError as fault:
+            flows[file] = str(fault)
+    makers = (
+        CaseMaker(case, Path(folder, CASES, f"{case.name}.yaml"), units, flows) for case in cases
+    )
     return {maker.file: maker for maker in makers}
 
 

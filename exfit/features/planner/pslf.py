@@ -3,6 +3,7 @@
 import re
 import textwrap
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -159,10 +160,11 @@ def _head(definition: Definition | None, record: _LogicalLine) -> Head:
     if definition is not None:
         values, more = _arranged(definition, record.number, values)
         faults += more
-    line = record.number
-    return Head(
-        int(bus), name.lower(), machine_id, line, values, definition, PSLF, base, tuple(faults)
-    )
+    line, kv = record.number, None
+    with suppress(ValueError):  # ! stands for what is not given
+        kv = number(record.fields[HEAD_FIELDS - 2]) or None
+    found = tuple(faults)
+    return Head(int(bus), name.lower(), machine_id, line, values, definition, PSLF, base, found, kv)
 
 
 def _arranged(definition: Definition, line: int, fields: tuple[Field, ...]) -> Arranged:

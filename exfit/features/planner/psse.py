@@ -70,7 +70,7 @@ def sound_records(text: str) -> FileRecords:
             fault = f"{ENDLESS} before the next one on line {number}"
             faults.append(DynamicsFault(open_[0].line, fault))
             open_, unclosed = (), False
-        read = _line(line, number, start, after_comma)
+        read = read_line(line, number, start, after_comma)
         if read.unclosed:
             faults.append(DynamicsFault(number, "a quote is opened and not closed on the line"))
         open_, unclosed = open_ + read.fields, unclosed or read.unclosed
@@ -83,7 +83,7 @@ def sound_records(text: str) -> FileRecords:
     return FileRecords(records, faults)
 
 
-def _line(line: str, number: int, start: int, after_comma: bool) -> _Line:
+def read_line(line: str, number: int, start: int, after_comma: bool) -> _Line:
     """Split a line up to the '/', with an empty field for each comma after a comma.
 
     ``start`` is where it starts in the text of the file.

@@ -77,7 +77,8 @@ class Head(NamedTuple):
     """A record by what it begins with, and the fields behind.
 
     ``definition`` is what exfit has a model of, None if it has none; ``base`` the MVA or MW that
-    its values are on, where the record says so; ``faults`` are those of its fields.
+    its values are on, and ``kv`` that of the bus, where the record says so; ``faults`` are those of
+    its fields.
     """
 
     bus: int
@@ -89,6 +90,7 @@ class Head(NamedTuple):
     program: str = PSSE
     base: float | None = None
     faults: tuple[DynamicsFault, ...] = ()
+    kv: float | None = None
 
 
 class Heads(NamedTuple):

@@ -55,7 +55,8 @@ def format_of(file: str | Path) -> FileFormat:
 class Unit:
     """A unit; ``warnings`` say, by line, what of the file its models do not represent.
 
-    ``unknown`` are the names of its records that exfit has no model of, which are left out.
+    ``unknown`` are the names of its records that exfit has no model of, which are left out; ``kv``
+    and ``mva`` are None where the file does not state them.
     """
 
     bus: int
@@ -67,6 +68,8 @@ class Unit:
     limiters: tuple[Reading, ...]
     warnings: tuple[DynamicsFault, ...]
     unknown: tuple[str, ...] = ()
+    kv: float | None = None
+    mva: float | None = None
 
     @property
     def added(self) -> tuple[Reading, ...]:
@@ -216,8 +219,17 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
         tuple(_attached(parts.values(), exciter, warnings)),
         tuple(sorted(warnings, key=lambda warning: warning.line)),
         tuple(head.name for head in unknown),
+        *_ratings(heads),
     )
     return unit, []
+
+
+def _ratings(heads: Iterable[Head]) -> tuple[float | None, float | None]:
+    """Return the kV and the MVA that the record of the machine states."""
+    for head in heads:
+        if head.definition is not None and head.definition.kind == "machine":
+            return head.kv, head.base or None
+    return None, None
 
 
 def _parts(

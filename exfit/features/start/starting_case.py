@@ -29,6 +29,7 @@ from exfit.case.suggestion import (
 )
 from exfit.case.yaml import QUESTION
 from exfit.errors import CaseError, ExfitError
+from exfit.features.start.ratings import NO_RATINGS, Ratings, answered
 from exfit.features.start.starting_tests import (
     StartingTest,
     doubtful_bases,
@@ -335,6 +336,7 @@ def case_of_records(
     folder: Path,
     sizes: Mapping[str, float],
     bases: Mapping[str, Base],
+    ratings: Ratings = NO_RATINGS,
 ) -> MadeCase:
     """Return the case of a unit with all tests of its records, to be written into a folder.
 
@@ -342,20 +344,31 @@ def case_of_records(
     contradicts them.
     """
     own = sizes_in_use(sizes, inspections)
+    ratings = ratings.of_record(inspections)
+    bases = ratings.bases(bases, inspections)
     tests = starting_tests(inspections, own, bases)
-    return MadeCase(starting_case(unit, tests, folder), tuple(doubtful_bases(tests)), tuple(own))
+    draft = answered(starting_case(unit, tests, folder), ratings, bases, inspections)
+    return MadeCase(draft, tuple(doubtful_bases(tests)), tuple(own))
 
 
 def case_of_plan(
-    case: CaseOfTable, unit: UnitData, folder: Path, bases: Mapping[str, Base]
+    case: CaseOfTable,
+    unit: UnitData,
+    folder: Path,
+    bases: Mapping[str, Base],
+    ratings: Ratings = NO_RATINGS,
 ) -> MadeCase:
     """Return the case that a table describes, to be written into a folder.
 
-    ``bases`` are by signal; those of the table count more. What neither the records nor the table
-    says is to be filled in. Raises ExfitError where a record cannot be read or contradicts its row.
+    ``bases`` are by signal; those of the table, and its ratings, count more. What neither the
+    records nor the table says is to be filled in.
+
+    Raises ExfitError where a record cannot be read or contradicts its row.
     """
     inspections = {file: settings.inspect(file) for file, settings in case.settings.items()}
     first, only = case.tests[0], next(iter(inspections.values()))
+    ratings = case.ratings.over(ratings).of_record([*inspections.values()])
+    bases = ratings.bases(bases, [*inspections.values()])
     if len(case.tests) == 1 and not tests_of(only) and first.at is None and first.step is None:
         own = {} if first.base is None else {"vt": first.base}
         tests = starting_tests([only], {}, {**bases, **own})
@@ -370,7 +383,8 @@ def case_of_plan(
             given[value] = case.network[str(key)]
         elif value.place[-3:] == ("channels", "vt", "column") and len(voltages) == 1:
             given[value] = next(iter(voltages))
-    return MadeCase(draft.filled(given), tuple(doubtful_bases(tests)))
+    draft = answered(draft.filled(given), ratings, bases, [*inspections.values()])
+    return MadeCase(draft, tuple(doubtful_bases(tests)))
 
 
 def _of_each_test(

@@ -13,11 +13,13 @@ from exfit.case.json_schema import PATTERNS
 from exfit.case.schema.values import FILE_NAME
 from exfit.case.suggestion import Base, RecordSettings, base_of
 from exfit.errors import ExfitError, FileError
+from exfit.features.start.ratings import ANGLE_UNITS, CONNECTIONS, NO_RATINGS, Ratings
 from exfit.features.start.starting_tests import StartingTest, renamed, started
 from exfit.records.formats import WORKBOOKS
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, tests_of
 from exfit.records.units import unit_of
+from exfit.signals import RECORDED
 from exfit.util.files import read_limited, utf8
 from exfit.util.text import near
 
@@ -28,9 +30,11 @@ YES, NO = ("yes", "y", "x", "1", "true"), ("", "no", "n", "0", "false", "-")
 NEAREST = 5.0  # s: how far a noted instant may be from the step that the record shows
 OF_UNIT = ("dyr", "bus", "id", "model", "machine", "name")
 OF_RECORD = ("time", "time unit", "sheet", "vt")
+OF_RATINGS = ("kv", "mva", "connection", "angle unit", "raw")
 OF_NETWORK = {"f0": "f0", "x": "X", "p": "P", "q": "Q"}  # columns, and their keys in a case
 ABOUT = "about."  # begins the names of columns for reports
-ALL_COLUMNS = (*COLUMNS, "unit", *OF_RECORD, *OF_UNIT, *OF_NETWORK)
+CHANNEL = "channel."  # begins those of a signal's column of the record
+ALL_COLUMNS = (*COLUMNS, "unit", *OF_RECORD, *OF_UNIT, *OF_RATINGS, *OF_NETWORK)
 MOST_BUSES = 999_999
 LONGEST_ID = 2
 TIME_UNITS = ("s", "ms", "us", "min")
@@ -234,8 +238,8 @@ class CaseOfTable:
 
     The unit is that of a bus and an id of ``dyr``, with another exciter where a ``model`` is given;
     without ``dyr`` a ``model`` and a ``machine`` with typical data. ``network`` are values of the
-    grid by their keys in a case, ``about`` what a report shows; ``place`` is where its first row
-    is.
+    grid by their keys in a case, ``about`` what a report shows, ``raw`` a power flow file with
+    ratings of the unit; ``place`` is where its first row is.
     """
 
     place: str
@@ -249,6 +253,8 @@ class CaseOfTable:
     settings: Mapping[Path, RecordSettings]
     network: Mapping[str, float]
     about: Mapping[str, str]
+    ratings: Ratings = NO_RATINGS
+    raw: Path | None = None
 
 
 def read_case_table(path: Path, dyr: Path | None = None) -> tuple[CaseOfTable, ...]:
@@ -256,15 +262,16 @@ def read_case_table(path: Path, dyr: Path | None = None) -> tuple[CaseOfTable, .
 
     Columns are file (required), at, step, base and validates as in a table of tests; unit, that of
     base; time (columns of date and time with ; between), time unit, sheet and vt (its column) of
-    the record; dyr, bus, id, model, machine and name of the unit; f0, X, P and Q of its grid;
-    about.NAME for reports. Files are relative to the table's folder. What a unit has is given in
-    one of its rows or more. With a ``dyr`` every row is of a unit of that file.
+    the record, channel.SIGNAL for its columns; dyr, bus, id, model, machine and name of the unit;
+    kV, MVA, connection, angle unit and raw, a power flow file that has ratings; f0, X, P and Q of
+    its grid; about.NAME for reports. Files are relative to the table's folder. What a unit has is
+    given in one of its rows or more. With a ``dyr`` every row is of a unit of that file.
 
     Raises ExfitError with all faults, each with its row and column.
     """
     faults = list[str]()
     by_case: dict[tuple[str, ...], list[Cells]] = {}
-    for row in read_cells(path, ALL_COLUMNS, (ABOUT,)):
+    for row in read_cells(path, ALL_COLUMNS, (ABOUT, CHANNEL)):
         by_case.setdefault(_identity(row.by_name), []).append(row)
     for identity, rows in by_case.items():  # with an id in one row and none in another
         of_file, bus, machine_id = (*identity, "", "")[:3]
@@ -303,9 +310,9 @@ def _identity(cells: Mapping[str, str]) -> tuple[str, ...]:
 def _case(rows: Sequence[Cells], folder: Path, dyr: Path | None, faults: list[str]) -> CaseOfTable:
     """Return the case of rows of one unit; add all that is wrong with them."""
     about = [name for name in rows[0].by_name if name.startswith(ABOUT)]
-    unit = _common(rows, [*OF_UNIT, *OF_NETWORK, *about], faults)
+    unit = _common(rows, [*OF_UNIT, *OF_RATINGS, *OF_NETWORK, *about], faults)
     cells = unit.by_name
-    own = folder / cells["dyr"] if cells.get("dyr") else dyr
+    own = _file(unit, "dyr", folder) or dyr
     bus, machine_id = unit.read("bus", _bus, faults), unit.read("id", _id, faults)
     name = unit.read("name", _name, faults)
     faults += _of_unit(unit, own, dyr)
@@ -323,7 +330,30 @@ def _case(rows: Sequence[Cells], folder: Path, dyr: Path | None, faults: list[st
         _settings(rows, folder, faults),
         {key: value for key, value in network.items() if value is not None},
         {key.removeprefix(ABOUT): cells[key] for key in about if cells[key]},
+        _ratings(unit, faults),
+        _file(unit, "raw", folder),
     )
+
+
+def _file(unit: Cells, column: str, folder: Path) -> Path | None:
+    """Return the file that a cell names, None where it is blank."""
+    name = unit.by_name.get(column)
+    return folder / name if name else None
+
+
+def _ratings(unit: Cells, faults: list[str]) -> Ratings:
+    """Return the ratings of a unit; add those that are none."""
+    numbers = {column: unit.read(column, _number, faults) for column in ("kv", "mva")}
+    for column, value in numbers.items():
+        if value is not None and value <= 0.0:
+            faults.append(f"{unit.place}: {column}: {value:g} is not above 0")
+    words: dict[str, str | None] = {}
+    for column, known in (("connection", CONNECTIONS), ("angle unit", ANGLE_UNITS)):
+        text = unit.by_name.get(column) or None
+        words[column] = text
+        if text is not None and text not in known:
+            faults.append(f"{unit.place}: {column}: {text!r}; {near(text, known)}")
+    return Ratings(numbers["kv"], numbers["mva"], words["connection"], words["angle unit"])
 
 
 def _default_name(bus: int | None, machine_id: str | None, row: Cells) -> str:
@@ -404,19 +434,34 @@ def _test(row: Cells, folder: Path, faults: list[str]) -> TableRow:
     return test
 
 
+def _channels(row: Cells, columns: Sequence[str], faults: list[str]) -> dict[str, str]:
+    """Return the columns of a record by signal; add the names that are none of a signal."""
+    for name in columns:
+        signal = name.removeprefix(CHANNEL)
+        if signal not in RECORDED:
+            faults.append(f"{row.place}: {name}: no signal; {near(signal, RECORDED)}")
+    given = {name.removeprefix(CHANNEL): row.by_name[name] for name in columns}
+    return {signal: column for signal, column in given.items() if column}
+
+
 def _settings(rows: Sequence[Cells], folder: Path, faults: list[str]) -> dict[Path, RecordSettings]:
     """Collect the settings by which each record of a unit is read."""
     settings: dict[Path, RecordSettings] = {}
     for file in dict.fromkeys(row.by_name.get("file", "") for row in rows):
         if file:
             of_file = [row for row in rows if row.by_name.get("file", "") == file]
-            row = _common(of_file, OF_RECORD, faults)
+            columns = [name for name in of_file[0].by_name if name.startswith(CHANNEL)]
+            row = _common(of_file, [*OF_RECORD, *columns], faults)
             cells, unit = row.by_name, row.by_name["time unit"]
             if unit and unit not in TIME_UNITS:
                 faults.append(f"{row.place}: time unit: {unit!r}; {near(unit, TIME_UNITS)}")
             names = (name.strip() for name in cells["time"].split(BETWEEN_COLUMNS))
             clock, sheet = tuple(filter(None, names)), cells["sheet"] or None
             settings[folder / file] = RecordSettings(
-                clock, unit or None, sheet, cells["vt"] or None
+                clock,
+                unit or None,
+                sheet,
+                cells["vt"] or None,
+                channels=_channels(row, columns, faults),
             )
     return settings

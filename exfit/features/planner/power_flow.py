@@ -1,0 +1,181 @@
+"""The power flow files of PSS/E (.raw, versions 33 to 35): ratings of the machines of a grid."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from exfit.errors import DynamicsError
+from exfit.features.planner.fields import DynamicsFault, Field, lines_of, located, number, text_of
+from exfit.features.planner.import_case import read_file
+from exfit.features.planner.psse import COMMENTS, read_line
+from exfit.features.start.ratings import Ratings, StepUp
+from exfit.features.start.record_files import UnitKey
+from exfit.util.text import show
+
+VERSIONS = (33, 35)
+SECTIONS = ("BUS", "LOAD", "FIXED SHUNT", "GENERATOR", "BRANCH")
+SYSTEM_WIDE = 34  # from this version on there are sections before the buses, behind the branches
+BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
+TITLE_LINES = 3
+SBASE, REV, BASFRQ = 1, 2, 5  # fields of the first line
+BASKV = 2  # of a bus
+MBASE, XT = 8, 12  # of a generator; one later in version 35, which has NREG before them
+WITH_NREG = 35
+THIRD_BUS, CZ, STAT = 2, 5, 11  # of a transformer
+ON_SYSTEM_BASE, ON_OWN_BASE = 1.0, 2.0  # CZ: of its reactance
+
+
+class _Row(NamedTuple):
+    """A line of a file."""
+
+    line: int
+    fields: Sequence[Field]
+
+
+class _Bus(NamedTuple):
+    name: str
+    kv: float
+
+
+def read_power_flow(path: Path) -> Mapping[UnitKey, Ratings]:
+    """Read the ratings of machines, by bus and id in capitals, from a power flow file.
+
+    Raises DynamicsError with all faults, each with its line, and for another version of the file.
+    """
+    faults = list[DynamicsFault]()
+    lines = [
+        (place, line)
+        for place, (_, line) in enumerate(lines_of(text_of(read_file(path), str(path))), start=1)
+        if not line.lstrip().startswith(COMMENTS)
+    ]
+    base, version, f0 = _heading(lines, faults)
+    if not faults:
+        ratings = _ratings(_sections(lines[TITLE_LINES:], int(version)), base, version, f0, faults)
+    if faults:
+        raise DynamicsError(located(faults, str(path)))
+    return ratings
+
+
+def _heading(
+    lines: Sequence[tuple[int, str]], faults: list[DynamicsFault]
+) -> tuple[float, float, float]:
+    """Return base, version and frequency of the first line; add what is wrong with them."""
+    place, line = lines[0] if lines else (1, "")
+    head = _Row(place, read_line(line, place, 0, True).fields)
+    for at, name in ((SBASE, "SBASE"), (REV, "REV"), (BASFRQ, "BASFRQ")):
+        if at >= len(head.fields):
+            faults.append(DynamicsFault(head.line, f"{name}: missing"))
+    base, version = _number(head, SBASE, "SBASE", faults), _number(head, REV, "REV", faults)
+    low, high = VERSIONS
+    if not faults and not low <= int(version) <= high:
+        text = f"REV: {show(version)} lies outside {low} ... {high}, the versions that are read"
+        faults.append(DynamicsFault(head.line, text))
+    return base, version, _number(head, BASFRQ, "BASFRQ", faults)
+
+
+def _ratings(
+    sections: Mapping[str, Sequence[_Row]],
+    base: float,
+    version: float,
+    f0: float,
+    faults: list[DynamicsFault],
+) -> dict[UnitKey, Ratings]:
+    """Return the ratings of the machines of a file; add what is wrong with its rows."""
+    buses = {
+        row.fields[0].text: _Bus(row.fields[1].text, _number(row, BASKV, "BASKV", faults))
+        for row in sections.get("BUS", ())
+        if len(row.fields) > BASKV
+    }
+    generators = [row for row in sections.get("GENERATOR", ()) if len(row.fields) > 1]
+    at_bus = Counter(row.fields[0].text for row in generators)
+    step_ups = _step_ups(sections.get("TRANSFORMER", ()), base, buses, faults)
+    later = int(version) >= WITH_NREG
+    ratings: dict[UnitKey, Ratings] = {}
+    for row in generators:
+        bus, machine_id = row.fields[0].text, row.fields[1].text.upper()
+        if bus not in buses or not bus.isdigit():
+            faults.append(DynamicsFault(row.line, f"bus {bus}: not in the section of the buses"))
+            continue
+        mva = _number(row, MBASE + later, "MBASE", faults)
+        own = _number(row, XT + later, "XT", faults)
+        step_up = StepUp(own, None) if own > 0.0 else None
+        beside = step_ups.get(bus, ())
+        if step_up is None and at_bus[bus] == len(beside) == 1:
+            step_up = StepUp(float(f"{beside[0].x * mva:.6g}"), beside[0].kv)
+        kv, power, frequency = (value or None for value in (buses[bus].kv, mva, f0))
+        key = UnitKey(int(bus), machine_id or "1")
+        ratings[key] = Ratings(kv, power, f0=frequency, step_up=step_up)
+    return ratings
+
+
+def _sections(lines: Sequence[tuple[int, str]], version: int) -> dict[str, list[_Row]]:
+    """Return the rows of each section: named where the one before ends, else in their order."""
+    more = version >= SYSTEM_WIDE
+    before, behind = (["SYSTEM-WIDE"], ["SYSTEM SWITCHING DEVICE"]) if more else ([], [])
+    order = iter([*before, *SECTIONS, *behind, "TRANSFORMER"])
+    name = next(order)
+    sections: dict[str, list[_Row]] = {}
+    for place, line in lines:
+        fields = read_line(line, place, 0, True).fields
+        # a transformer's resistance may be 0, too, with its reactance behind it
+        if [field.text.upper() for field in fields[:2]] in (["0"], ["Q"], ["0", "END"]):
+            begins = BEGIN.search(line)
+            following = next(order, "")
+            name = begins[1].upper() if begins else following
+        elif fields:
+            sections.setdefault(name, []).append(_Row(place, fields))
+    return sections
+
+
+class _Transformer(NamedTuple):
+    """A transformer as one of its buses sees it: its reactance, pu of 1 MVA, and the other's kV."""
+
+    x: float
+    kv: float
+
+
+def _step_ups(
+    rows: Sequence[_Row], base: float, buses: Mapping[str, _Bus], faults: list[DynamicsFault]
+) -> dict[str, list[_Transformer]]:
+    """Return the transformers of two windings in service that a bus is the lower side of."""
+    found: dict[str, list[_Transformer]] = {}
+    for first, second in _of_two_windings(rows):
+        ends = [buses.get(field.text) for field in first.fields[:2]]
+        code = _number(first, CZ, "CZ", faults)
+        reactance = _number(second, 1, "X1-2", faults)
+        if (
+            None in ends
+            or first.fields[STAT].text == "0"
+            or code not in (ON_SYSTEM_BASE, ON_OWN_BASE)
+        ):
+            continue
+        power = base if code == ON_SYSTEM_BASE else _number(second, 2, "SBASE1-2", faults)
+        kv = [bus.kv for bus in ends if bus is not None]
+        if power > 0.0 and kv[0] != kv[1]:
+            low = first.fields[kv.index(min(kv))].text
+            found.setdefault(low, []).append(_Transformer(reactance / power, max(kv)))
+    return found
+
+
+def _of_two_windings(rows: Sequence[_Row]) -> Iterator[tuple[_Row, _Row]]:
+    """Yield the first two lines of each transformer of two windings, which has four, not five."""
+    at = 0
+    while at + 1 < len(rows):
+        first = rows[at]
+        two = len(first.fields) > STAT and first.fields[THIRD_BUS].text in ("0", "")
+        if two:
+            yield first, rows[at + 1]
+        at += 4 if two else 5
+
+
+def _number(row: _Row, at: int, name: str, faults: list[DynamicsFault]) -> float:
+    """Return a number of a row, 0 where the row ends before; add its fault."""
+    if at >= len(row.fields):
+        return 0.0
+    try:
+        return number(row.fields[at])
+    except ValueError as error:
+        faults.append(DynamicsFault(row.line, f"{name}: {error}"))
+        return 0.0

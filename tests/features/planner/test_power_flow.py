@@ -1,0 +1,163 @@
+"""Ratings of units from power flow files: each is an answer that a case then does not ask for."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from dynamics import THREE
+from pmu_records import F0, KV, MVA, degrees, phasors_of, smooth_course, stamps, write_table
+from power_flow_files import HIGH_KV, X, power_flow
+
+from exfit.case.load import load_case
+from exfit.errors import DynamicsError
+from exfit.features.planner.power_flow import read_power_flow
+
+
+@pytest.fixture(autouse=True)
+def workplace(empty_folder):
+    """Work in a folder with a file of three units."""
+    Path("units.dyr").write_text(THREE)
+    Path("records").mkdir()
+    return empty_folder
+
+
+def event(kv=KV, angle="V Angle (deg)", power=True, frequency="Freq (Hz)"):
+    """Write the record of a swing of the unit at bus 9, its voltage at a side with this kV."""
+    course = smooth_course()
+    voltage, current = phasors_of(course, kv)
+    columns = {
+        "Time (UTC)": stamps(course.time),
+        "V Mag (kV)": np.abs(voltage),
+        angle: degrees(voltage),
+        "I Mag (A)": np.abs(current),
+        "I Angle (deg)": degrees(current),
+    }
+    columns |= {frequency: course.frequency} if frequency else {}
+    columns |= {"Gen P (MW)": course.p * MVA, "Gen Q (Mvar)": course.q * MVA} if power else {}
+    write_table(Path("records", "9_1.csv"), columns)
+
+
+def imported(run, *options, records="records"):
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--records", records, *options,
+              "--force")  # fmt: skip
+    assert ran.code == 0, ran.err
+    return Path("cases", "bus-9-1.yaml")
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("version", [33, 34, 35])
+def test_each_version_gives_the_ratings_of_its_machines(version, named):
+    for cz in (1, 2):
+        text = power_flow(version, cz=cz, named=named)
+        Path("net.raw").write_text(text)
+        ratings = read_power_flow(Path("net.raw"))
+        assert [*ratings] == [(1, "1"), (9, "1")]
+        for own in ratings.values():
+            assert (own.kv, own.mva, own.f0) == (KV, MVA, F0)  # X has six decimals
+            assert own.step_up == pytest.approx((X, HIGH_KV), rel=1e-4)
+    Path("net.raw").write_text(power_flow(version, named=named, own_x=0.12))
+    assert {own.step_up for own in read_power_flow(Path("net.raw")).values()} == {(0.12, None)}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (", 33,", ", 32,", "net.raw:1: REV: 32 lies outside 33 ... 35"),
+        ("100.0, 33", "1oo, 33", "net.raw:1: SBASE: '1oo' is not a number"),
+        ("120.000", "12O.000", "net.raw:11: MBASE: '12O.000' is not a number"),
+        ("18.0000", "x", "net.raw:4: BASKV: 'x' is not a number"),
+    ],
+)
+def test_all_faults_of_a_file_are_named_with_line_value_and_limit(old, new, says):
+    text = power_flow()
+    assert old in text
+    Path("net.raw").write_text(text.replace(old, new))
+    with pytest.raises(DynamicsError) as raised:
+        read_power_flow(Path("net.raw"))
+    assert says in str(raised.value)
+    assert len(str(raised.value).splitlines()) == text.count(old)
+
+
+@pytest.mark.parametrize("power", [True, False])
+def test_no_value_is_open_in_a_case_that_a_power_flow_file_answers(run, power):
+    event(power=power)
+    assert '"?"' in imported(run).read_text()
+    Path("net.raw").write_text(power_flow())
+    path = imported(run, "--raw", "net.raw")
+    assert '"?"' not in path.read_text()
+    case = load_case(path)
+    phasors = case.recordings[0].record.phasors
+    assert (phasors.kV, phasors.voltage.connection) == (KV, "phase-to-ground")
+    assert case.plant.network["X"] == 0.0
+    assert case.plant.network["f0"] == F0
+
+
+def test_a_voltage_that_was_recorded_behind_the_transformer_has_its_reactance_and_kv(run):
+    event(HIGH_KV)
+    Path("net.raw").write_text(power_flow(35))
+    case = load_case(imported(run, "--raw", "net.raw"))
+    assert case.recordings[0].record.phasors.kV == HIGH_KV
+    assert case.plant.network["X"] == pytest.approx(X, rel=1e-5)
+
+
+def test_options_answer_what_they_name(run):
+    event(angle="V Angle", frequency="")
+    path = imported(run, "--kv", KV, "--mva", MVA, "--connection", "phase-to-ground",
+                    "--angle-unit", "deg")  # fmt: skip
+    content = path.read_text()
+    phasors = yaml.safe_load(content)["record"]["phasors"]
+    assert phasors["kV"] == KV
+    assert phasors["voltage"]["connection"] == "phase-to-ground"
+    assert phasors["voltage"]["angle_unit"] == "deg"
+    assert content.count('"?"') == 1  # the frequency, which nothing states
+    assert yaml.safe_load(content)["plant"]["network"]["f0"] == "?"
+
+
+def test_columns_of_a_table_count_more_than_a_power_flow_file_and_options(run):
+    event()
+    Path("net.raw").write_text(power_flow(kv=17.5, mva=110.0))
+    Path("records", "table.csv").write_text(
+        "bus,id,file,kV,MVA,raw,channel.p,channel.q\n"
+        f"9,1,9_1.csv,{KV},,../net.raw,Gen P (MW),Gen Q (Mvar) [Mvar]\n"
+    )
+    path = imported(run, "--mva", MVA, records="records/table.csv")
+    assert '"?"' not in path.read_text()
+    record = load_case(path).recordings[0].record
+    assert record.phasors.kV == KV
+    assert record.phasors.MVA == MVA
+    assert (record.channels["p"].column, record.channels["p"].base) == ("Gen P (MW)", MVA)
+
+
+def test_all_faults_of_ratings_in_a_table_are_named_together(run):
+    event()
+    Path("records", "table.csv").write_text(
+        "bus,id,file,kV,MVA,connection,angle unit,channel.x\n9,1,9_1.csv,-1,x,star,degree,a\n"
+    )
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--records", "records/table.csv")
+    assert ran.code == 1
+    for word in ("kv: -1 is not above 0", "mva: 'x' is not a number", "connection: 'star'",
+                 "angle unit: 'degree'", "channel.x: no signal"):  # fmt: skip
+        assert f"table.csv:2: {word}" in ran.err
+
+
+def test_a_channel_that_the_record_does_not_have_is_named(run):
+    event()
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--records", "records", "--channel",
+              "efd=Field [V]", "--channel", "ifd=Other")  # fmt: skip
+    assert ran.code == 1
+    assert "efd: Field [V]: no column with a unit of records/9_1.csv" in ran.err
+    assert "ifd: Other: no column" in ran.err
+
+
+def test_a_file_of_pslf_answers_kv_and_mva_itself(run):
+    from loose_dyd import PSLF_UNIT
+
+    event()
+    Path("records", "9_1.csv").rename(Path("records", "1_1.csv"))
+    Path("units.dyd").write_text(PSLF_UNIT)
+    ran = run("import", "--all", "units.dyd", "-o", "cases", "--records", "records")
+    assert ran.code == 0, ran.err
+    text = Path("cases", "bus-1-1.yaml").read_text()
+    assert '"?"' not in text
+    assert yaml.safe_load(text)["record"]["phasors"]["kV"] == KV
