@@ -44,7 +44,8 @@ def compared(name):
     told, rows = reference(name)
     times, case = [row["t"] for row in rows], TwoBuses(told)
     got = [row["vt"] for row in case.shown(times)]
-    free = [row["vt"] for row in TwoBuses(told, **widened(case.values, case.unit.exciter.name)).shown(times)]
+    wide = widened(case.values, case.unit.exciter.name)
+    free = [row["vt"] for row in TwoBuses(told, **wide).shown(times)]
     apart = max(abs(ours - row["vt"]) for ours, row in zip(got, rows, strict=True))
     acts = max(abs(a - b) for a, b in zip(got, free, strict=True)) > ACTS
     return models_of(case.unit), f"{told['program']} {told['version']}", apart, acts
