@@ -75,7 +75,7 @@ def table():
             yield f"| {model} | {program} | {len(rows)} | {worst:.1e} | {acts} |"
         without += [] if programs else [model]
     yield ""
-    yield f"No curve on load: {', '.join(without)}. Those rest on block diagrams and second typings."
+    yield f"No curve on load: {', '.join(without)}. Those rest on diagrams and second typings."
 
 
 def main():
