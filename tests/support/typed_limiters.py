@@ -135,7 +135,7 @@ class Choices:
 
     def _change(self, t, name):
         made = self.made[name]
-        self.made[name] = self.next_mode[name] if name in self.next_mode else not made
+        self.made[name] = self.next_mode.get(name, not made)
         self.events.append((t, name, self.made[name]))
 
     def times(self, name):
@@ -500,8 +500,8 @@ class LimitedUnit:
                 return [c.margins[name] for name in names]
 
             def event(k, margins=margins, slacks=slacks):
-                def holds(t, y):
-                    return margins(t, y.tobytes())[k] + slacks[k]
+                def holds(time, states, margins=margins, slacks=slacks):
+                    return margins(time, states.tobytes())[k] + slacks[k]
 
                 holds.terminal, holds.direction = True, -1
                 return holds

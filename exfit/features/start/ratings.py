@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from exfit.case.case_draft import CaseDraft, Noted, OpenValue
 from exfit.case.suggestion import Base, rated_bases
+from exfit.plants import KINDS
 from exfit.records.inspection import Inspection
 from exfit.records.units import scale_between
 
@@ -110,7 +111,8 @@ def answered(
         if answer is not None:
             given[value] = answer
     draft = draft.filled(given)
-    if ratings.step_up is None or draft.kind_of_plant != "grid-playback":
+    kind = KINDS.get(draft.kind_of_plant)
+    if ratings.step_up is None or kind is None or not kind.finds_rest:  # only events are behind one
         return draft
     plant = draft.sections["plant"]
     x = Noted(ratings.step_up.x, "pu, the step-up transformer's: recorded behind it")
