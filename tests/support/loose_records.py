@@ -77,8 +77,10 @@ def loose(definition, values, random, bus=1, machine_id="1"):
     name = name.lower() if random.integers(4) == 0 else name
     fields = [str(bus), quoted(name, random), quoted(machine_id, random)]
     icons = dict(definition.record.icons)
-    fields += [str(int(values.get(symbol, icons[symbol]))) for symbol in icons]
-    fields += [styled(given[symbol], random) for symbol in definition.record.cons]
+    fields += [
+        str(int(values.get(name, icons[name]))) if name in icons else styled(given[name], random)
+        for name in definition.names
+    ]
     gaps = [" ", "\t", ",", " , ", ", ", "   ", "\n", ",\n  ", "\r\n", "\n// it's 1 2 3 / 'x\n"]
     gaps += ["\n@! the unit's, \"\n  ", "\n\n"]
     text = fields[0]
