@@ -26,6 +26,7 @@ from exfit.case.yaml import (
 from exfit.errors import CaseError
 from exfit.records.record import Record
 from exfit.registry import parts
+from exfit.util.interrupts import deferred_interrupts
 from exfit.util.text import Place, dotted, near
 
 CaseOrPath = Case | str | PathLike[str]
@@ -113,7 +114,8 @@ def validated(
     ``schema`` makes the JSON Schema of the file, by default that of a case.
     """
     try:
-        return form.model_validate(content)
+        with deferred_interrupts():  # pydantic makes errors of its own of an interruption
+            return form.model_validate(content)
     except ValidationError as error:
         from exfit.case.json_schema import form_faults, json_schema
 

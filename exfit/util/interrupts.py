@@ -1,7 +1,9 @@
 """What an interruption (Ctrl-C) may not cut in two, and signals that interrupt as Ctrl-C does."""
 
+import _thread
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +16,8 @@ ENDING = tuple(
     if name in signal.Signals.__members__
 )
 SIGNALLED = 128  # exit codes of programs that a signal ended are its number and this, for shells
+IMPORTING = "<frozen importlib._bootstrap>"  # the file of the frames of an import
+AGAIN = 0.02  # s until a signal that met an import is looked at again
 
 
 @contextmanager
@@ -58,27 +62,57 @@ def endings_as_interruptions() -> Iterator[list[int]]:
     """Have signals that end a program interrupt what is inside, as Ctrl-C does.
 
     What is given holds the numbers of those that came. Those that are ignored, as by nohup, stay
-    so; other threads than the main one get none.
+    so; other threads than the main one get none. An import ends first, as Ctrl-C lets it end, too:
+    a module that was interrupted cannot be imported again, nor what needs it.
     """
     received: list[int] = []
-    program = os.getpid()
+    program, imports = os.getpid(), _imports(sys._getframe())
 
-    def interrupt(number: int, _: FrameType | None) -> None:
+    def interrupt(number: int, frame: FrameType | None) -> None:
         if os.getpid() != program:  # a process that was forked from this one ends as others do
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, former[signal.Signals(number)])
             signal.raise_signal(number)
-        received.append(number)
+            return
+        if _imports(frame) > imports:
+            again = threading.Timer(AGAIN, _send, (signal.Signals(number),))
+            again.daemon = True
+            again.start()
+            return
+        if number != signal.SIGINT:
+            received.append(number)
         raise KeyboardInterrupt
 
     main = threading.current_thread() is threading.main_thread()
-    replaced = [it for it in ENDING if main and signal.getsignal(it) is signal.SIG_DFL]
+    usual = {signal.SIGINT: signal.default_int_handler, **dict.fromkeys(ENDING, signal.SIG_DFL)}
+    former = {
+        number: handler
+        for number, handler in usual.items()
+        if main and signal.getsignal(number) is handler
+    }
     try:
-        for number in replaced:
+        for number in former:
             signal.signal(number, interrupt)
         yield received
     finally:
-        for number in replaced:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in former.items():
+            signal.signal(number, handler)
         # where an interruption has passed through code made of text, as dataclasses are, CPython
         # ends the program by SIGINT in place of its exit code, unless other such code ran after it
         eval("None")
+
+
+def _send(number: signal.Signals) -> None:
+    """Send the main thread a signal, which elsewhere than on Windows wakes it, too."""
+    if sys.platform == "win32":
+        _thread.interrupt_main(number)
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+
+
+def _imports(frame: FrameType | None) -> int:
+    """Count the frames of imports from a frame outwards."""
+    count = 0
+    while frame is not None:
+        count += frame.f_code.co_filename == IMPORTING
+        frame = frame.f_back
+    return count

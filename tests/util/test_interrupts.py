@@ -1,16 +1,20 @@
 """An interruption waits for what may not be cut in two; what ends a program interrupts it."""
 
+import importlib
 import os
 import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
 
 import exfit
 from exfit.util.interrupts import ENDING, deferred_interrupts, endings_as_interruptions
+
+PATIENCE = 30  # s
 
 
 def interrupted(steps, error=None):
@@ -137,6 +141,24 @@ def test_other_threads_get_no_handlers():
     thread.start()
     thread.join()
     assert handlers == [signal.SIG_DFL]
+
+
+def imported(module):
+    """Import a module that a signal meets, and wait for what that does."""
+    with endings_as_interruptions():
+        importlib.import_module(module)
+        time.sleep(PATIENCE)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, *ENDING])
+def test_an_import_is_whole_before_an_interruption_takes_effect(number, tmp_path, monkeypatch):
+    module = f"met_by_{number.name}"
+    text = f"import signal\nsignal.raise_signal({number})\nwhole = True\n"
+    (tmp_path / f"{module}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        imported(module)
+    assert sys.modules.pop(module).whole
 
 
 IN_TEXT = """\
