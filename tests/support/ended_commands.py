@@ -16,7 +16,8 @@ ENDS = {  # the exit codes of a command that meets a signal, and of one that is 
     "SIGKILL": (-9, 3, 0),
 }
 TEMPORARY = ".exfit-"
-OF_LATER_PHASES = ("parameters_lm.yaml", "down-step.csv")  # the end of a phase, the validation
+# the end of a phase, the validation, the uncertainty
+OF_LATER_PHASES = ("parameters_lm.yaml", "down-step.csv", "sensitivities.csv")
 PATIENCE = 120  # s
 
 
