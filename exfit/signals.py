@@ -106,6 +106,8 @@ ROWS = (
     SignalRow("E", "source voltage"),
     SignalRow("R", "resistance to the source"),
     SignalRow("X", "reactance to the source"),
+    SignalRow("fault_G", "conductance of a fault"),
+    SignalRow("fault_B", "susceptance of a fault"),
 )  # fmt: skip
 
 SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}

@@ -335,8 +335,13 @@ def network_part(given: Data, kind: PlantKind, plant: Place = ("plant",)) -> Par
             yield "Q", f"is missing{f': {either}' if 'X' in symbols else ''}"
         if "Q" in given and "E" in given:
             yield "Q", "not allowed with E, from which it follows"
-        if values.get("R") == values.get("X") == 0.0:
+        if values.get("R") == values.get("X") == 0.0 and "Xs" not in symbols:
             yield "X", "0, and R = 0 as well: the machine needs an impedance to the source"
+        if "Xs" in symbols:
+            if values.get("Rs") == values.get("Xs") == 0.0:
+                yield "Xs", "0, and Rs = 0 as well: the far bus needs an impedance to the source"
+            if "E" in given:
+                yield "E", "not allowed with a far bus before the source: give Q"
 
     if "Q" in given and "E" in given:
         sheet = tuple(dict.fromkeys((*sheet, *kind.network(("Q",)))))

@@ -29,7 +29,7 @@ from exfit.fitting.experiment import (
 from exfit.fitting.nuisances import TURN, Found, nuisances_of, prefix_from
 from exfit.fitting.recordings import deviation, levels_of, record_of, span_of
 from exfit.fitting.system import system_of
-from exfit.plants import BREAKER, NETWORK, REFERENCES, VT0
+from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.simulator import LARGEST_STEP, Simulator
@@ -224,6 +224,10 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
             steps.append(InputStep(at, size, signal, smooth, change.ramp or 0.0))
     for turn in test.angle_steps:
         steps.append(InputStep(turn.at, turn.radians, "angle", ramp=turn.ramp or 0.0))
+    for fault in test.fault:
+        for name, size in zip(FAULT, fault.admittance, strict=True):
+            if size != 0.0:
+                steps += [InputStep(fault.at, size, name), InputStep(fault.cleared, -size, name)]
     if test.breaker is not None:
         opens = test.breaker.opens
         steps.append(InputStep(start_value(opens) or 0.0, 1.0, BREAKER, isinstance(opens, Unknown)))

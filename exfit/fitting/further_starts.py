@@ -15,7 +15,7 @@ from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import Way
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import UNSTABLE, Residuals, SimulationCounter
-from exfit.plants import BREAKER, REFERENCES
+from exfit.plants import BREAKER, FAULT, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import DEFAULT_STRATEGY
@@ -158,6 +158,8 @@ def linear_form(residuals: Residuals) -> Residuals | str:
             reason = f"the test switches the {switched[0]} of the network"
         elif BREAKER in changed:
             reason = "the test opens the breaker"
+        elif not {*FAULT}.isdisjoint(changed):
+            reason = "the test has a fault at the terminals"
         elif driving:
             reason = f"recorded signals drive the simulation: {', '.join(driving)}"
         elif limits := limits_at_rest(experiment.simulator.system, experiment.parameters(values)):

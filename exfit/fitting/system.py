@@ -7,13 +7,14 @@ from traceback import extract_tb
 
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, RecordFile, Recording
-from exfit.case.schema.tests import Switch
+from exfit.case.schema.tests import BumpTest
 from exfit.case.ties import Ties
 from exfit.engine.system import System, parameters_used, trace
 from exfit.errors import CaseError, ModelError
 from exfit.models.sheet import Model
 from exfit.plants import (
     BREAKER,
+    FAULT,
     REFERENCES,
     SATURATION,
     SPEED,
@@ -76,7 +77,7 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     changed = {"vref"}
     for test in case.tests:
         changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
-        changed |= {name for switch in test.network for name in _switched(switch)}
+        changed |= _changed_in_network(test)
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}
@@ -85,12 +86,14 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed.add(BREAKER)
     if recording is not None:
         changed |= {*driving_after_opening(case, recording)}
-    inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
+    inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", *FAULT, BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
 
 
-def _switched(switch: Switch) -> list[str]:
-    return [name for name in ("R", "X", "E") if getattr(switch, name) is not None]
+def _changed_in_network(test: BumpTest) -> set[str]:
+    names = ("R", "X", "E")
+    switched = {n for switch in test.network for n in names if getattr(switch, n) is not None}
+    return switched | {*FAULT} if test.fault else switched
 
 
 def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:

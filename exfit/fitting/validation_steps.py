@@ -119,7 +119,7 @@ def _stepped(case: Case, test: BumpTest) -> str | None:
 
     Raises CaseError where the test of the case changes the network, or opens the breaker.
     """
-    if test.E or test.angle or test.network or test.breaker:
+    if test.E or test.angle or test.network or test.fault or test.breaker:
         text = (
             "changes the network or opens the breaker: the steps of a record by hand are those of "
             "vref, vs or pref"

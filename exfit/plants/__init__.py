@@ -25,11 +25,12 @@ VT0 = "vt0"
 DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
 MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
 BREAKER, SPEED = "breaker", "speed"  # inputs: 1 from the opening on; the recorded change of speed
+FAULT = ("fault_G", "fault_B")  # inputs: the admittance of a fault at the terminals
 
 OF_EXCITER = ("vref", "vs")
 REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
 # what a test may change in any plant, those of features among them
-EVENTS = (*REFERENCES, "E", "angle", "network", BREAKER)
+EVENTS = (*REFERENCES, "E", "angle", "network", "fault", BREAKER)
 # what a stabiliser may listen to; pa is the accelerating power, none an input that is not in use
 HEARD = ("speed", "p", "vt", "pa", "none")
 LIMITER_KINDS = ("oel", "uel", "scl")  # what limiters limit, as their names begin

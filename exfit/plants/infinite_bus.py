@@ -1,5 +1,6 @@
 """A machine on load: behind R + jX to a stiff source of constant voltage and frequency."""
 
+from collections.abc import Collection
 from functools import cache
 from math import pi
 from typing import Literal
@@ -11,6 +12,7 @@ from exfit.models.machines import Machine
 from exfit.models.sheet import UP_TO_10, WITHIN_10, Model, Sheet, sheet
 from exfit.plants import (
     BREAKER,
+    FAULT,
     MACHINE,
     MEASURED,
     NETWORK,
@@ -22,6 +24,7 @@ from exfit.plants import (
     Stabilised,
     compared,
 )
+from exfit.plants.far_bus import BEHIND_LOAD, LOAD, FaultedLine, machine_current, source_behind
 from exfit.plants.limiting import Limiters, signals_of
 from exfit.plants.loaded_machine import Terminals, behind, breaker_of, current, voltage
 from exfit.plants.parts import (
@@ -48,13 +51,26 @@ FLOW: Sheet = sheet(
 REACTIVE: Sheet = sheet(("Q", 0.0, *WITHIN_10, "reactive power at the start"))
 SOURCE: Sheet = sheet(("E", 1.0, "pu", (0.01, 10.0), "voltage of the source"))
 
-OFTEN_STILL = ("E", "R", "X", "angle", "vs", "pref")  # inputs that are there where they change
+OFTEN_STILL = (
+    "E",
+    "R",
+    "X",
+    "angle",
+    "vs",
+    "pref",
+    *FAULT,
+)  # inputs that are there where they change
+AT_FAR_BUS = frozenset(row.symbol for row in (*LOAD, *BEHIND_LOAD))
 Given = Literal["Q", "E"]  # what sets the start beside vt0 and P
 
 
-def flow_sheet(given: Given) -> Sheet:
-    """Return the network's data sheet where the start is given by P and Q, or by P and E."""
-    return (*FLOW, *(REACTIVE if given == "Q" else SOURCE))
+def flow_sheet(given: Given, load: Collection[str] = ()) -> Sheet:
+    """Return the network's data sheet where the start is given by P and Q, or by P and E.
+
+    With a load at the far bus, of which these values are given, it has what is beyond it too.
+    """
+    loaded = (*(row for row in LOAD if row.symbol in load), *(BEHIND_LOAD if load else ()))
+    return (*FLOW, *(REACTIVE if given == "Q" else SOURCE), *loaded)
 
 
 def reactive_power(vt: Signal, n: Names) -> Signal:
@@ -79,6 +95,7 @@ def infinite_bus(
     dialect: Dialect = "standard",
     governor: Model | None = None,
     limiters: Limiters = (),
+    load: frozenset[str] = frozenset(),
 ) -> System:
     """Return an exciter on a machine behind R + jX to a stiff source.
 
@@ -87,21 +104,29 @@ def infinite_bus(
     machine, network, stabiliser and governor under their prefixes (``network.X``), and the initial
     voltage ``vt0``. The inputs are changes: of the references ``vref`` and ``pref``, of ``vs``
     beside the stabiliser, of ``vc1``, the voltage that the exciter measures, of ``E`` and its
-    ``angle`` (rad), of ``R`` and ``X``. With the input ``breaker`` a breaker opens where that is 1:
-    p, q and it are zero from then on, delta stays, and vt follows the speed, which is the simulated
-    one, or 1 and the input ``speed``. All per unit on the machine's base; ``delta``, to the source
-    as it is, in rad, ``speed`` 1 when rated.
+    ``angle`` (rad), of ``R`` and ``X``, of ``fault_G`` and ``fault_B``, the admittance of a fault
+    at the terminals. With the input ``breaker`` a breaker opens where that is 1: p, q and it are
+    zero from then on, delta stays, and vt follows the speed, which is the simulated one, or 1 and
+    the input ``speed``. ``load`` names the given values of a load at the far bus (`far_bus`). All
+    per unit on the machine's base; ``delta``, to the source as it is, in rad, ``speed`` 1 when
+    rated.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
     unit = UnitOnLoad(model, machine, saturation, stabiliser, dialect, governor, limiters)
-    network = flow_sheet(given)
+    network, far = flow_sheet(given, load), ("far",) if load else ()
+    meshed = bool(load) or not {*FAULT}.isdisjoint(inputs)
+    unloaded = dict.fromkeys((row.symbol for row in LOAD), 0.0)
 
     def rest(p: Signals) -> Rest:
         n, vt = named_parameters(p, NETWORK, network), p[VT0]
         reactive = n.Q if given == "Q" else reactive_power(vt, n)
         at = behind(vt, n.P, reactive, n.R, n.X)
+        held = {}
+        if load:
+            held = {"far": modulus(at.ex, at.ey)}
+            at = source_behind(at, Names(**{**unloaded, **vars(n)}))
         states, setpoints = unit_at_rest(unit, vt, n.P, at, p, n)
-        return Rest(states, {**setpoints, "source": modulus(at.ex, at.ey)})
+        return Rest(states, {**setpoints, **held, "source": modulus(at.ex, at.ey)})
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
@@ -115,7 +140,12 @@ def infinite_bus(
             dw = breaker.dw
             factor = 1.0 if dialect == "powerworld" else breaker.factor  # which the source has
         at = unit.source(fluxes, dw, of_machine)
-        closed = current(at, E, R, X, delta)
+        if meshed:
+            line = FaultedLine(R, X, changed.fault_G, changed.fault_B)
+            drawing = Names(**{**unloaded, **vars(n)}) if load else None
+            closed = machine_current(at, line, E, delta, drawing, r.get("far", 1.0))
+        else:
+            closed = current(at, E, R, X, delta)
         i = closed if breaker is None else breaker.current(closed)
         terminals = Terminals(fluxes, voltage(at, i, factor), i, dw)
         it = modulus(closed.d, closed.q)
@@ -131,7 +161,7 @@ def infinite_bus(
 
     return System(
         parameters=(*unit.parameters(symbols((NETWORK, network))), VT0),
-        setpoints=(*unit.setpoints, "source"),
+        setpoints=(*unit.setpoints, "source", *far),
         states=unit.states,
         inputs=inputs,
         outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states, *signals_of(unit.limiters)))),
@@ -152,6 +182,7 @@ def _build(equipment: Equipment) -> System:
         equipment.dialect,
         equipment.governor,
         equipment.limiters,
+        equipment.given & AT_FAR_BUS,
     )
 
 
@@ -159,9 +190,9 @@ INFINITE_BUS = PlantKind(
     name="infinite-bus",
     title="on load, behind R + jX to a stiff source",
     needs=("exciter", "machine", "network"),
-    events=("vref", "vs", "pref", "E", "angle", "network", BREAKER),
+    events=("vref", "vs", "pref", "E", "angle", "network", "fault", BREAKER),
     signals=compared(OUTPUTS),
-    network=lambda given: flow_sheet("E" if "E" in given else "Q"),
+    network=lambda given: flow_sheet("E" if "E" in given else "Q", AT_FAR_BUS.intersection(given)),
     network_required=("f0", "X", "P"),
     build=_build,
 )

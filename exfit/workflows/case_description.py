@@ -206,6 +206,9 @@ def _events(case: Case, recording: Recording, identified: Identified) -> Iterato
         values = {name: getattr(switch, name) for name in ("R", "X", "E")}
         changes = (f"{name} {value:g} pu" for name, value in values.items() if value is not None)
         yield f"network switched at {switch.at:g} s: {', '.join(changes)}"
+    for fault in test.fault:
+        impedance = f"{fault.R:g} + j{fault.X:g} pu"
+        yield f"fault of {impedance} at the terminals, {fault.at:g} ... {fault.cleared:g} s"
     if test.breaker is not None:
         opens = _given(test.breaker.opens, "g", "s", identified.get(f"{prefix}{OPENING}"))
         drivers = driving_after_opening(case, recording)

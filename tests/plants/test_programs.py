@@ -62,6 +62,6 @@ def test_a_turbine_of_another_rating_than_the_machine_rests_as_in_powerworld():
         "records": ["1 'SCRX' 1 0.0 100.0 0.01 10.0 -99.0 99.0 1 0.0 /"],
         "governor": {"model": "GGOV1", "parameters": values},
     }
-    rest = TwoBuses(told).rest
+    rest = TwoBuses(told).shown([0.0])[0]
     assert abs(rest["governor.PE"] - 0.1281288564) < 1e-6
     assert abs(rest["governor.VALVE"] - 0.2850236595) < 1e-6

@@ -23,6 +23,7 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
             yield from _place_faults(place, at, duration)
         if name not in kind.events and name in test:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
+    yield from _terminal_fault_faults(test.at("fault"), duration)
     if not kind.finds_rest and test.at("frequency_offset").value is not None:
         yield test.at("frequency_offset").fault(no_event(kind))
     for switch in test.at("network").entries:
@@ -32,6 +33,24 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
     if not kind.plays_back and test.content and not {*EVENTS} & test.content.keys():
         yield test.fault(f"no step: give one of {', '.join(kind.events)}")
     yield from _rest_faults(test, kind)
+
+
+def _terminal_fault_faults(given: ContentNode, duration: float | None) -> Iterator[Fault]:
+    """Yield faults at the terminals that are none, or last beyond the next one or the test."""
+    before: float | None = None
+    for entry in given.entries:
+        at, cleared = entry.at("at").number, entry.at("cleared").number
+        impedance = [entry.at(key) for key in ("R", "X") if key in entry]
+        if entry.is_section and all(node.number == 0.0 for node in impedance):
+            yield entry.fault("has no impedance: give R or X above 0, such as X: 0.001")
+        if at is not None and before is not None and at < before:
+            text = f"{show(at)} s: the fault before lasts until {show(before)} s"
+            yield entry.at("at").fault(text)
+        if at is not None and cleared is not None and cleared <= at:
+            yield entry.at("cleared").fault(f"{show(cleared)} s is not after {show(at)} s")
+        elif cleared is not None:
+            yield from _place_faults(entry.at("cleared"), cleared, duration)
+        before = cleared
 
 
 def _rest_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:

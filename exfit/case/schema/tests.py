@@ -131,6 +131,23 @@ class Switch(Section):
     )
 
 
+class FaultSection(Section):
+    """A fault at the terminals through an impedance to ground, until it is cleared."""
+
+    at: Number = Field(description="Time of the fault, s.")
+    cleared: Number = Field(description="Time at which it is cleared, s.")
+    R: NotNegative = Field(default=0.0, description="Resistance of the fault, pu.")
+    X: NotNegative = Field(
+        default=0.0, description="Reactance of the fault, pu; it or R must be above zero."
+    )
+
+    @property
+    def admittance(self) -> tuple[float, float]:
+        """G and B of its impedance, pu."""
+        square = self.R * self.R + self.X * self.X
+        return self.R / square, -self.X / square
+
+
 class AngleStep(Section):
     """A step or ramp of the angle of the source."""
 
@@ -248,6 +265,11 @@ class BumpTest(Section):
     network: tuple[Switch, ...] = Field(
         default=(), min_length=1, description="Switchings of R, X and E; infinite-bus only."
     )
+    fault: tuple[FaultSection, ...] = Field(
+        default=(),
+        min_length=1,
+        description="Faults at the terminals, each cleared before the next; infinite-bus only.",
+    )
     breaker: BreakerSection | None = Field(
         default=None,
         description="The breaker opens; infinite-bus and machine-on-load only.",
@@ -295,6 +317,7 @@ class BumpTest(Section):
         instants = {start_value(event.at) for event in events}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
         instants |= {event.at for event in self.angle_steps}
+        instants |= {at for fault in self.fault for at in (fault.at, fault.cleared)}
         if self.breaker is not None:
             instants.add(start_value(self.breaker.opens))
         return tuple(sorted(at for at in instants if at is not None))
