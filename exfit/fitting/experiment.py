@@ -406,15 +406,15 @@ class Switching(NamedTuple):
 Simulated = TypeVar("Simulated", Simulator, Experiment)
 
 
-def with_enough_substeps(simulated: Simulated, values: Values, case: Path) -> Simulated:
+def with_enough_substeps(simulated: Simulated, values: Values, place: Path | str) -> Simulated:
     """Return a simulator, or what has one, with sub-steps enough all along the response to values.
 
-    Raises SimulationError, naming the case, where they have no start or no finite response.
+    Raises SimulationError, naming the place, where they have no start or no finite response.
     """
     try:
         return simulated.with_enough_substeps(values)
     except SimulationError as fault:
-        raise SimulationError(f"{case}: {fault}") from fault
+        raise SimulationError(f"{place}: {fault}") from fault
 
 
 @dataclass(frozen=True)
@@ -456,9 +456,8 @@ class ExperimentSetup:
 
     def with_enough_substeps(self, values: Values) -> "ExperimentSetup":
         """Return the setup with sub-steps enough all along the response to the values."""
-        experiment = with_enough_substeps(
-            self.experiment, self.with_start_values(values), self.case
-        )
+        place = f"{self.case}: {self.record.source.name}"
+        experiment = with_enough_substeps(self.experiment, self.with_start_values(values), place)
         return replace(self, experiment=experiment)
 
     def response(self, values: Values) -> Response:

@@ -5,22 +5,32 @@ from collections.abc import Mapping
 import numpy as np
 
 from exfit.models.blocks import Limited
+from exfit.models.governor_parts import AT_LIMIT
 from exfit.models.sheet import Model
 from exfit.plants import Stabilised
 from exfit.plants.parts import Names
+from exfit.util.text import show
 
 ROUNDING_AT_REST = 1e-9  # pu/s
 
 
-def rests_at(governor: Model, values: Mapping[str, float], power: float) -> bool:
-    """Test whether a governor with these values holds a power at rest: no limit is in its way."""
+def why_no_rest(governor: Model, values: Mapping[str, float], power: float) -> str | None:
+    """Name the limits that keep a governor with these values from holding a power at rest."""
     p, x, d = Names(**values), Names(), Names()
     u = Names(dw=0.0, p=np.float64(power))
     with np.errstate(all="ignore"):
         u.pref = governor.rest(u.p, u, p, x)
         governor.equations(x, u, p, d)
     slopes = [slope.slope if isinstance(slope, Limited) else slope for slope in vars(d).values()]
-    return bool(np.all(np.abs(slopes) <= ROUNDING_AT_REST))
+    if np.all(np.abs(slopes) <= ROUNDING_AT_REST):
+        return None
+    starts = {name.removesuffix("0"): getattr(x, name) for name in governor.setpoints}
+    passed = [
+        f"{symbol} = {show(values[symbol])} where it needs {start:.6g}"
+        for symbol, start in starts.items()
+        if symbol in values and abs(start - values[symbol]) > AT_LIMIT
+    ]
+    return ", ".join(passed) or "one of its limits is in the way"
 
 
 def listening(stabiliser: Stabilised, heard: Names) -> Names:

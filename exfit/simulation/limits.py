@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from exfit.engine.system import System, Trace, trace
 from exfit.engine.trace import Node, Signal, evaluate, in_order, larger, smaller
+from exfit.models.governor_parts import AT_LIMIT
+from exfit.plants import GOVERNOR
 from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
 from exfit.simulation.simulator import Run, Simulator
 from exfit.util.arrays import Array
@@ -73,7 +75,11 @@ def limits_passed(system: System, values: Values) -> str:
     """Name the limits that the start would have to pass, with both values."""
     of = traced(system)
     everything = evaluate([*of.slopes, *of.outputs, *of.clamped], at_rest(of, values))
-    faults = []
+    faults = [
+        f"the start needs {start:.6g}, {side} {name} = {limit:.6g}"
+        for name, limit, start, side in governor_limits_passed(system, values)
+        if abs(start - limit) > AT_LIMIT
+    ]
     for node in [node for node in everything if node.op == "clip"]:
         x, low, high = (everything[operand] for operand in node.operands)
         for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
@@ -83,6 +89,20 @@ def limits_passed(system: System, values: Values) -> str:
                     f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
                 )
     return "; ".join(dict.fromkeys(faults))
+
+
+def governor_limits_passed(
+    system: System, values: Values
+) -> Iterator[tuple[str, float, float, str]]:
+    """Yield (limit, its value, that of the start, which side) of what a governor starts beyond."""
+    of = traced(system)
+    start = at_rest(of, values)
+    for node in of.r:
+        name = _given(node)
+        if name.startswith(GOVERNOR) and name in values and name != _name(node):
+            limit, needed = values[name], float(start[node])
+            if abs(needed - limit) > ROUNDING_AT_REST:
+                yield name, limit, needed, "above" if needed > limit else "below"
 
 
 def acting_at_rest(system: System, values: Values) -> str:
@@ -152,7 +172,7 @@ def _choice(node: Node, states: Container[Node]) -> Iterator[EquationLimit]:
 def _limit(value: Node, bound: Node, sign: float, state: Node | None) -> Iterator[EquationLimit]:
     fixed = bound.constant
     if fixed is None or isfinite(fixed):
-        name = _given(bound) if fixed is None else f"{fixed:g}"
+        name = _limit_name(bound) if fixed is None else f"{fixed:g}"
         signal = "" if state is None else _name(state)
         yield EquationLimit(name, signal, sign, value, bound, value is state)
 
@@ -211,17 +231,14 @@ def _gated(node: Node, output: Node) -> Node | None:
 def _limit_name(node: Node) -> str:
     """Name the parameter that gives a limit: of all from which it is computed, the one named so."""
     symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
-    limits = [_name(n) for n in symbols if _is_limit(n)]
-    return ", ".join(limits or map(_name, symbols))
+    limits = [n for n in symbols if _is_limit(n)]
+    return ", ".join(dict.fromkeys(map(_given, limits or symbols)))
 
 
-def _given(bound: Node) -> str:
-    """Parameter of a limit, also where it is computed at the start.
-
-    Where a parameter may select that by being 0, the setpoint has its name with a 0 behind it.
-    """
-    computed = any(n.op == "symbol" and n.args[0].startswith("r.") for n in in_order([bound]))
-    return _limit_name(bound).removesuffix("0") if computed else _limit_name(bound)
+def _given(symbol: Node) -> str:
+    """Parameter of a limit; a setpoint that takes its place has its name with a 0 behind it."""
+    computed = symbol.args[0].startswith("r.")
+    return _name(symbol).removesuffix("0") if computed else _name(symbol)
 
 
 def _state_in(node: Node, states: Container[Node]) -> Node | None:

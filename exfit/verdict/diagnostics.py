@@ -32,10 +32,10 @@ from exfit.verdict.run_quality import (
     INVISIBLE,
     LARGEST_STEP_ERROR,
     other_levels,
+    state_of_rest_notes,
     step_remedy,
     typical_notes,
     unphysical_notes,
-    unstable_rest_notes,
     unsteady_signals,
     voltage_notes,
 )
@@ -59,7 +59,7 @@ def notes(
     yield from unphysical_notes(case, values)
     for experiment, comparison in zip(residuals.experiments, compared, strict=True):
         simulator, at = experiment.at(values)
-        yield from unstable_rest_notes(simulator, at)
+        yield from state_of_rest_notes(simulator, at)
         vt = comparison.overlays.get("vt")
         yield from voltage_notes(case, comparison.time, None if vt is None else vt.simulated)
         for signal, change in simulator.step_errors(at, experiment.signals).items():

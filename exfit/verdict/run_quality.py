@@ -35,8 +35,16 @@ TURNING = ("angle",)  # at rest, too, evenly
 LARGEST_STEP_ERROR = 1e-4  # pu, or of the largest value of a signal that passes 1 pu
 
 
-def unstable_rest_notes(simulator: Simulator, values: Values) -> Iterator[str]:
-    """Note a rest before the step that is unstable, by its fastest growth."""
+def state_of_rest_notes(simulator: Simulator, values: Values) -> Iterator[str]:
+    """Note a governor that starts beyond a limit, and a rest that is unstable."""
+    if any(name.startswith(GOVERNOR) for name in simulator.system.setpoints):
+        from exfit.simulation.limits import governor_limits_passed  # only with a governor
+
+        for name, limit, start, side in governor_limits_passed(simulator.system, values):
+            yield (
+                f"the unit starts at {start:.6g}, {side} {name} = {limit:.6g}, and is taken to be "
+                "at rest on that limit"
+            )
     rates = simulator.rates_at_rest(values)
     fastest = max(rates, key=lambda rate: float(rate.real), default=0.0)
     noise = ROUNDING_OF_RATES * max(map(abs, rates), default=0.0)
@@ -155,7 +163,7 @@ def simulation_notes(
     yield from unphysical_notes(case, values)
     yield from speed_notes(simulator.inputs, values)
     yield from (action.sentence for action in limiter_actions(simulator, values))
-    yield from unstable_rest_notes(simulator, values)
+    yield from state_of_rest_notes(simulator, values)
     yield from step_error_notes(case, simulator, values, response.signals)
     yield from voltage_notes(case, response.time, response.signals.get("vt"))
     delta = response.signals.get("delta")

@@ -22,7 +22,7 @@ from exfit.verdict.diagnostics import (
     record_warnings,
     search_range_notes,
 )
-from exfit.verdict.run_quality import typical_notes, unstable_rest_notes
+from exfit.verdict.run_quality import state_of_rest_notes, typical_notes
 from exfit.workflows.responses import FLAT_DRIFT, flat_drift
 
 Values = Mapping[str, float]
@@ -79,7 +79,7 @@ def check(case: Case, program: Program | None = None) -> Check:
     drift, error, substeps, of_rest = 0.0, 0.0, 1, list[str]()
     for experiment in experiments:
         simulator, at = experiment.at(values)
-        of_rest += unstable_rest_notes(simulator, at)
+        of_rest += state_of_rest_notes(simulator, at)
         signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))
         error = max(error, *simulator.step_errors(at, signals).values())

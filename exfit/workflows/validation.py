@@ -28,9 +28,9 @@ from exfit.util.file_names import folded
 from exfit.util.vocabulary import NOT_STATED, Criteria
 from exfit.verdict.diagnostics import causes_before_fit
 from exfit.verdict.run_quality import (
+    state_of_rest_notes,
     step_error_notes,
     switching_notes,
-    unstable_rest_notes,
     unsteady_signals,
     voltage_notes,
 )
@@ -177,7 +177,7 @@ def _validated(
         *comparison.notes,
         *(cause.sentence for cause in causes_before_fit(case, recording)),
         *switching_notes(setup),
-        *unstable_rest_notes(simulator, at),
+        *state_of_rest_notes(simulator, at),
         *step_error_notes(case, simulator, at, simulated),
         *voltage_notes(case, comparison.time, simulated.get("vt")),
     )

@@ -6,14 +6,14 @@ from places import REFERENCE
 
 from exfit.case.load import load_case
 from exfit.case.peek import free_of
-from exfit.errors import CaseError
+from exfit.errors import CaseError, SimulationError
 from exfit.fitting.system import system_of
 from exfit.output.run_folder import write_fit
 from exfit.plants import BREAKER
 from exfit.results.io import load_result
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.verdict.run_quality import speed_notes, typical_notes
-from exfit.workflows import fit, simulate
+from exfit.workflows import check, fit, simulate
 from exfit.workflows.given_values import changed_values
 
 TRUTH = {"governor.R": 0.05, "governor.T1": 0.5, "governor.T3": 8.0}
@@ -173,6 +173,31 @@ def test_a_simulated_speed_after_a_rejection_holds_where_there_is_a_governor(tmp
     without = {name: value for name, value in values.items() if not name.startswith("governor")}
     assert [*speed_notes(inputs, values)] == []
     assert len([*speed_notes(inputs, without)]) == 1
+
+
+@pytest.mark.parametrize(("excess", "rests"), [(0.009, True), (0.011, False)])
+def test_a_unit_at_its_limit_is_noted_and_one_beyond_it_is_refused(tmp_path, excess, rests):
+    limit = f"T1: 0.5, VMAX: {0.7 - excess:g}"
+    path = written(tmp_path, ("T1: 0.5", limit))
+    if not rests:
+        with pytest.raises(CaseError, match=r"P = 0\.7 pu: VMAX = 0\.689 where it needs 0\.7$"):
+            load_case(path)
+        return
+    case = load_case(path)
+    for notes in (check(case).notes, simulate(case, {}).notes):
+        (note,) = [note for note in notes if "governor.VMAX" in note]
+        assert "starts at 0.7, above governor.VMAX = 0.691" in note
+
+
+def test_a_record_beyond_a_limit_of_the_governor_is_named(tmp_path):
+    columns = np.genfromtxt(REFERENCE / "playback_ac8b_tgov1.csv", delimiter=",", names=True)
+    names = ("t", "vt", "angle", "p", "q")
+    table = np.column_stack([columns[name] for name in names])
+    np.savetxt(tmp_path / "record.csv", table, delimiter=",", header=",".join(names), comments="")
+    (tmp_path / "case.yaml").write_text(EVENT.replace("VMAX: 1.2", "VMAX: 0.57"))
+    says = r"record\.csv: .* the start needs 0\.6000.*, above governor\.VMAX = 0\.57$"
+    with pytest.raises(SimulationError, match=says):
+        check(load_case(tmp_path / "case.yaml"))
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from exfit.engine.system import Rest, System
 from exfit.engine.tangents import TangentKernel
 from exfit.models import GOVERNORS
 from exfit.models.blocks import SHORTEST, Limited
+from exfit.models.governor_parts import AT_LIMIT
 from exfit.models.sheet import crossed_limits, typical
 from exfit.plants.parts import Names, motion, values_named
 
@@ -231,6 +232,46 @@ def test_GGOV1_rests_without_one_of_its_parts(change):
     slopes, pm = motion_of(model, p, x, seen(pref=pref))
     assert pm == pytest.approx(POWER, abs=1e-14)
     assert np.abs(slopes).max() < 1e-13
+
+
+def limits_of(model):
+    """Return the limits that a unit may start beyond, and on which side of it."""
+    names = [name.removesuffix("0") for name in model.setpoints if name != "PE0"]
+    return {name: -1.0 if "MIN" in name else 1.0 for name in names}
+
+
+def started_beyond(model, name, excess):
+    """Return typical data with one limit so far on the wrong side of the start at rest."""
+    values = typical(model.sheet)
+    x, _ = resting(model, Names(**values))
+    of = {"Ldref": "TURB", "VMAX": "VALVE", "VMIN": "VALVE"} if model.name == "GGOV1" else {}
+    of = of.get(name, {"HYGOV": "C", "IEEEG1": "VALVE", "IEESGO": "V4"}.get(model.name, "V1"))
+    return values | {name: getattr(x, of) - limits_of(model)[name] * excess}
+
+
+def test_a_unit_that_starts_slightly_beyond_a_limit_rests_on_it(governor):
+    """It is kept there where the speed pushes it on, and leaves it where that turns round."""
+    assert limits_of(governor)
+    for name, side in limits_of(governor).items():
+        values = started_beyond(governor, name, 0.9 * AT_LIMIT)
+        x, pref = resting(governor, Names(**values))
+        slopes, pm = motion_of(governor, Names(**values), x, seen(pref=pref))
+        assert np.abs(slopes).max() < 1e-13, name
+        assert pm == pytest.approx(POWER, abs=1e-14)
+        undamped = dict.fromkeys({"Dt", "Dturb"} & {*values}, 0.0)
+        for push in (1.0, -1.0):
+            u = np.zeros((401, len(SIDES)))
+            u[:, 0] = -side * push * 1e-3 * np.minimum(np.arange(401) / 100.0, 1.0)
+            moved = run(governor, values | undamped | {"Pm": POWER}, u, 5e-3)[:, 0] - POWER
+            assert np.abs(moved).max() < 1e-12 if push > 0.0 else side * moved[-1] < -1e-3, name
+
+
+def test_a_unit_that_starts_farther_beyond_a_limit_is_not_at_rest(governor):
+    for name in limits_of(governor):
+        values = started_beyond(governor, name, 1.1 * AT_LIMIT)
+        x, pref = resting(governor, Names(**values))
+        slopes, _ = motion_of(governor, Names(**values), x, seen(pref=pref))
+        assert np.abs(slopes).max() > 1e-4, name
 
 
 def test_a_unit_above_its_load_limit_is_not_at_rest():

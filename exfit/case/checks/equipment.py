@@ -7,7 +7,7 @@ from exfit.case.parts import Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
 from exfit.plants import HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
-from exfit.plants.controls import rests_at, rests_with_output
+from exfit.plants.controls import rests_with_output, why_no_rest
 from exfit.plants.limiting import inputs_for_limiters
 from exfit.util.text import show, show_value
 
@@ -54,9 +54,11 @@ def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -
     values = _start_values(section, model)
     nodes = (content.at("plant"), *(record.at("plant") for record in records))
     for power in dict.fromkeys(plant.at("network", "P").number for plant in nodes):
-        if power is not None and values is not None and not rests_at(model, values, power):
-            text = f"{model.name} does not rest at P = {show(power)} pu: one of its limits is in"
-            yield section.at("parameters").fault(f"{text} the way")
+        if power is None or values is None:
+            continue
+        if why := why_no_rest(model, values, power):
+            text = f"{model.name} does not rest at P = {show(power)} pu: {why}"
+            yield section.at("parameters").fault(text)
 
 
 def _limiter_faults(content: ContentNode, parts: Parts, off_line: bool) -> Iterator[Fault]:

@@ -16,6 +16,7 @@ from exfit.models.blocks import (
     washout,
     where,
 )
+from exfit.models.governor_parts import in_use
 from exfit.models.sheet import (
     DIVIDING_TIME,
     LONG_TIME,
@@ -43,12 +44,16 @@ def gast(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
                                          [1 + sT3]         │
     dw ─►[Dturb]───────────────────────────────────────────┘
 
-    pref is a power. The limits are non-windup. A unit that starts above AT, the
-    load that the ambient temperature allows, is not at rest. Typical data are those
-    of IEC 61970-302 (GovGAST).
+    pref is a power. The limits are non-windup. AT is the load that the ambient
+    temperature allows. Typical data are those of IEC 61970-302 (GovGAST).
     """
-    demand = smaller(u.pref - u.dw / p.R, p.AT + p.KT * (p.AT - s.V3))
-    v1, d.V1 = limited_lag(demand, s.V1, 1.0, p.T1, p.VMIN, p.VMAX)
+    low, high, allowed = (
+        in_use(s.VMIN0, p.VMIN),
+        in_use(s.VMAX0, p.VMAX),
+        in_use(s.AT0, p.AT),
+    )
+    demand = smaller(u.pref - u.dw / p.R, allowed + p.KT * (allowed - s.V3))
+    v1, d.V1 = limited_lag(demand, s.V1, 1.0, p.T1, low, high)
     v2, d.V2 = lag(v1, s.V2, 1.0, p.T2)
     _, d.V3 = lag(v2, s.V3, 1.0, p.T3)
     return v2 - p.Dturb * u.dw
@@ -57,6 +62,7 @@ def gast(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 def gast_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
     x.V1 = x.V2 = x.V3 = pm
+    x.VMAX0, x.VMIN0, x.AT0 = larger(p.VMAX, pm), smaller(p.VMIN, pm), larger(p.AT, pm)
     return pm
 
 
@@ -75,6 +81,7 @@ GAST = documented(
     ),
     "V1 V2 V3",
     records=record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),
+    setpoints="VMAX0 VMIN0 AT0",
 )
 
 
@@ -91,11 +98,11 @@ def droop(pe: Signal, valve: Signal, p: Signal) -> Signal:
 
 
 def fuel_demand(
-    error: Signal, least: Signal, s: Signal, p: Signal
+    error: Signal, least: Signal, low: Signal, high: Signal, s: Signal, p: Signal
 ) -> tuple[Signal, Signal, Signal]:
     """Return the demand for fuel, at most ``least``, that of the PID alone, and its error.
 
-    ``error`` is that before its dead band.
+    ``low`` and ``high`` are the limits of the valve; ``error`` is that before its dead band.
 
     With Rselect = -2 demand and error wait for each other; that loop is solved here: it is
     monotonous, so that a limit holds there as it does here.
@@ -105,7 +112,7 @@ def fuel_demand(
     loop = where(p.Rselect < -1.5, p.R, 0.0)
     alone = dead_band(error - loop * held, p) / (1.0 + loop * gain)
     free = held + gain * clip(alone, p.minerr, p.maxerr)
-    fsr = clip(smaller(free, least), p.VMIN, p.VMAX)
+    fsr = clip(smaller(free, least), low, high)
     seen = clip(dead_band(error - loop * fsr, p), p.minerr, p.maxerr)
     return fsr, held + gain * seen, seen
 
@@ -113,6 +120,11 @@ def fuel_demand(
 def dead_band(error: Signal, p: Signal) -> Signal:
     """Take the dead band off an error."""
     return error - clip(error, -p.db, p.db)
+
+
+def fully_open(p: Signal, high: Signal) -> Signal:
+    """Largest fsrt: 1, or where a unit starts above a VMAX of 1, that start."""
+    return where(p.VMAX > 1.0, 1.0, larger(1.0, high))
 
 
 def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -162,10 +174,10 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     time step before and Ka times step times (Aset - acceleration); here that step
     is 10 ms. Ka = 0 leaves the limiter out (there it lets no valve open). Dm < 0
     multiplies wf on its way to fsrt with (1 + dw)^Dm. pref is a speed, R times the
-    droop at rest; where Rselect = 0, it is 0. A unit that starts above Ldref is not
-    at rest. Trate_Mbase is the turbine's rating over the machine's base, 1 where
-    PSS/E's Trate (MW) is 0. A .dyr file does not have that base: an import names a
-    Trate, by which the valve is that of PowerWorld 24 within 1e-6 pu at rest.
+    droop at rest; where Rselect = 0, it is 0. Trate_Mbase is the turbine's rating
+    over the machine's base, 1 where PSS/E's Trate (MW) is 0. A .dyr file does not
+    have that base: an import names a Trate, by which the valve is that of
+    PowerWorld 24 within 1e-6 pu at rest.
 
     The equations are those of InterPSS, which has compared them with PowerWorld. In
     doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power), the way
@@ -174,29 +186,36 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     time of a diesel engine (Teng) and limits of rate of the load limiter (Rup,
     Rdown). Typical data are those of the public libraries (OpenIPSL, InterPSS).
     """
+    low, high, Ldref = (
+        in_use(s.VMIN0, p.VMIN),
+        in_use(s.VMAX0, p.VMAX),
+        in_use(s.Ldref0, p.Ldref),
+    )
+    full = fully_open(p, high)
     pe, d.PE = lag(u.p / p.Trate_Mbase, s.PE, 1.0, p.Tpelec)
     power_error = p.Kimw * (s.PE0 - pe)
     mw, d.MW = limited_integrator(power_error, s.MW, 1.0, -1.1 * p.R, 1.1 * p.R)
     acceleration, d.ACC = washout(u.dw, s.ACC, 1.0, p.Ta)
-    valve = clip(s.VALVE, p.VMIN, p.VMAX)
+    valve = clip(s.VALVE, low, high)
     wf = valve * where(p.Flag > 0.5, 1.0 + u.dw, 1.0)
     falling = exp(smaller(p.Dm, 0.0) * log(1.0 + u.dw))
     temperature, d.TEMP = lead_lag(wf * falling, s.TEMP, p.Tsa, p.Tsb)
     measured, d.TEMPM = lag(temperature, s.TEMPM, 1.0, p.Tfload)
-    load = p.Ldref / p.Kturb + p.Wfnl - measured
+    load = Ldref / p.Kturb + p.Wfnl - measured
     fsrt = p.Kpload * load + s.LOAD
     fsra = where(p.Ka > 0.0, s.FSRA, NEVER)
-    least = smaller(smaller(fsrt, 1.0), fsra)
-    fsr, fsrn, error = fuel_demand(u.pref + mw - u.dw - p.R * droop(pe, valve, p), least, s, p)
+    least = smaller(smaller(fsrt, full), fsra)
+    error = u.pref + mw - u.dw - p.R * droop(pe, valve, p)
+    fsr, fsrn, error = fuel_demand(error, least, low, high, s, p)
     _, d.DERIV = washout(error, s.DERIV, 1.0, p.Tdgov)
     d.INTEG = p.Kigov * (error + (fsr - fsrn) / p.Kpgov)
     # without Kpload the load limiter's integral does not follow: it stops at 1
     follows = p.Kpload > 0.0
     back = where(follows, (fsr - fsrt) / where(follows, p.Kpload, 1.0), 0.0)
-    d.LOAD = limited(p.Kiload * (load + back), s.LOAD, -NEVER, where(follows, NEVER, 1.0))
+    d.LOAD = limited(p.Kiload * (load + back), s.LOAD, -NEVER, where(follows, NEVER, full))
     d.FSRA = (fsr - s.FSRA) / STEP + p.Ka * (p.Aset - acceleration)
     velocity = clip((fsr - valve) / p.Tact, p.Rclose, p.Ropen)
-    d.VALVE = limited(velocity, s.VALVE, p.VMIN, p.VMAX)
+    d.VALVE = limited(velocity, s.VALVE, low, high)
     power, d.TURB = lead_lag(p.Kturb * (wf - p.Wfnl), s.TURB, p.Tc, p.Tb)
     return p.Trate_Mbase * (power - larger(p.Dm, 0.0) * (1.0 + u.dw))
 
@@ -207,7 +226,10 @@ def ggov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     x.MW = x.DERIV = x.ACC = 0.0
     x.TURB = pm / p.Trate_Mbase + larger(p.Dm, 0.0)
     x.VALVE = x.INTEG = x.TEMP = x.TEMPM = x.TURB / p.Kturb + p.Wfnl
-    x.LOAD = where(p.Kpload > 0.0, x.VALVE, 1.0)
+    x.VMAX0, x.VMIN0 = larger(p.VMAX, x.VALVE), smaller(p.VMIN, x.VALVE)
+    x.Ldref0 = larger(p.Ldref, x.TURB)
+    full = fully_open(p, in_use(x.VMAX0, p.VMAX))
+    x.LOAD = where(p.Kpload > 0.0, x.VALVE, full)
     x.FSRA = x.VALVE + STEP * p.Ka * p.Aset
     return p.R * where(p.Rselect < -1.5, x.VALVE, droop(x.PE, x.VALVE, p))
 
@@ -268,5 +290,5 @@ GGOV1 = documented(
         ignored="PMWSET",
         held={"Trate_Mbase": 1.0},
     ),
-    setpoints="PE0",
+    setpoints="PE0 VMAX0 VMIN0 Ldref0",
 )

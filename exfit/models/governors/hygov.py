@@ -17,7 +17,8 @@ agrees where r Tr = 1. Not modelled: dead band and the curve of gate and power
 of later versions. Typical data are those of IEC 61970-302 (GovHydro1).
 """
 
-from exfit.models.blocks import Signal, clip, lag, larger, limited
+from exfit.models.blocks import Signal, clip, lag, larger, limited, smaller
+from exfit.models.governor_parts import in_use
 from exfit.models.sheet import (
     AS_IN_PSSE,
     DIVIDING_TIME,
@@ -53,15 +54,17 @@ PSLF_RECORDS = record(
 )
 
 STATES = "E C G Q"
+SETPOINTS = "GMAX0 GMIN0"
 SHUT = 0.01  # pu of gate
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return Pm."""
-    c = clip(s.C, p.GMIN, p.GMAX)
+    low, high = in_use(s.GMIN0, p.GMIN), in_use(s.GMAX0, p.GMAX)
+    c = clip(s.C, low, high)
     _, d.E = lag(u.pref - u.dw - p.R * c, s.E, 1.0, p.Tf)
     velocity = clip((s.E / p.Tr + d.E) / p.r, -p.VELM, p.VELM)
-    d.C = limited(velocity, s.C, p.GMIN, p.GMAX)
+    d.C = limited(velocity, s.C, low, high)
     g, d.G = lag(c, s.G, 1.0, p.Tg)
     h = s.Q / larger(g, SHUT)
     h = h * h
@@ -73,4 +76,5 @@ def rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
     x.E = 0.0
     x.C = x.G = x.Q = pm / p.At + p.qNL
+    x.GMAX0, x.GMIN0 = larger(p.GMAX, x.C), smaller(p.GMIN, x.C)
     return p.R * x.C

@@ -1,6 +1,16 @@
 """Governors of steam turbines: IEEEG1, IEESGO and TGOV1."""
 
-from exfit.models.blocks import Signal, clip, lag, lead_lag, limited, limited_lag
+from exfit.models.blocks import (
+    Signal,
+    clip,
+    lag,
+    larger,
+    lead_lag,
+    limited,
+    limited_lag,
+    smaller,
+)
+from exfit.models.governor_parts import in_use
 from exfit.models.sheet import (
     DIVIDING_TIME,
     TIME,
@@ -39,10 +49,11 @@ def ieeeg1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     Pm over their sum (ANDES scales them to 1). T1 = 0 bypasses its block with T2.
     Typical data are those of IEC 61970-302 (GovSteamIEEE1).
     """
+    low, high = in_use(s.PMIN0, p.PMIN), in_use(s.PMAX0, p.PMAX)
     v1, d.V1 = lead_lag(p.K * u.dw, s.V1, p.T2, p.T1)
-    valve = clip(s.VALVE, p.PMIN, p.PMAX)
+    valve = clip(s.VALVE, low, high)
     velocity = clip((u.pref - v1 - valve) / p.T3, p.UC, p.UO)
-    d.VALVE = limited(velocity, s.VALVE, p.PMIN, p.PMAX)
+    d.VALVE = limited(velocity, s.VALVE, low, high)
     v4, d.V4 = lag(valve, s.V4, 1.0, p.T4)
     v5, d.V5 = lag(v4, s.V5, 1.0, p.T5)
     v6, d.V6 = lag(v5, s.V6, 1.0, p.T6)
@@ -54,6 +65,7 @@ def ieeeg1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
     x.V1 = 0.0
     x.VALVE = x.V4 = x.V5 = x.V6 = x.V7 = pm / (p.K1 + p.K3 + p.K5 + p.K7)
+    x.PMAX0, x.PMIN0 = larger(p.PMAX, x.VALVE), smaller(p.PMIN, x.VALVE)
     return x.VALVE
 
 
@@ -89,6 +101,7 @@ IEEEG1 = documented(
         f"K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8 {NOT_MODELLED}",
         absent=dict.fromkeys(["K2", "K4", "K6", "K8", *NOT_MODELLED.split()], 0.0),
     ),
+    setpoints="PMAX0 PMIN0",
 )
 
 
@@ -114,7 +127,7 @@ def ieesgo(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """
     v1, d.V1 = lag(u.dw, s.V1, p.K1, p.T1)
     v3, d.V3 = lead_lag(v1, s.V3, p.T2, p.T3)
-    demand = clip(u.pref - v3, p.PMIN, p.PMAX)
+    demand = clip(u.pref - v3, in_use(s.PMIN0, p.PMIN), in_use(s.PMAX0, p.PMAX))
     v4, d.V4 = lag(demand, s.V4, 1.0, p.T4)
     v5, d.V5 = lag(v4, s.V5, p.K2, p.T5)
     v6, d.V6 = lag(v5, s.V6, p.K3, p.T6)
@@ -124,6 +137,7 @@ def ieesgo(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 def ieesgo_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
     x.V1, x.V3, x.V4, x.V5, x.V6 = 0.0, 0.0, pm, p.K2 * pm, p.K2 * p.K3 * pm
+    x.PMAX0, x.PMIN0 = larger(p.PMAX, pm), smaller(p.PMIN, pm)
     return pm
 
 
@@ -144,6 +158,7 @@ IEESGO = documented(
     ),
     "V1 V3 V4 V5 V6",
     records=record("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN"),
+    setpoints="PMAX0 PMIN0",
 )
 
 
@@ -159,7 +174,8 @@ def tgov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     pref is a speed, R times the power at rest. The limits are non-windup. Typical
     data are those of IEC 61970-302 (GovSteam0).
     """
-    v1, d.V1 = limited_lag((u.pref - u.dw) / p.R, s.V1, 1.0, p.T1, p.VMIN, p.VMAX)
+    low, high = in_use(s.VMIN0, p.VMIN), in_use(s.VMAX0, p.VMAX)
+    v1, d.V1 = limited_lag((u.pref - u.dw) / p.R, s.V1, 1.0, p.T1, low, high)
     v3, d.V3 = lead_lag(v1, s.V3, p.T2, p.T3)
     return v3 - p.Dt * u.dw
 
@@ -167,6 +183,7 @@ def tgov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 def tgov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
     x.V1 = x.V3 = pm
+    x.VMAX0, x.VMIN0 = larger(p.VMAX, pm), smaller(p.VMIN, pm)
     return p.R * pm
 
 
@@ -184,4 +201,5 @@ TGOV1 = documented(
     "V1 V3",
     records=record("TGOV1", "R T1 VMAX VMIN T2 T3 Dt"),
     pslf_records=record("tgov1", "R T1 VMAX VMIN T2 T3 Dt"),
+    setpoints="VMAX0 VMIN0",
 )
