@@ -41,12 +41,14 @@ LIVELY = {
     "AC7C": {"TR": 0.02, "KDR": 0.2, "TDR": 0.05, "KF2": 0.05, "KF3": 0.02},
     "AC8C": {"TR": 0.02, "TA": 0.03, "VFEMAX": 9.0},
     "AC9C": {"TR": 0.02, "VFEMAX": 9.0},
+    "AC11C": {"TR": 0.02},
 }
 SOURCE = {"KI": 0.4, "XL": 0.1, "THETAP": 20.0, "VBMAX": 99.0, "KC1": 0.2}
 INDEPENDENT = SOURCE | {"SW1": 2.0}
 SOURCES = {"KI1": 0.4, "XL": 0.1, "THETAP": 20.0, "VBMAX1": 99.0, "KC1": 0.1}
 SOURCES |= {"KI2": 0.3, "KC2": 0.03}
 CHOPPER = SOURCES | {"SCT": 0.0}
+BOOST = SOURCE | {"KI2": 0.3, "KC2": 0.03, "VBMAX1": 99.0, "VBOOST": 2.0, "VBMAX2": 9.0}
 
 
 def parameters(name, **changes):
@@ -158,6 +160,24 @@ def ac9c(s, p):
     return solved(s, p, inner * regulator, inner * p.KF / (1.0 + s * p.TF) - by_vfe, 0.0, by_vt)
 
 
+def ac11c(s, p):
+    """VFD = VA VB1 + what boosts it at a low voltage."""
+    vfe = around(p).vfe
+
+    def vb1(vt, vfe):
+        return min(rectified(first_source(vt, p, p.KI), p.KC1 * vfe), p.VBMAX1)
+
+    def boost(vt, vfe):
+        source = p.KI2 * abs(P - 1j * Q) / vt + p.KBOOST
+        return min(rectified(source, p.KC2 * vfe), p.VBMAX2) if vt <= p.VBOOST else 0.0
+
+    va = (vfe - boost(VT, vfe)) / vb1(VT, vfe)
+    by_vt = slope(lambda vt: va * vb1(vt, vfe) + boost(vt, vfe), VT)
+    by_vfe = slope(lambda x: va * vb1(VT, x) + boost(VT, x), vfe)
+    regulator = p.KPA * (1.0 + 1.0 / (s * p.TIA)) * (1.0 + s * p.TB / (1.0 + s * p.TB / p.KB))
+    return solved(s, p, vb1(VT, vfe) * regulator, -by_vfe, 0.0, by_vt)
+
+
 FUNCTIONS = {
     "AC1C": ac1c,
     "AC2C": ac2c,
@@ -168,6 +188,7 @@ FUNCTIONS = {
     "AC7C": ac7c,
     "AC8C": ac8c,
     "AC9C": ac9c,
+    "AC11C": ac11c,
 }
 CASES = [
     *((name, {}) for name in FUNCTIONS),
@@ -180,6 +201,10 @@ CASES = [
     ("AC9C", CHOPPER),  # it conducts,
     ("AC9C", CHOPPER | {"VLIM1": 2.0}),  # is blocked,
     ("AC9C", CHOPPER | {"VLIM1": 2.0, "VLIM2": 1.0}),  # and reversed
+    ("AC11C", {"VOS": 2.0}),
+    ("AC11C", {"VOS": 3.0}),
+    ("AC11C", BOOST),
+    ("AC11C", BOOST | {"SW1": 2.0, "VBMAX2": 0.1}),
 ]
 
 
@@ -266,6 +291,14 @@ LIMITS = [
     ("AC9C", {"VRMAX": 6.0}, held_by(lambda efd, vfe, p: p.VRMAX * rectified(VT, p.KC1 * vfe))),
     ("AC9C", {"VBMAX1": 0.6}, held_by(lambda efd, vfe, p: p.VRMAX * p.VBMAX1)),
     ("AC9C", {"VFEMAX": 5.0}, BY_VFE),
+    ("AC11C", {"VRMAX": 6.0}, held_by(lambda efd, vfe, p: p.VRMAX * rectified(VT, p.KC1 * vfe))),
+    ("AC11C", {"VAMAX": 6.0}, held_by(lambda efd, vfe, p: p.VAMAX * rectified(VT, p.KC1 * vfe))),
+    (
+        "AC11C",
+        {"VBMAX1": 0.5, "VBOOST": 2.0, "VBMAX2": 0.2},
+        held_by(lambda efd, vfe, p: p.VRMAX * p.VBMAX1 + p.VBMAX2),
+    ),
+    ("AC11C", {"VFEMAX": 5.0}, BY_VFE),
 ]
 
 
@@ -290,7 +323,7 @@ def test_a_large_step_down_drives_the_exciter_to_its_floor(name):
 
 TAKEN_OVER = {
     **dict.fromkeys(("AC1A", "AC1C", "AC2C", "AC5C", "AC6C"), ("vuel", "voel")),
-    **dict.fromkeys(("AC8C", "AC9C"), ("vuel_out", "voel_out")),
+    **dict.fromkeys(("AC8C", "AC9C", "AC11C"), ("vuel_out", "voel_out")),
 }
 
 
@@ -302,7 +335,8 @@ def test_a_gate_takes_the_exciter_over(name):
     under, over = TAKEN_OVER[name]
     for share, gate, vref in ((1.1, over, 0.5), (0.9, under, -0.5)):
         vfe = share * around(p).vfe
-        supply = p.KA * rectified(p.KP * VT, p.KC1 * vfe) if name in ("AC8C", "AC9C") else 1.0
+        source = rectified(p.KP * VT, p.KC1 * vfe) if gate.endswith("_out") else 1.0
+        supply = source * vars(p).get("KA", 1.0) if gate.endswith("_out") else 1.0
         efd = after(name, p, vref, {gate: vfe / supply})
         assert efd[-1] == pytest.approx(field_voltage(lambda _, vfe=vfe: vfe)(p), rel=1e-6)
 
@@ -347,3 +381,46 @@ def test_the_gates_of_ac3c_and_ac4c_take_the_input_of_the_regulator_over():
         p = parameters("AC3C", KF=0.0, KN=0.0, VFEMAX=9.0)
         efd = after("AC3C", p, vref, {gate: share * around(p).vfe / (p.KR * EFD) / p.KA})
         assert (efd[-1] - EFD) * vref > 0.1
+
+
+# no derivative, as OEL's regulator has it
+ALONE = {"TB": 1e-7}
+
+
+@pytest.mark.parametrize(("gate", "of", "changes"), [("vuel", "U", {}), ("voel", "O", ALONE)])
+def test_a_limiter_at_the_first_gates_of_ac11c_has_a_regulator_of_its_own(gate, of, changes):
+    """It does as the first one would with its gain and time, and without OEL's derivative."""
+    p = parameters("AC11C", TR=0.0)
+    same = parameters(
+        "AC11C",
+        TR=0.0,
+        KPA=vars(p)[f"KP{of}"],
+        TIA=vars(p)[f"TI{of}"],
+        **changes,
+    )
+    error = 0.01 if gate == "vuel" else -0.01
+    expected = after("AC11C", same, error, None, 1.0)
+    assert after("AC11C", p, 0.0, {gate: error}, 1.0) == pytest.approx(expected, abs=1e-12)
+    assert abs(expected[-1] - EFD) > 0.01
+
+
+@pytest.mark.parametrize("limited", [False, True])
+def test_the_stabiliser_of_ac11c_acts_where_vos_says(limited):
+    """By a regulator of its own it does the same, between limits; a limiter sends it there."""
+    for VOS in (1.0, 2.0, 3.0):
+        p = parameters("AC11C", VOS=VOS)
+        expected = after("AC11C", p, 0.01, None, 1.0)
+        held = {"vs": 0.01, **({"vuel": 0.0} if limited else {})}
+        got = after("AC11C", p, -0.05 if limited else 0.0, held, 1.0)
+        if VOS == 1.0 and limited:
+            expected = np.full_like(got, EFD)  # it is part of what the gate replaces
+        assert got == pytest.approx(expected, abs=1e-9)
+    p = parameters("AC11C", VOS=3.0, VRSMAX=0.2)
+    most = held_by(lambda efd, vfe, p: (start_of(p) + 0.2) * rectified(VT, p.KC1 * vfe))(p)
+    assert after("AC11C", p, 0.0, {"vs": 0.5})[-1] == pytest.approx(most, rel=1e-6)
+
+
+def start_of(p):
+    """Return the VA of AC11C at the start."""
+    vfe = around(p).vfe
+    return vfe / rectified(p.KP * VT, p.KC1 * vfe)

@@ -45,6 +45,7 @@ FILES = Path(models.__file__).parent
 ON_LOAD = "on load"
 AT_GATE = "has the gate"  # what acts only while a limiter does
 VOLTAGES = (0.8, 0.95, 1.0, 1.05, 1.2)
+BOOSTED = {"AC11C": {"VBOOST": 2.0}}  # what acts at a low voltage only does so at any
 
 
 @pytest.fixture(params=list(SHEETS))
@@ -242,7 +243,7 @@ def awake_values(model):
 
 def switched_values(model):
     """Return awake data with every switch in its other position: what it selects acts there."""
-    values = awake_values(model)
+    values = awake_values(model) | BOOSTED.get(model, {})
     switches = {
         row.symbol: row.low + row.high - row.typical
         for row in MODELS[model].sheet
@@ -301,16 +302,19 @@ def test_what_acts_on_load_only_does_so_there(exciter):
         pytest.skip("its stabiliser washes a power at rest out")
     values = lively_values(exciter)
     # the angle between voltage and current acts only where both take part
-    values |= {symbol: values[symbol] or 0.5 for symbol in symbols}
+    values |= {symbol: values[symbol] or 0.5 for symbol in symbols} | BOOSTED.get(exciter, {})
     base = exciter_parameters(values, found, SATURATION["quadratic"])
     for symbol in symbols:
         for power in (0.0, 0.7):
             # a stabiliser acts on load only, and so does its place
             u = exciter_inputs(vt=1.0, ifd=1.8, p=power, q=0.3 * power, vs=0.01 * power)
             rests, motions = [], []
-            # more of it, or less of a ceiling
-            for factor in (1.0, 1.5, 0.5):
-                p = Names(**{**vars(base), symbol: factor * values[symbol]})
+            # more of it, or less of a ceiling; of a place the next ones
+            changes = (
+                (0.0, 1.0, 2.0) if symbol == "VOS" else values[symbol] * np.array([0, 0.5, -0.5])
+            )
+            for change in changes:
+                p = Names(**{**vars(base), symbol: values[symbol] + change})
                 x, d = Names(), Names()
                 vref = found.rest(2.0, u, p, x)
                 rests.append([vref, x])
@@ -321,8 +325,24 @@ def test_what_acts_on_load_only_does_so_there(exciter):
 
 
 def test_all_parameters_of_an_exciter_reach_its_equations(model):
-    used = parameters_used(system_of(model))
-    assert {row.symbol for row in MODELS[model].sheet if ON_LOAD not in row.meaning} <= used
+    used, found = parameters_used(system_of(model)), MODELS[model]
+    rows = {row.symbol: row for row in found.sheet if ON_LOAD not in row.meaning}
+    for symbol in rows.keys() - used:
+        assert AT_GATE in rows[symbol].meaning, symbol
+        assert moves_at_a_gate(model, symbol), symbol
+
+
+def moves_at_a_gate(model, symbol):
+    """Return whether a parameter moves an exciter while OEL has its gate."""
+    p = exciter_parameters(lively_values(model), MODELS[model], SATURATION["quadratic"])
+    u, x, found = exciter_inputs(vt=1.0, ifd=1.8, voel=-0.1), Names(), []
+    u.vref = MODELS[model].rest(2.0, u, p, x)
+    for factor in (1.0, 1.1):
+        d, changed = Names(), Names(**{**vars(p), symbol: factor * getattr(p, symbol)})
+        # an integral that has moved shows its gain
+        moved = Names(**{name: value + 0.01 for name, value in vars(x).items()})
+        found.append([MODELS[model].equations(moved, u, changed, d), d])
+    return found[0] != found[1]
 
 
 def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(model):
