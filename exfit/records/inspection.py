@@ -37,10 +37,11 @@ from exfit.records.samples import Samples
 from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
 from exfit.records.units import unit_in, usual
 from exfit.signals import OF_EVENT
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, median_step
 from exfit.util.text import LARGEST
 
 REFERENCE = "vref"
+BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +102,27 @@ class Inspection:
 
     @property
     def is_event(self) -> bool:
-        """Whether it seems to be a grid event: phasors, or an angle and p without a reference."""
+        """Whether it seems to be a grid event: phasors, or p and an angle without a reference.
+
+        A frequency does for an angle where the voltage is moved by the grid, not by a reference.
+        """
         signals = {channel.signal for channel in self.channels}
-        plain = {"vt", "angle", "p"} <= signals and REFERENCE not in signals
+        driving = "angle" in signals or ("frequency" in signals and self._moved_by_grid)
+        plain = {"vt", "p"} <= signals and driving and REFERENCE not in signals
         return self.pmu is not None or plain or self.plays_in
+
+    @property
+    def _moved_by_grid(self) -> bool:
+        """Whether q falls as vt rises, where a step of the reference would raise both."""
+        voltage, reactive = self.channel_of("vt"), self.channel_of("q")
+        if voltage is None or reactive is None:
+            return False
+        apart = max(round(BETWEEN_CHANGES / median_step(self.time)), 1)
+        of_vt, of_q = (
+            samples[apart:] - samples[:-apart]
+            for samples in (self.samples[voltage.name], self.samples[reactive.name])
+        )
+        return float(np.nansum(of_vt * of_q)) < 0.0
 
     @property
     def findings(self) -> tuple[str, ...]:

@@ -369,7 +369,8 @@ def case_of_plan(
     first, only = case.tests[0], next(iter(inspections.values()))
     ratings = case.ratings.over(ratings).of_record([*inspections.values()])
     bases = ratings.bases(bases, [*inspections.values()])
-    if len(case.tests) == 1 and not tests_of(only) and first.at is None and first.step is None:
+    whole = only.is_event or not tests_of(only)
+    if len(case.tests) == 1 and whole and first.at is None and first.step is None:
         own = {} if first.base is None else {"vt": first.base}
         tests = starting_tests([only], {}, {**bases, **own})
     else:
@@ -396,7 +397,8 @@ def _of_each_test(
         assert row.file is not None
         inspection = inspections[row.file]
         tests = tests_of(inspection)
-        if row.at is not None or len(tests) < 2 or files.count(row.file) > 1:
+        several = len(tests) > 1 and not inspection.is_event
+        if row.at is not None or not several or files.count(row.file) > 1:
             yield row
             continue
         for test in tests:

@@ -3,7 +3,7 @@
 import csv
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
@@ -14,7 +14,12 @@ from exfit.case.schema.values import FILE_NAME
 from exfit.case.suggestion import Base, RecordSettings, base_of
 from exfit.errors import ExfitError, FileError
 from exfit.features.start.ratings import ANGLE_UNITS, CONNECTIONS, NO_RATINGS, Ratings
-from exfit.features.start.starting_tests import StartingTest, renamed, started
+from exfit.features.start.starting_tests import (
+    StartingTest,
+    renamed,
+    started,
+    starting_tests,
+)
 from exfit.records.formats import WORKBOOKS
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, tests_of
@@ -169,16 +174,23 @@ def tests_of_table(
     """Return the tests that rows name, whose files are all inspected, in order of the rows.
 
     Where no row says which tests validate, every other one does. Raises ExfitError where a record
-    shows no step at the instant of a row.
+    shows no step at the instant of a row, and for an instant or a size of a grid event.
     """
     alternate = all(row.validates is None for row in rows)
+    files = [row.file for row in rows if row.file is not None]
+    events: Sequence[StartingTest | None] = [None] * len(rows)
+    if any(inspections[file].is_event for file in files):
+        _refuse_as_events(rows)
+        events = starting_tests([inspections[file] for file in files], {}, bases)
     tests, recorded = list[StartingTest](), list[DetectedTest]()
-    for k, row in enumerate(rows):
-        assert row.file is not None
-        inspection = inspections[row.file]
-        test = _nearest(row, tests_of(inspection))
+    for k, (row, file, event) in enumerate(zip(rows, files, events, strict=True)):
+        inspection = inspections[file]
         own = bases if row.base is None else {**bases, "vt": row.base}
         validates = k % 2 == 1 if alternate else bool(row.validates)
+        if event is not None:
+            tests.append(replace(event, bases=own, validates=validates))
+            continue
+        test = _nearest(row, tests_of(inspection))
         try:
             tests.append(started(inspection, test, row.step, own, validates))
         except ExfitError as fault:
@@ -186,7 +198,23 @@ def tests_of_table(
         recorded.append(test)
     if all(test.validates for test in tests):
         raise ExfitError(f"{rows[0].place}: every test validates; at least one must be fitted")
-    return renamed(tests, recorded)
+    return renamed(tests, recorded) if recorded else tuple(tests)
+
+
+def _refuse_as_events(rows: Sequence[TableRow]) -> None:
+    """Raise FileError where rows of grid events give what no event has, or one record twice."""
+    faults, seen = list[str](), set[Path | None]()
+    for row in rows:
+        for name, value in (("at", row.at), ("step", row.step)):
+            if value is not None:
+                faults.append(
+                    f"{row.place}: {name}: {value:g}: not allowed: {row.file} shows a grid event"
+                )
+        if row.file in seen:
+            faults.append(f"{row.place}: file: {row.file}: a grid event in a further row, too")
+        seen.add(row.file)
+    if faults:
+        raise FileError(faults)
 
 
 def _nearest(row: TableRow, tests: Sequence[DetectedTest]) -> DetectedTest:

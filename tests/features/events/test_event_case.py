@@ -69,6 +69,20 @@ def test_a_table_with_an_angle_and_no_reference_is_an_event_too(tmp_path):
     assert not RecordSettings().inspect(write_table(tmp_path / "other.csv", columns)).is_event
 
 
+@pytest.mark.parametrize("moved_by", ["grid", "reference"])
+def test_a_frequency_shows_an_event_where_q_falls_as_the_voltage_rises(tmp_path, moved_by):
+    course = smooth_course()
+    columns = {
+        "t": course.time,
+        "vt": course.vt,
+        "frequency [Hz]": course.frequency,
+        "p": course.p,
+        "q": course.q if moved_by == "reference" else 0.3 - course.q,
+    }
+    inspection = RecordSettings().inspect(write_table(tmp_path / "event.csv", columns))
+    assert inspection.is_event == (moved_by == "grid")
+
+
 @pytest.mark.parametrize(
     ("factor", "word"), [(-1.0, "turns against"), (57.3, "times as fast"), (0.01, "times as fast")]
 )

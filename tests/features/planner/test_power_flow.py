@@ -22,7 +22,7 @@ def workplace(empty_folder):
     return empty_folder
 
 
-def event(kv=KV, angle="V Angle (deg)", power=True, frequency="Freq (Hz)"):
+def event(kv=KV, angle="V Angle (deg)", power=True, frequency="Freq (Hz)", name="9_1.csv"):
     """Write the record of a swing of the unit at bus 9, its voltage at a side with this kV."""
     course = smooth_course()
     voltage, current = phasors_of(course, kv)
@@ -35,7 +35,7 @@ def event(kv=KV, angle="V Angle (deg)", power=True, frequency="Freq (Hz)"):
     }
     columns |= {frequency: course.frequency} if frequency else {}
     columns |= {"Gen P (MW)": course.p * MVA, "Gen Q (Mvar)": course.q * MVA} if power else {}
-    write_table(Path("records", "9_1.csv"), columns)
+    write_table(Path("records", name), columns)
 
 
 def imported(run, *options, records="records"):
@@ -127,6 +127,34 @@ def test_columns_of_a_table_count_more_than_a_power_flow_file_and_options(run):
     assert record.phasors.kV == KV
     assert record.phasors.MVA == MVA
     assert (record.channels["p"].column, record.channels["p"].base) == ("Gen P (MW)", MVA)
+
+
+@pytest.mark.parametrize(
+    ("validates", "fitted"),
+    [(("", "", ""), ["event1", "event3"]), (("yes", "no", "no"), ["event2", "event3"])],
+)
+def test_a_table_may_list_several_events_of_a_unit(run, validates, fitted):
+    Path("net.raw").write_text(power_flow())
+    rows = ["bus,id,file" + (",validates" if any(validates) else "")]
+    for name, word in zip(("a.csv", "b.csv", "c.csv"), validates, strict=True):
+        event(name=name)
+        rows.append(f"9,1,{name}" + (f",{word}" if any(validates) else ""))
+    Path("records", "table.csv").write_text("\n".join(rows))
+    case = load_case(imported(run, "--raw", "net.raw", records="records/table.csv"))
+    assert [recording.name for recording in case.recordings] == fitted
+    assert len(case.validations) == 3 - len(fitted)
+
+
+def test_an_instant_of_an_event_and_an_event_twice_are_refused(run):
+    event(name="a.csv")
+    Path("records", "table.csv").write_text(
+        "bus,id,file,at,step\n9,1,a.csv,2.0,\n9,1,a.csv,,0.05\n"
+    )
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--records", "records/table.csv")
+    assert ran.code == 1
+    for text in ("table.csv:2: at: 2: not allowed: records/a.csv shows a grid event",
+                 "table.csv:3: step: 0.05: not allowed", "table.csv:3: file: "):  # fmt: skip
+        assert text in ran.err
 
 
 def test_all_faults_of_ratings_in_a_table_are_named_together(run):
