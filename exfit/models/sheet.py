@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import cleandoc
-from itertools import chain
+from itertools import chain, pairwise
 from math import inf, isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -498,25 +498,42 @@ def crossed_limits(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
             yield symbol, f"{low:g} is not below {partner} = {values[partner]:g}"
 
 
+class SaturationPoint(NamedTuple):
+    """A point of a saturation curve and the names of its values."""
+
+    e: float
+    se: float
+    of_e: str
+    of_se: str
+
+
+def saturation_points(values: Mapping[str, float]) -> list[SaturationPoint]:
+    """Return the two points of a curve, the lower voltage first; none without a saturation.
+
+    Where both SE are zero there is none, and E1 and E2 say nothing.
+    """
+    if not {"E1", "SE1", "E2", "SE2"} <= values.keys() or values["SE1"] == values["SE2"] == 0.0:
+        return []
+    names = ("E1", "SE1"), ("E2", "SE2")
+    return sorted(SaturationPoint(values[e], values[se], e, se) for e, se in names)
+
+
 def saturation_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) where two saturation points contradict each other.
 
-    Saturation grows with the voltage: SE at the higher of E1, E2 is the larger. Where both SE are
-    zero there is none, and E1 and E2 say nothing.
+    VX = E SE grows with the voltage; at zero voltage there is none.
     """
-    if not {"E1", "SE1", "E2", "SE2"} <= values.keys():
-        return
-    if values["SE1"] == values["SE2"] == 0.0:
-        return
-    (low, se_low, lower, _), (high, se_high, _, name) = sorted(
-        [(values["E1"], values["SE1"], "E1", "SE1"), (values["E2"], values["SE2"], "E2", "SE2")]
-    )
-    if low == high:
-        yield "E1", f"{low:g} equals E2: two points are needed"
-    elif low == 0.0:
-        yield lower, "0 is no point of a saturation curve, unless SE1 and SE2 are 0"
-    elif se_high <= se_low:
-        yield name, f"{se_high:g} at {high:g} pu is not above {se_low:g} at {low:g} pu"
+    for low, high in pairwise(saturation_points(values)):
+        if low.e == high.e:
+            yield "E1", f"{low.e:g} equals E2: two points are needed"
+        elif low.e == 0.0 < low.se:
+            yield low.of_e, f"0 is no point of a saturation curve, unless {low.of_se} is 0"
+        elif high.e * high.se <= low.e * low.se:
+            yield high.of_se, _not_above(low, high)
+
+
+def _not_above(low: SaturationPoint, high: SaturationPoint) -> str:
+    return f"{high.se:g} at {high.e:g} pu is not above {low.se:g} at {low.e:g} pu"
 
 
 def stabiliser_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
@@ -539,7 +556,11 @@ def contradictions(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
 
 
 def exponential_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, fault) for a saturation of zero at one point: no exponential reaches it."""
-    zero = [symbol for symbol in ("SE1", "SE2") if values.get(symbol) == 0.0]
-    if len(zero) == 1:
-        yield zero[0], "0 lies on no exponential saturation curve; give both SE as 0, or neither"
+    """Yield (symbol, fault) for a saturation that is zero at one point, or that falls."""
+    for low, high in pairwise(saturation_points(values)):
+        for point in (low, high):
+            if point.se == 0.0:
+                text = "0 lies on no exponential saturation curve; give both SE as 0, or neither"
+                yield point.of_se, text
+        if high.se <= low.se and high.e * high.se > low.e * low.se:
+            yield high.of_se, _not_above(low, high)

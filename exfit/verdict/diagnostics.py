@@ -19,6 +19,7 @@ from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.nuisances import prefix_from
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
+from exfit.models.machines.machine import unusual_reactances
 from exfit.plants import MACHINE, REFERENCES
 from exfit.registry import parts
 from exfit.results.compare_with_record import compare_with_record
@@ -173,9 +174,16 @@ def diagram_notes(case: Case) -> Iterator[str]:
 
 
 def case_warnings(case: Case) -> Iterator[str]:
-    """Warn of steps of no test, and of records that validate nothing, by the case alone."""
+    """Warn of data of no machine, steps of no test, records that validate nothing."""
     from exfit.records.contradictions import LARGEST_STEP, size_in_words
 
+    reactances = {
+        name.removeprefix(MACHINE): value
+        for name, value in case.values().items()
+        if name.startswith(MACHINE)
+    }
+    for symbol, text in unusual_reactances(reactances):
+        yield f"{MACHINE}{symbol}: {text}, as in no machine"
     for recording in (*case.recordings, *case.validations):
         per_unit = case.seen_from(recording).kind.per_unit
         for k, event in enumerate(recording.test.events("vref") if per_unit else ()):

@@ -7,6 +7,7 @@ from places import CONFIGS
 from records import write
 from step_records import step_record
 
+from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
 from exfit.verdict.diagnostics import case_warnings, record_warnings
@@ -45,6 +46,13 @@ def warnings(case):
 
 def test_a_sound_case_has_no_warning(tmp_path):
     assert warnings(case_of(tmp_path)) == []
+
+
+def test_reactances_of_no_machine_are_reported():
+    content = yaml.safe_load((CONFIGS / "models" / "ac1a.yaml").read_text("utf-8"))
+    content["plant"]["parameters"] |= {"Xpd": 0.3, "Xppd": 0.25, "Xl": 0.26}
+    (text,) = case_warnings(Case.from_dict(content))
+    assert text == "machine.Xppd: 0.25 is below Xl = 0.26, as in no machine"
 
 
 FAULTS = {

@@ -155,10 +155,11 @@ def _report_import(imported: "ImportedUnits", folder: Path) -> None:
     echo(f"written to {folder}; {counts}; all units: {UNITS}")
     for path in first_texts([str(path) for path in plan.others]):
         echo(f"no unit for {path}: its name does not begin with a bus", err=True)
-    left_out = Counter(name for unit in plan.units.units for name in unit.unknown)
-    if left_out:
-        counts = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items()))
-        echo(f"left out, no model of exfit (units): {counts}", err=True)
+    of_units = Counter(name for unit in plan.units.units for name in unit.unknown)
+    for what, left_out in (("units", of_units), ("other devices", plan.units.devices)):
+        if left_out:
+            counts = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items()))
+            echo(f"left out, no model of exfit ({what}): {counts}", err=True)
     for line in first_texts(lines[NO_MODEL]):
         echo(f"no model: {line}", err=True)
     if plan.units.classical:

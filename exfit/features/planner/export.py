@@ -335,7 +335,7 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
     }
     # what the planner's file has and the case does without
     of_file = content.get("as_found", {}).get("unused", {})
-    symbols = [*dict(record.unused)]
+    symbols = [*dict(record.unused), "SE1", "SE2"]
     if prefix + SHARE not in result.parameters:
         symbols.append(RATING)
     unused = {

@@ -2,13 +2,24 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from math import sqrt
 from typing import NamedTuple, TypeVar
 
 from exfit.features.planner.fields import DynamicsFault, Field, number, whole
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
-from exfit.models.sheet import DynamicsRecord, Model, Parameter, Sheet, typical
+from exfit.models.machines.machine import unusual_reactances
+from exfit.models.sheet import (
+    DynamicsRecord,
+    Model,
+    Parameter,
+    Sheet,
+    saturation_points,
+    typical,
+)
 from exfit.util.text import rounded, show, show_value
 
 PSSE, PSLF = "PSS/E", "PSLF"
@@ -131,7 +142,8 @@ def is_machine_id(text: str) -> bool:
     return 1 <= len(text) <= LONGEST_ID and text.isascii() and text.isalnum()
 
 
-def definitions(program: str = PSSE) -> list[Definition]:
+@cache
+def definitions(program: str = PSSE) -> tuple[Definition, ...]:
     """Return every record of every model that a program has."""
     catalogues: Iterable[tuple[str, Mapping[str, Model | Machine]]] = (
         ("machine", MACHINES),
@@ -140,14 +152,15 @@ def definitions(program: str = PSSE) -> list[Definition]:
         ("governor", GOVERNORS),
         (LIMITER, LIMITERS),
     )
-    return [
+    return tuple(
         Definition(kind, model, record, program)
         for kind, catalogue in catalogues
         for model in catalogue.values()
         for record in (model.records if program == PSSE else model.pslf_records)
-    ]
+    )
 
 
+@cache
 def definition_of(name: str, program: str = PSSE) -> Definition | None:
     """Return the record that a file means by a name, None where exfit has no model of it.
 
@@ -222,6 +235,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     wrong = wrong or [*contradictions(definition.model, values)]
     remarks = [
         *_unmodelled(definition, given),
+        *_unusual(definition.model, values),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
         *(
             (
@@ -336,10 +350,17 @@ def _without_effect(
         value = given.get(row.symbol, 0.0)
         if value != 0.0 and given.get(lag) == 0.0:
             yield row.symbol, f"{show(value)} has no effect, since {lag} is 0"
-    for name, value in unused.items():
-        other = dict(definition.record.unused)[name]
-        why = f", since {other} is 0" if other else ""
-        yield name, f"{definition.program} ignores {show(value)}{why}; 0 is taken"
+    for name, other in definition.record.unused:
+        if name in unused:
+            why = f", since {other} is 0" if other else ""
+            yield name, f"{definition.program} ignores {show(unused[name])}{why}; 0 is taken"
+    knee = _knee_above(given)
+    if knee is not None:
+        text = (
+            f"{show(given['SE1'])}, and SE2 {show(given['SE2'])}, fall: the quadratic curve is 0 "
+            f"up to {knee:.4g} pu; no saturation is taken"
+        )
+        yield "SE1", text
     if rating != 0.0:
         text = (
             f"{show(rating)} MW, but the machine's base is not in the file: enter {SHARE} in the "
@@ -361,11 +382,31 @@ def with_exchanged(record: DynamicsRecord, values: Mapping[str, Value]) -> dict[
 
 def unused_of(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:
     """Return those values that act in a model and not in the program of a record."""
-    return {
+    unused = {
         name: values[name]
         for name, other in record.unused
         if values.get(name, 0.0) != 0.0 and values.get(other, 0.0) == 0.0
     }
+    if _knee_above(values) is not None:
+        unused |= {name: values[name] for name in ("SE1", "SE2")}
+    return unused
+
+
+def _knee_above(values: Mapping[str, float]) -> float | None:
+    """The knee of a saturation that falls from the lower to the higher voltage, else None.
+
+    VX = B (E - A)^2 through both points is 0 below A, which then lies above them.
+    """
+    for low, high in pairwise(saturation_points(values)):
+        before, behind = sqrt(low.e * low.se), sqrt(high.e * high.se)
+        if before > behind and low.e < high.e:
+            return (high.e * before - low.e * behind) / (before - behind)
+    return None
+
+
+def _unusual(model: Model | Machine, values: Mapping[str, float]) -> Texts:
+    """Yield (symbol, warning) for data that a machine can hardly have."""
+    return unusual_reactances(values) if isinstance(model, Machine) else ()
 
 
 def record_fields(definition: Definition, values: Mapping[str, float]) -> list[str]:

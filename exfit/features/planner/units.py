@@ -1,7 +1,9 @@
 """The units of a dynamics file: machine, exciter, stabiliser, governor, and what is left out."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 from exfit.errors import DynamicsError
@@ -31,14 +33,16 @@ MOST_LISTED = 20  # units in a message
 OTHERS: Mapping[str, str] = {
     name: kind
     for kind, names in {
-        "governor": """BBGOV1 CRCMGV DEGOV DEGOV1 GAST GAST2A GASTWD GGOV1 GGOV1DU HYGOV HYGOV2
-            HYGOVDU HYGOVM HYGOVR1 HYGOVRU HYGOVT IEEEG1 IEEEG1SDU IEEEG2 IEEEG3 IEESGO IVOGO
+        "governor": """BBGOV1 CCBT1 CRCMGV DEGOV DEGOV1 G2WSCC GAST GAST2A GASTWD GGOV1 GGOV1DU
+            GGOV2 GGOV3 GPWSCC H6B H6E HYG3 HYGOV HYGOV2 HYGOV4 HYGOVDU HYGOVM HYGOVR HYGOVR1
+            HYGOVRU HYGOVT IEEEG1 IEEEG1SDU IEEEG2 IEEEG3 IEEEG3_GE IEEEG3_PTI IEESGO IVOGO LCFB1
             PIDGOV SHAF25 TGOV1 TGOV1DU TGOV2 TGOV3 TGOV4 TGOV5 TURCZT TWDM1T TWDM2T URCSCT URGS3T
             WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
         "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PTIST1 PTIST3
             STAB3 STAB4 STABNI STBSVC""",
         "excitation limiter": "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL4C UEL2",
-        "compensator": "COMP COMPCC IEEEVC REMCMP",
+        "compensator": "CCOMP COMP COMPCC IEEEVC REMCMP",
+        "meter": "AMETA FMETA IMETR VMETA",
     }.items()
     for name in names.split()
 }
@@ -97,26 +101,32 @@ class RefusedUnit:
 class DynamicsUnits:
     """The units of a dynamics file in its order; ``faults`` are of records that belong to no unit.
 
-    ``classical`` counts the classical machines without an exciter, which are no units.
+    ``classical`` counts the classical machines without an exciter, which are no units; ``devices``
+    are the names of records of other devices, such as loads and plants with converters, with the
+    number of places where they stand.
     """
 
     units: tuple[Unit, ...]
     refused: tuple[RefusedUnit, ...]
     faults: tuple[DynamicsFault, ...]
     classical: int = 0
+    devices: Mapping[str, int] = field(default_factory=dict)
 
 
 def read_units(text: str, file: str | Path) -> DynamicsUnits:
     """Return every unit of a dynamics file, whose suffix gives the program.
 
-    What is wrong with one does not hinder the others. A unit is what has a bus and a machine id:
-    loads and other devices whose records begin so count as units without a machine.
+    What is wrong with one does not hinder the others.
     """
     heads, faults = format_of(file).heads(text)
     units, refused, classical = list[Unit](), list[RefusedUnit](), 0
+    devices = Counter[str]()
     for own in _by_unit(heads).values():
         if _all_classical(own):
             classical += 1
+            continue
+        if _is_device(own):
+            devices.update({head.name for head in own})
             continue
         unit, wrong = _unit_of(own)
         if unit is not None:
@@ -135,28 +145,32 @@ def read_units(text: str, file: str | Path) -> DynamicsUnits:
                 tuple(sorted(wrong, key=lambda fault: fault.line)),
             )
         )
-    return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical)
+    return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical, devices)
 
 
 def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | None = None) -> Unit:
     """Return a unit of a dynamics file: the only one, or that of a bus and a machine id.
 
-    Raises DynamicsError with all faults of its records, each as ``file:line: what is wrong``, and
-    where the unit is not in the file, is not the only one, or has no machine or exciter that exfit
-    knows.
+    Records that cannot be read are warnings if the unit is whole without them. Raises DynamicsError
+    with all faults, each as ``file:line: what is wrong``, and where the unit is not in the file, is
+    not the only one, or has no machine or exciter that exfit knows.
     """
     files = format_of(file)
-    heads, faults = files.heads(text)
-    if faults:
-        raise DynamicsError(located(faults, file))
+    heads, unread = files.heads(text)
     if not heads:
-        raise DynamicsError(f"{file}: has no record of a unit: {files.begins}")
-    chosen = _chosen(_by_unit(heads), file, bus, machine_id)
+        none = f"{file}: has no record of a unit: {files.begins}"
+        raise DynamicsError([*located(unread, file), none])
+    try:
+        chosen = _chosen(_by_unit(heads), file, bus, machine_id)
+    except DynamicsError as fault:
+        raise DynamicsError([*located(unread, file), *fault.faults]) from None
     unit, faults = _unit_of(chosen)
     if unit is None:
         faults += _missing(_missing_kinds(chosen), chosen)
-        raise DynamicsError(located(faults, file))
-    return unit
+        raise DynamicsError(located([*unread, *faults], file))
+    left = [DynamicsFault(line, f"{text}: the record is left out") for line, text in unread]
+    warnings = sorted([*unit.warnings, *left], key=lambda warning: warning.line)
+    return replace(unit, warnings=tuple(warnings))
 
 
 def _by_unit(heads: Iterable[Head]) -> dict[tuple[int, str], list[Head]]:
@@ -355,9 +369,8 @@ def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[Dynamics
         return
     text = f"no {' and no '.join(missing)} of the catalogue: "
     yield DynamicsFault(heads[0].line, text + ", ".join(head.name for head in heads))
-    names = [name for kind in NEEDED for name in _names_of(kind, heads[0].program)]
     for head in _unknown(heads):
-        meant = closest(head.name, names, NEARLY_THE_NAME)
+        meant = _meant(head.name, head.program)
         if meant is not None:
             yield DynamicsFault(head.line, f"{head.name}: did you mean {meant}?")
 
@@ -365,6 +378,16 @@ def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[Dynamics
 def _is_machine(name: str) -> bool:
     """Whether a name is that of a machine: GENROU, GENSAL, GENTPJ ..., of which none is a load."""
     return name.upper().startswith("GEN") and name.upper() not in CLASSICAL
+
+
+def _is_device(heads: Sequence[Head]) -> bool:
+    """Whether no record at a place is of a machine or of a model of exfit, nor nearly so named."""
+    return all(
+        head.definition is None
+        and not _is_machine(head.name)
+        and _meant(head.name, head.program) is None
+        for head in heads
+    )
 
 
 def _unknown(heads: Iterable[Head]) -> list[Head]:
@@ -387,13 +410,22 @@ def _all_classical(heads: Iterable[Head]) -> bool:
     return all(head.name.upper() in CLASSICAL for head in heads)
 
 
-def _names_of(kind: str, program: str) -> list[str]:
+@cache
+def _names_of(kind: str, program: str) -> tuple[str, ...]:
     """Return the names by which a file of a program may have a machine or an exciter."""
-    return sorted(
+    names = (
         definition.record.name
         for definition in definitions(program)
         if definition.kind == kind and definition_of(definition.record.name, program) == definition
     )
+    return tuple(sorted(names))
+
+
+@cache
+def _meant(name: str, program: str) -> str | None:
+    """Return the machine or exciter whose name is nearly this one, if one is."""
+    names = [known for kind in NEEDED for known in _names_of(kind, program)]
+    return closest(name, names, NEARLY_THE_NAME)
 
 
 def _left_out(name: str) -> str:

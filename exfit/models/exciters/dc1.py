@@ -26,10 +26,10 @@ from exfit.models.sheet import (
 STATES, SETPOINTS = "VC VL VR EFD VF", "KE0 VRMAX0 VRMIN0"
 
 
-def record_of_psse(name: str, TF: str, times_speed: bool = False) -> Records:
+def record_of_psse(name: str, TF: str, times_speed: bool = False, doubt: str = "") -> Records:
     """Return PSS/E's record of an exciter with a lead-lag; Switch is not used there."""
     order = f"TR KA TA TB TC VRMAX VRMIN KE TE KF {TF} Switch E1 SE1 E2 SE2"
-    return record(name, order, absent={"Switch": 0.0}, times_speed=times_speed)
+    return record(name, order, absent={"Switch": 0.0}, times_speed=times_speed, doubt=doubt)
 
 
 def record_of_pslf(name: str) -> Records:
@@ -303,7 +303,11 @@ IEEEX1 = documented(
         *shared(TE=0.8, KF=0.03, TF1=1.0, E1=2.4, SE1=0.03, E2=5.0, SE2=0.5),
     ),
     STATES,
-    records=record_of_psse("IEEEX1", "TF1"),
+    aliases="EXDC1",
+    records=(
+        *record_of_psse("IEEEX1", "TF1"),
+        *record_of_psse("EXDC1", "TF1", doubt="PSS/E has it as IEEEX1, whose order is taken"),
+    ),
     pslf_records=record(
         "exdc1", "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 E1 SE1 E2 SE2", doubt=OF_A_LIST
     ),

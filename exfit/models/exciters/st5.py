@@ -100,6 +100,11 @@ ST5B = documented(
         "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
         ignored="TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
     ),
+    pslf_records=record(
+        "esst5b",
+        "TR KR T1 KC VRMAX VRMIN TC1 TB1 TC2 TB2 TOC1 TOB1 TOC2 TOB2 TUC1 TUB1 TUC2 TUB2",
+        ignored="TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
+    ),
 )
 
 

@@ -96,8 +96,8 @@ ROWS = table(
     ("Xpd", "pu", (0.001, 10.0), "d-axis transient reactance"),
     ("Xppd", "pu", (0.001, 10.0), "subtransient reactance"),
     ("Xl", *UP_TO_10, "leakage reactance"),
-    ("S10", *UP_TO_10, "saturation at 1.0 pu"),
-    ("S12", *UP_TO_10, "saturation at 1.2 pu"),
+    ("S10", *UP_TO_100, "saturation at 1.0 pu"),
+    ("S12", *UP_TO_100, "saturation at 1.2 pu"),
 )
 of_machine = partial(chosen, ROWS)
 
@@ -122,11 +122,18 @@ def d_axis_order(values: Mapping[str, float]) -> Faults:
     X'd = X''d is a damper that is not seen: its time constant may be anything, such as 999.
     """
     yield from descending(values, "Xd", "Xpd")
-    yield from not_rising(values, "Xpd", "Xppd")
     yield from descending(values, "Xpd", "Xl")
-    yield from not_rising(values, "Xppd", "Xl")
     if values["Xpd"] > values["Xppd"]:
         yield from descending(values, "Tpd0", "Tppd0")
+
+
+def unusual_reactances(values: Mapping[str, float]) -> Faults:
+    """Yield (symbol, text) for reactances that the equations bear and no machine has.
+
+    Planners' files hold such data, estimated or rounded.
+    """
+    rows = [symbol for symbol in ("Xpd", "Xppd", "Xl") if symbol in values]
+    yield from not_rising(values, *rows)
 
 
 def saturation_order(values: Mapping[str, float]) -> Faults:

@@ -20,7 +20,7 @@ from tiers import few_of
 
 from exfit import cli
 from exfit.case.load import load_case
-from exfit.features.planner.records import definition_of
+from exfit.features.planner.records import definition_of, definitions
 from exfit.features.planner.units import read_unit
 from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.sheet import record, typical
@@ -192,7 +192,16 @@ STABILISER = replace(
 @pytest.fixture
 def pssx(monkeypatch):
     """Let exfit know one stabiliser of which only the data matter."""
-    monkeypatch.setattr("exfit.features.planner.records.STABILISERS", {"PSSX": STABILISER})
+    with monkeypatch.context() as patch:
+        patch.setattr("exfit.features.planner.records.STABILISERS", {"PSSX": STABILISER})
+        forget_records()
+        yield
+    forget_records()
+
+
+def forget_records():
+    definitions.cache_clear()
+    definition_of.cache_clear()
 
 
 def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx):

@@ -296,7 +296,7 @@ def test_a_record_of_another_model_is_refused(fit, case):
     [
         ("KA", 1e7, "f:10: ESAC1A: KA: 10000000 lies outside 0.01 ... 100000 pu"),
         ("VAMIN", 20.0, "f:10: ESAC1A: VAMIN: 20 is not below VAMAX = 14.5"),
-        ("machine.Xpd", 0.2, "f:9: GENROU: Xpd: 0.2 is below"),
+        ("machine.Xpd", 0.1, "f:9: GENROU: Xpd: 0.1 is not above Xl = 0.2"),
     ],
 )
 def test_a_value_that_the_record_cannot_have_is_refused_before_anything_is_written(

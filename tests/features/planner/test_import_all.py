@@ -51,8 +51,8 @@ def test_every_unit_becomes_the_case_that_it_becomes_alone(run):
         run("import", "units.dyr", "--bus", bus, "--id", machine_id, "-o", alone, "--force")
         assert Path("cases", name).read_text() == alone.read_text()
     rows = units_of()
-    assert [row["status"] for row in rows.values()] == ["written"] * 3 + ["no model"]
-    assert "no model: bus 8, machine 1: line 14: no machine and no exciter" in ran.err
+    assert [row["status"] for row in rows.values()] == ["written"] * 3
+    assert "left out, no model of exfit (other devices): IEELBL (1)" in ran.err
     assert (rows["1 2"]["machine"], rows["1 2"]["case"]) == ("GENROU", "bus-1-2.yaml")
 
 
@@ -98,7 +98,7 @@ def test_records_are_joined_by_bus_and_id_and_others_are_named(run):
     assert load_case(Path("cases", CASES[0])).recordings[0].record.file == "../records/1_1.csv"
     assert load_case(Path("cases", CASES[1])).recordings == ()
     assert [row["status"] for row in units_of().values()] == [
-        "written with records", "written", "written with records", "no model"
+        "written with records", "written", "written with records"
     ]  # fmt: skip
 
 

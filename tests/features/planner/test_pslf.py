@@ -70,8 +70,8 @@ def test_a_record_names_only_what_the_sheet_or_the_record_explains(definition):
 def test_an_order_from_a_thin_source_is_in_doubt():
     certain = {name for name, own in DEFINITIONS.items() if not own.record.doubt}
     assert certain == {
-        "genrou", "gensal", "exac4", "exac8b", "exst1", "esst1a", "exst4b", "esst4b", "rexs",
-        "ieeest", "pss2a", "pss2b", "tgov1", "ieeeg1", "ggov1",
+        "genrou", "gensal", "exac4", "exac8b", "exst1", "esst1a", "exst4b", "esst4b", "esst5b",
+        "rexs", "ieeest", "pss2a", "pss2b", "tgov1", "ieeeg1", "ggov1",
     }  # fmt: skip
     _, read = read_back(record_text(DEFINITIONS["exac1"], sound_of("exac1"), 1, "1"))
     assert "not confirmed" in read.warnings[0].text
@@ -168,7 +168,8 @@ def test_a_fault_of_one_unit_leaves_the_others():
     other = PSLF_UNIT.replace(" 1 ", " 2 ").replace("150", "-150")
     units = read_units(PSLF_UNIT + other, "a.dyd")
     assert [unit.bus for unit in units.units] == [1]
-    assert {unit.bus: unit.modelled for unit in units.refused} == {4: False, 2: True}
+    assert {unit.bus: unit.modelled for unit in units.refused} == {2: True}
+    assert units.devices == {"wlwscc": 1}
 
 
 def test_the_end_of_a_record_may_be_marked_as_other_writers_do():

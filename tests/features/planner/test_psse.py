@@ -29,6 +29,7 @@ from exfit.features.planner.records import (
 from exfit.features.planner.units import read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record, typical
+from exfit.workflows import simulate
 
 DEFINITIONS = {(one.model.name, one.record.name): one for one in definitions()}
 # a record with all that records may have, whatever the catalogue holds
@@ -218,8 +219,8 @@ FAULTS = {
         "unit.dyr:2: ESAC1A: KA: -1 lies outside 0.01 ... 100000 pu",
     ),
     "crossed limits": ("14.5 -14.5\n", "-14.5 14.5\n", "unit.dyr:2: ESAC1A: VAMIN: 14.5 is not"),
-    "a saturation that falls": (" .03 ", " .3 ", "unit.dyr:4: ESAC1A: SE2: 0.1 at 4.18"),
-    "reactances out of order": (" .55 .25 ", " .55 .35 ", "unit.dyr:1: GENROU: Xpd: 0.3 is below"),
+    "a saturation at no voltage": ("3.14 .03", "0 .03", "unit.dyr:4: ESAC1A: E1: 0 is no point"),
+    "reactances out of order": (" .25 .2 ", " .25 .35 ", "unit.dyr:1: GENROU: Xpd: 0.3 is not"),
     "no end": (".4 /", ".4", "unit.dyr:1: the record that begins here has no '/' before the next"),
     "no end of the last": ("-14.5 /", "-14.5", "unit.dyr:2: the record that begins here has no"),
     "an open quote": ("ESAC1A", "'ESAC1A", "unit.dyr:2: a quote is opened and not closed"),
@@ -288,12 +289,53 @@ def test_names_and_ids_may_be_quoted_and_a_bus_needs_its_number():
         read_unit(text.replace('1 "GENROU"', "'NORTH 21.6' 'GENROU'"), "unit.dyr")
 
 
-def test_no_saturation_may_be_written_as_four_zeros():
-    """The voltages then say nothing; a zero beside a saturation is a fault."""
-    values = read_unit(replaced("3.14 .03 4.18 .1", "0 0 0 0"), "unit.dyr").exciter.values
-    assert {values[name] for name in ("E1", "SE1", "E2", "SE2")} == {0.0}
-    (fault,) = fault_of(replaced("3.14 .03 4.18 .1", "0 0 4.18 .1"))
-    assert "E1: 0 is no point of a saturation curve" in fault
+@pytest.mark.parametrize("points", ["0 0 0 0", "0 0 4.18 .1"])
+def test_a_saturation_of_zero_at_no_voltage_is_read_as_it_stands(points):
+    values = read_unit(replaced("3.14 .03 4.18 .1", points), "unit.dyr").exciter.values
+    assert [values[name] for name in ("E1", "SE1", "E2", "SE2")] == [*map(float, points.split())]
+
+
+def test_a_saturation_whose_knee_lies_above_its_points_is_none_with_a_warning():
+    """ACTIVSg2000 has forty exciters with E SE smaller at the higher voltage."""
+    text = replaced("3.14 .03 4.18 .1", "4.18 .01 3.14 .03")
+    unit = read_unit(text, "unit.dyr")
+    values = [unit.exciter.values[name] for name in ("E1", "SE1", "E2", "SE2")]
+    assert values == [4.18, 0.0, 3.14, 0.0]
+    assert unit.exciter.unused == (("SE1", 0.01), ("SE2", 0.03))
+    (warning,) = unit.warnings
+    # sqrt(E SE) is linear in E and zero at the knee
+    knee = 4.18 + 0.0418**0.5 * (4.18 - 3.14) / (0.0942**0.5 - 0.0418**0.5)
+    assert (
+        f"SE1: 0.01, and SE2 0.03, fall: the quadratic curve is 0 up to {knee:.4g} pu"
+        in warning.text
+    )
+    assert "unused: {SE1: 0.01, SE2: 0.03}" in imported_case(unit, "unit.dyr").text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (" .25 .2 ", " .25 .26 ", "Xppd: 0.25 is below Xl = 0.26"),
+        (" .55 .25 ", " .55 .305 ", "Xpd: 0.3 is below Xppd = 0.305"),
+    ],
+)
+def test_reactances_that_no_machine_has_but_that_can_be_simulated_are_warned_of(old, new, words):
+    """A public file of a steam plant has X''d below Xl."""
+    unit = read_unit(replaced(old, new), "unit.dyr")
+    assert [warning.text for warning in unit.warnings] == [f"GENROU: {words}"]
+    response = simulate(
+        parse_case(imported_case(unit, "unit.dyr").text, Path("case.yaml"))
+    ).response
+    assert np.all(np.isfinite(response.signals["vt"]))
+
+
+@pytest.mark.parametrize("damage", ["0.0 /\n", "3 'ESAC1A' 1 2\n", "9 'GEN\n"])
+def test_a_record_that_cannot_be_read_does_not_stop_a_unit_beside_it(damage):
+    for text in (SOUND + damage, damage + SOUND):
+        unit = read_unit(text, "unit.dyr", 1)
+        assert unit.exciter.values["KA"] == 766.0
+        assert unit.warnings
+        assert all(text.endswith("the record is left out") for _, text in unit.warnings)
 
 
 @pytest.mark.parametrize(
