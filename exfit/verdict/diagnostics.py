@@ -173,17 +173,22 @@ def diagram_notes(case: Case) -> Iterator[str]:
             yield f"{model.name} {model.doubt}"
 
 
-def case_warnings(case: Case) -> Iterator[str]:
-    """Warn of data of no machine, steps of no test, records that validate nothing."""
-    from exfit.records.contradictions import LARGEST_STEP, size_in_words
-
-    reactances = {
+def machine_warnings(case: Case) -> Iterator[str]:
+    """Warn of reactances that no machine has."""
+    values = {
         name.removeprefix(MACHINE): value
         for name, value in case.values().items()
         if name.startswith(MACHINE)
     }
-    for symbol, text in unusual_reactances(reactances):
+    for symbol, text in unusual_reactances(values):
         yield f"{MACHINE}{symbol}: {text}, as in no machine"
+
+
+def case_warnings(case: Case) -> Iterator[str]:
+    """Warn of data of no machine, steps of no test, records that validate nothing."""
+    from exfit.records.contradictions import LARGEST_STEP, size_in_words
+
+    yield from machine_warnings(case)
     for recording in (*case.recordings, *case.validations):
         per_unit = case.seen_from(recording).kind.per_unit
         for k, event in enumerate(recording.test.events("vref") if per_unit else ()):
