@@ -1,5 +1,7 @@
 """What exciters of several types share: regulator, alternator, supplies and PID."""
 
+from typing import NamedTuple
+
 from exfit.models.blocks import (
     Limited,
     Signal,
@@ -9,6 +11,7 @@ from exfit.models.blocks import (
     field_demand,
     inf,
     lag,
+    larger,
     lead_lag,
     limited_integrator,
     limited_lag,
@@ -38,6 +41,26 @@ Gate = tuple[Signal, Signal] | None  # its lower and upper limit
 def gated(x: Signal, gate: Gate) -> Signal:
     """Hold a signal between the limits of a gate, where there is one."""
     return x if gate is None else clip(x, *gate)
+
+
+class Routed(NamedTuple):
+    """What passes the first gates, which limiter has them, and what the stabiliser keeps of vs."""
+
+    signal: Signal
+    by_oel: Signal
+    by_uel: Signal
+    own: Signal
+
+
+def routed(vc: Signal, u: Signal, p: Signal) -> Routed:
+    """Send vs to the voltage error (VOS = 1) or behind its gates (2); 3, or a limiter, keeps it."""
+    at_error = where(p.VOS < 1.5, u.vs, 0.0)
+    error = u.vref + u.vsum + at_error - vc
+    raised = larger(error, u.vuel)
+    free = (p.VOS < 2.5) & (u.voel >= raised) & (u.vuel <= error)
+    at_gate = where(free, u.vs - at_error, 0.0)
+    signal = smaller(raised, u.voel) + at_gate
+    return Routed(signal, u.voel < raised, u.vuel > error, u.vs - at_error - at_gate)
 
 
 def regulated(

@@ -217,7 +217,10 @@ def test_a_parameter_that_is_not_a_number_spoils_its_own_set_alone(model):
 
 
 # what only a limiter at its gate lets through
-BEHIND_A_GATE = {"AC11C": ("VU",), "ST5C": ("VU1", "VU2", "VO1", "VO2")}
+BEHIND_A_GATE = {
+    "AC11C": ("VU",),
+    **dict.fromkeys(("ST5C", "ST10C"), ("VU1", "VU2", "VO1", "VO2")),
+}
 
 
 def test_a_state_that_is_not_a_number_is_seen_at_the_terminals(model):

@@ -79,6 +79,11 @@ def st9c(p):
     return chain, lag(1.0, p.TR) * (lag(1.0, 0.0) + derivative)
 
 
+def st10c(p):
+    chain = lead_lag(p.TC1, p.TB1) * lead_lag(p.TC2, p.TB2) * lag(p.KR * bridge(p), p.T1)
+    return chain, lag(1.0, p.TR)
+
+
 DIAGRAMS = {
     "ST1C": st1c,
     "ST2C": st2c,
@@ -89,13 +94,15 @@ DIAGRAMS = {
     "ST7C": st7c,
     "ST8C": st8c,
     "ST9C": st9c,
+    "ST10C": st10c,
 }
 INDEPENDENT = {"SW1": 2.0}
 CASES = [
     *((name, {}) for name in DIAGRAMS),
-    *((name, INDEPENDENT) for name in ("ST3C", "ST4C", "ST6C", "ST8C", "ST9C")),
+    *((name, INDEPENDENT) for name in ("ST3C", "ST4C", "ST6C", "ST8C", "ST9C", "ST10C")),
     ("ST3C", {"VGMAX": 0.5, "KA": 5.0}),  # nothing is fed back
     ("ST9C", {"ZA": 0.0}),
+    ("ST10C", {"VOS": 3.0}),
     ("ST4C", {"TA": 0.0}),
     ("ST4C", {"TG": 0.0}),
     ("ST4C", {"TA": 0.0, "TG": 0.0}),
@@ -139,6 +146,8 @@ def limits(name, p):
         return VT * p.VRMIN, VT * p.VRMAX
     if name == "ST9C":
         return bridge(p) * p.KAS * p.VRMIN, bridge(p) * p.KAS * p.VRMAX
+    if name == "ST10C":
+        return bridge(p) * p.VRMIN, bridge(p) * p.VRMAX
     if name == "ST6C":
         return bridge(p) * max(p.VRMIN, p.VMMIN), bridge(p) * min(p.VRMAX, p.VMMAX)
     return bridge(p) * max(p.VMMIN, p.VAMIN), bridge(p) * min(p.VMMAX, p.VAMAX)
@@ -154,6 +163,7 @@ LARGE = {
     "ST7C": {"VMAX": 9.0, "VMIN": -9.0},
     "ST8C": {},
     "ST9C": {},
+    "ST10C": {},
 }
 
 
@@ -196,7 +206,7 @@ def test_a_gate_at_the_input_replaces_the_error(name):
     """The step of the reference that gives this error does the same; OEL has the last word."""
     values = lively_values(name)
     values |= {symbol: value for symbol, value in OPEN.items() if symbol in values}
-    if name == "ST5C":
+    if name in ("ST5C", "ST10C"):
         values |= {f"T{gate}{time[1:]}": values[time] for gate in "UO" for time in SWITCHED}
     if name == "ST2C":  # its gates are behind the PID
         values |= {"KPR": 1.0, "KIR": 0.0, "KDR": 0.0}
@@ -214,13 +224,15 @@ def test_a_gate_at_the_input_replaces_the_error(name):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("limiter", "gate"), [("vuel", "U"), ("voel", "O")])
-def test_st5c_changes_its_lead_lags_while_a_limiter_has_the_gate(limiter, gate):
-    values = lively_values("ST5C")
-    _, p, x = standing("ST5C", values)
+@pytest.mark.parametrize("name", ["ST5C", "ST10C"])
+def test_other_lead_lags_take_over_while_a_limiter_has_the_gate(name, limiter, gate):
+    values = lively_values(name)
+    _, p, x = standing(name, values)
     change = 1e-6 if limiter == "vuel" else -1e-6
     TC1, TB1, TC2, TB2 = (getattr(p, f"T{gate}{time[1:]}") for time in SWITCHED)
-    chain = lead_lag(TC1, TB1) * lead_lag(TC2, TB2) * lag(p.KR, p.T1)
-    times, efd = alone("ST5C", values, held={limiter: x.VL1 + change}, step=2.5e-4)
+    gain = p.KR * (rectified(p.KP, p.KC * IFD) if name == "ST10C" else 1.0)
+    chain = lead_lag(TC1, TB1) * lead_lag(TC2, TB2) * lag(gain, p.T1)
+    times, efd = alone(name, values, held={limiter: x.VL1 + change}, step=2.5e-4)
     expected = change * chain.step(times)
     assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
 
@@ -236,9 +248,9 @@ def test_st9c_changes_the_time_of_its_integral_while_uel_has_the_gate():
         assert efd - EFD == pytest.approx(p.KAS * bridge(p) * rise, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["ST1C", "ST4C", "ST6C", "ST7C"])
+@pytest.mark.parametrize("name", ["ST1C", "ST4C", "ST6C", "ST7C", "ST10C"])
 def test_a_gate_at_the_output_is_the_output(name):
-    values = lively_values(name) | {"TA": 0.0}
+    values = lively_values(name) | {"T1" if name == "ST10C" else "TA": 0.0}
     vb = bridge(SimpleNamespace(**values)) if "SW1" in values else 1.0
     for held, output in (
         ({"vuel_out": 0.5}, 0.5),
@@ -310,6 +322,26 @@ def test_the_stabiliser_of_st1c_is_added_where_vos_says():
     assert at_error == pytest.approx(by_reference, abs=1e-12)
     _, behind = alone("ST1C", values | {"VOS": 2.0}, held={"vs": 0.01}, step=1e-3)
     assert behind[0] - EFD == pytest.approx(0.01, abs=1e-12)
+
+
+@pytest.mark.long
+def test_the_stabiliser_of_st10c_acts_where_vos_says():
+    """By lead-lags of its own it does the same; a limiter sends it there from behind its gates."""
+    values = lively_values("ST10C") | {"TR": 0.0, "VRSMAX": 0.2}
+    vb = rectified(values["KP"], values["KC"] * IFD)
+    u, _, _ = standing("ST10C", values)
+    gate = {"vuel": u.vref - u.vc1}
+    _, expected = alone("ST10C", values, vref=1e-5)
+    for VOS in (1.0, 2.0, 3.0):
+        placed = values | {"VOS": VOS}
+        _, got = alone("ST10C", placed, held={"vs": 1e-5})
+        assert got == pytest.approx(expected, abs=1e-12)
+        _, gated = alone("ST10C", placed, vref=-0.01, held={"vs": 1e-5} | gate)
+        # at the error it is part of what the gate replaces
+        apart = gated - alone("ST10C", placed, vref=-0.01, held=gate)[1]
+        assert apart == pytest.approx(0.0 if VOS == 1.0 else expected - EFD, abs=1e-12)
+    _, got = alone("ST10C", values | {"VOS": 3.0}, held={"vs": 1.0})
+    assert got.max() - EFD == pytest.approx(0.2 * vb)
 
 
 @pytest.mark.long

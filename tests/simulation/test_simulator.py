@@ -526,7 +526,8 @@ def freezes(exciter, values, inputs):
 TRIED = {"MAX": ("above", (0.5, 0.1, 0.05, 1e-3)), "MIN": ("below", (0.1, 0.9, 1.3, 9.0))}
 # what bounds a signal that other signals make up for, or that no start needs
 WIDE = ("VBMAX", "VB1MAX", "VB2MAX", "VGMAX", "VHMAX")
-AT_A_PI = {"REXS": "VIMAX", "ST3C": "VIMAX", "AC11C": "VRSMAX"}  # whose input is zero at rest
+# whose input is zero at rest
+AT_A_PI = {"REXS": "VIMAX", "ST3C": "VIMAX", "AC11C": "VRSMAX", "ST10C": "VRSMAX"}
 
 
 def limits_of(exciter):

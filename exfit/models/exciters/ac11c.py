@@ -45,13 +45,17 @@ from exfit.models.blocks import (
     clip,
     field_demand,
     lag,
-    larger,
     lead_lag,
     modulus,
-    smaller,
     where,
 )
-from exfit.models.exciter_parts import alternator_rest, bridge, first_source, limited_alternator
+from exfit.models.exciter_parts import (
+    alternator_rest,
+    bridge,
+    first_source,
+    limited_alternator,
+    routed,
+)
 from exfit.models.sheet import (
     FREE,
     GAIN,
@@ -124,21 +128,15 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vfe = field_demand(s.VE, u.ifd, p)
     vb1, boost = sources(vfe, u, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    at_error = where(p.VOS < 1.5, u.vs, 0.0)
-    error = u.vref + u.vsum + at_error - vc
-    raised = larger(error, u.vuel)
-    oel, uel = u.voel < raised, u.vuel > error
-    at_gate = where((p.VOS < 2.5) & (u.voel >= raised) & (u.vuel <= error), u.vs - at_error, 0.0)
-    signal = smaller(raised, u.voel) + at_gate
+    signal, oel, uel, own = routed(vc, u, p)
     lead = p.TB + p.TB / p.KB
     vl, d.VD = lead_lag(s.VA0 + p.KPA * (signal + s.VI / p.TIA), s.VD, lead, p.TB / p.KB)
     vu, d.VU = lead_lag(s.VA0 + p.KPU * (signal + s.VI / p.TIU), s.VU, lead, p.TB / p.KB)
     vo = s.VA0 + p.KPO * (signal + s.VI / p.TIO)
     chosen = where(oel, vo, where(uel, vu, vl))
     d.VI = where(pushes(chosen, signal, p.VRMIN, p.VRMAX), 0.0, signal)
-    rest_of_vs = u.vs - at_error - at_gate
-    vsl, d.VSD = lead_lag(p.KPA * (rest_of_vs + s.VS / p.TIA), s.VSD, lead, p.TB / p.KB)
-    d.VS = where(pushes(vsl, rest_of_vs, p.VRSMIN, p.VRSMAX), 0.0, rest_of_vs)
+    vsl, d.VSD = lead_lag(p.KPA * (own + s.VS / p.TIA), s.VSD, lead, p.TB / p.KB)
+    d.VS = where(pushes(vsl, own, p.VRSMIN, p.VRSMAX), 0.0, own)
     vr = clip(clip(chosen, p.VRMIN, p.VRMAX), u.vuel_out, u.voel_out)
     va = clip(vr + clip(vsl, p.VRSMIN, p.VRSMAX), p.VAMIN, p.VAMAX)
     efd, d.VE = limited_alternator(va * vb1 + boost, vfe, s, u, p)
