@@ -281,7 +281,8 @@ class DynamicsRecord:
     the model's own equations: any value will do; ``doubt`` says what is not settled about the
     order; ``spelled`` are symbols with their names in the file, where these differ by more than
     capitals; ``times_speed`` says that efd is multiplied by the speed there; ``places`` are where a
-    limiter acts by the value of its flag, OEL or UEL, which is one of the integers.
+    limiter acts by the value of its flag, OEL or UEL, which is one of the integers; ``signals`` are
+    those of the codes of a stabiliser's inputs, where they are others than usual.
     """
 
     name: str
@@ -296,6 +297,7 @@ class DynamicsRecord:
     places: tuple[tuple[int, str], ...] = ()
     unused: tuple[tuple[str, str], ...] = ()
     exchanged: tuple[str, ...] = ()
+    signals: tuple[tuple[int, str], ...] = ()
 
 
 Records = tuple[DynamicsRecord, ...]
@@ -316,6 +318,7 @@ def record(
     places: Mapping[int, str] = NONE,
     unused: Mapping[str, str] = NONE,
     exchanged: str = "",
+    signals: Mapping[int, str] = NONE,
 ) -> Records:
     """Return a record from its symbols in one text, ``"TR KA TA"``; several are added."""
     made = DynamicsRecord(
@@ -331,6 +334,7 @@ def record(
         tuple(places.items()),
         tuple(unused.items()),
         tuple(exchanged.split()),
+        tuple(signals.items()),
     )
     return (made,)
 

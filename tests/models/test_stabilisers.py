@@ -69,8 +69,9 @@ def lively(model):
 
 def limits_of(values):
     """Return the floor and the ceiling of the output."""
-    high = next(values[name] for name in ("VSTMAX", "LSMAX", "HLIM") if name in values)
-    return values.get("VSTMIN", values.get("LSMIN", -high)), high
+    high = next(values[name] for name in ("VSTMAX", "LSMAX", "VSMAX", "HLIM") if name in values)
+    floors = [values[name] for name in ("VSTMIN", "LSMIN", "VSMIN") if name in values]
+    return (floors or [-high])[0], high
 
 
 def resting(model, p, u):
@@ -248,6 +249,11 @@ def pss5c(s, p):
     return [low * (band("VL") + band("L") + band("I")) + high * band("H")]
 
 
+def wsccst(s, p):
+    shaped = [lead(s, p[f"TPQ{k}"], p[f"TQ{k}"]) for k in (1, 2, 3)]
+    return [p["KQS"] / (1.0 + s * p["TQS"]) * washed(s, p["TQ"]) * np.prod(shaped)]
+
+
 FUNCTIONS = {
     "STAB1": stab1,
     "STAB2A": stab2a,
@@ -264,6 +270,7 @@ FUNCTIONS = {
     "PSS7C": pss7c,
     "IEEEST": ieeest,
     "ST2CUT": st2cut,
+    "WSCCST": wsccst,
 }
 
 

@@ -343,6 +343,7 @@ GAINS = {
     "PSS6C": ("KS",),
     "PSS7C": ("KS1",),
     "ST2CUT": ("K1", "K2"),
+    "WSCCST": ("KQS",),
     "STAB1": ("K_T",),
     "STAB2A": ("K5",),
 }

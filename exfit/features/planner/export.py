@@ -17,7 +17,6 @@ from exfit.features.planner.records import (
     PSSE,
     RATING,
     SHARE,
-    SIGNALS,
     SPEED_FLAG,
     WIDTH,
     Definition,
@@ -44,7 +43,6 @@ from exfit.util.text import near, show
 from exfit.util.vocabulary import NOT_STATED, TYPICAL, by_source
 
 NAME = re.compile(r"[A-Za-z_][\w.]*")  # in a tie
-CODES = {signal: code for code, signal in SIGNALS.items()}
 
 Content = Mapping[str, Any]  # of a case
 
@@ -283,8 +281,10 @@ def _added(
         return
     own = getattr(definition.model, "inputs", ())
     inputs = stabiliser_inputs(result.case_text, result.case) or own
-    codes = dict(zip(definition.codes, map(CODES.__getitem__, inputs), strict=False))
-    if not codes and inputs != own:
+    of_signals = {signal: code for code, signal in definition.signals.items()}
+    named = zip(definition.codes, map(of_signals.get, inputs), strict=False)
+    codes = {symbol: code for symbol, code in named if code is not None}
+    if len(codes) < len(inputs) and inputs != own:
         text = f"{name} has no codes of its inputs: {', '.join(inputs)} is lost"
         warnings.append(text)
     yield replace(record, values={**record.values, **codes})

@@ -29,7 +29,7 @@ RATING, SHARE = "Trate", "Trate_Mbase"  # of a turbine: MW, and over the machine
 SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
 FLAGS = ("OEL", "UEL")  # of the places where limiters act
 LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
-SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
+SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the usual code of an input
 OF_SATURATION = ("E1", "SE1", "E2", "SE2")
 LEAST_DIGITS = 4  # of a fitted value: with fewer, values that depend on each other miss the record
 WIDTH = 80  # columns of a file
@@ -76,6 +76,11 @@ class Definition:
     def codes(self) -> tuple[str, ...]:
         """The integers that say which signals the inputs of a stabiliser are."""
         return tuple(name for name, _ in self.record.icons if name.startswith("ICS"))
+
+    @property
+    def signals(self) -> Mapping[int, str]:
+        """The signals that these integers stand for."""
+        return dict(self.record.signals) or SIGNALS
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -252,7 +257,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         ),
     ]
     codes = [(given.get(name, icons[name]), icons[name]) for name in definition.codes]
-    inputs = tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
+    signals = definition.signals
+    inputs = tuple(signals.get(int(code), signals[usual]) for code, usual in codes)
     if given.get(RATING, 0.0) != 0.0:
         unused[RATING] = given[RATING]
     times_speed = record.times_speed or given.get(SPEED_FLAG, 0.0) != 0.0
@@ -331,7 +337,7 @@ def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Texts:
     explained = {*record.ignored, *(row.symbol for row in definition.model.sheet)}
     for name, modelled in (*record.icons, *record.absent):
         value = given.get(name, modelled)
-        known = name in definition.codes and value in SIGNALS
+        known = name in definition.codes and value in definition.signals
         known = known or (name in FLAGS and value in dict(record.places))
         known = known or (name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH)
         if not known and value != modelled and name not in explained:

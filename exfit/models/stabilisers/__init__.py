@@ -5,5 +5,5 @@ FAMILIES = {  # files that hold several models; any other is named after its own
     "pss3": "PSS3B PSS3C",
     "pss4": "PSS4B PSS4C",
     "canonical": "PSS6C PSS7C",
-    "of_programs": "IEEEST ST2CUT STAB1 STAB2A",
+    "of_programs": "IEEEST ST2CUT STAB1 STAB2A WSCCST",
 }

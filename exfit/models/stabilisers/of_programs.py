@@ -1,4 +1,4 @@
-"""Stabilisers of planning programs: IEEEST, ST2CUT, STAB1 and STAB2A."""
+"""Stabilisers of planning programs: IEEEST, ST2CUT, STAB1, STAB2A and WSCCST."""
 
 from exfit.models.blocks import (
     SHORTEST,
@@ -21,10 +21,14 @@ from exfit.models.sheet import (
     WITHIN_1000,
     WITHIN_10000,
     documented,
+    limits,
     record,
     sheet,
 )
 from exfit.models.stabiliser_parts import SPEED_AND_POWER, of_stabiliser
+
+# of WSCCST: constants that PSLF reads and does not use
+NOT_USED = "T1 T2 T3 KBOOST DW1 DW2 DDWT TDELAY T4"
 
 
 def numerator(d: Signal, p: Signal) -> Signal:
@@ -243,5 +247,65 @@ STAB2A = documented(
     inputs="p",
     records=record(
         "STAB2A", "K2 T2 K3 T3 K4 K5 T5 HLIM", doubt="its order is from one public source"
+    ),
+)
+
+
+def wsccst(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """WSCCST: single input stabiliser with three lead-lags (PSLF).
+
+    vsi1 ─►[  KQS   ]─►[  sTQ  ]─►[1+sTPQ1]─►[1+sTPQ2]─►[1+sTPQ3]─►[clip]─► vs
+           [1 + sTQS]  [1 + sTQ]  [1+sTQ1 ]  [1+sTQ2 ]  [1+sTQ3 ]
+                                                             VSMAX, VSMIN
+
+    The lists of PowerWorld and of a writer of PSLF files name each of these blocks,
+    so that what can differ is their order, which only matters at the limits. VSMIN
+    is Vslow there. TQS, TQ1, TQ2 or TQ3 = 0 bypasses its block. Not modelled, since
+    the lists do not say how they act: the signal of the voltage (KQV), the cut-off
+    (Vcutoff) and the boost (Sw1); a file that uses them is warned about. Typical
+    data are those of a hydro plant in a public repository, with TQ1 = 0 for the
+    lead-lag that it does not use.
+    """
+    v1, d.V1 = lag(u.vsi1, s.V1, p.KQS, p.TQS)
+    v2, d.V2 = washout(v1, s.V2, p.TQ, p.TQ)
+    v3, d.V3 = lead_lag(v2, s.V3, p.TPQ1, p.TQ1)
+    v4, d.V4 = lead_lag(v3, s.V4, p.TPQ2, p.TQ2)
+    v5, d.V5 = lead_lag(v4, s.V5, p.TPQ3, p.TQ3)
+    return clip(v5, p.VSMIN, p.VSMAX)
+
+
+def wsccst_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is then 0."""
+    x.V1 = x.V2 = p.KQS * u.vsi1
+    x.V3 = x.V4 = x.V5 = 0.0
+
+
+WSCCST = documented(
+    wsccst,
+    wsccst_rest,
+    sheet(
+        ("KQS", 6.0, *WITHIN_10000, "gain"),
+        ("TQS", 0.05, *TIME, "transducer lag"),
+        ("TQ", 27.0, *WASHOUT_TIME, "washout time constant"),
+        ("TQ1", 0.0, *TIME, "first lag"),
+        ("TPQ1", 0.0, *TIME, "first lead"),
+        ("TQ2", 0.033, *TIME, "second lag"),
+        ("TPQ2", 0.208, *TIME, "second lead"),
+        ("TQ3", 0.033, *TIME, "third lag"),
+        ("TPQ3", 0.208, *TIME, "third lead"),
+        *limits("VSMAX", 0.07, -0.07, "the output"),
+    ),
+    "V1 V2 V3 V4 V5",
+    inputs="speed",
+    doubt="rests on two lists of parameters; its diagram was not seen",
+    pslf_records=record(
+        "wsccst",
+        "ICS KQV TQV KQS TQS TQ TQ1 TPQ1 TQ2 TPQ2 TQ3 TPQ3 VSMAX VCUTOFF VSMIN "
+        f"{NOT_USED} SW1 TD1 TD2 VTL VK",
+        icons={"ICS": 1},
+        absent={"KQV": 0.0, "VCUTOFF": 0.0, "SW1": 0.0},
+        ignored=f"TQV {NOT_USED} TD1 TD2 VTL VK",
+        spelled={"ICS": "j", "VSMIN": "vslow"},
+        signals={1: "speed", 2: "pa"},
     ),
 )
