@@ -281,9 +281,7 @@ def _added(
         return
     own = getattr(definition.model, "inputs", ())
     inputs = stabiliser_inputs(result.case_text, result.case) or own
-    of_signals = {signal: code for code, signal in definition.signals.items()}
-    named = zip(definition.codes, map(of_signals.get, inputs), strict=False)
-    codes = {symbol: code for symbol, code in named if code is not None}
+    codes = definition.codes_for(inputs)
     if len(codes) < len(inputs) and inputs != own:
         text = f"{name} has no codes of its inputs: {', '.join(inputs)} is lost"
         warnings.append(text)

@@ -82,6 +82,12 @@ class Definition:
         """The signals that these integers stand for."""
         return dict(self.record.signals) or SIGNALS
 
+    def codes_for(self, inputs: Iterable[str]) -> dict[str, int]:
+        """Return these integers for the signals that have one."""
+        of_signals = {signal: code for code, signal in self.signals.items()}
+        named = zip(self.codes, map(of_signals.get, inputs), strict=False)
+        return {symbol: code for symbol, code in named if code is not None}
+
     @property
     def absent(self) -> tuple[str, ...]:
         """The parameters of the model that the record neither lists nor holds at a value."""
