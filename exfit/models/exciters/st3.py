@@ -20,6 +20,7 @@ from exfit.models.sheet import (
     AS_IN_PSSE,
     FREE,
     GAIN,
+    OF_A_LIST,
     OF_TWO_PROGRAMS,
     documented,
     limits,
@@ -98,6 +99,16 @@ ST3A = documented(
         "VMMIN",
         spelled={"THETAP": "angp"},
         doubt=AS_IN_PSSE,
+    )
+    + record(
+        "exst3a",
+        "TR VIMAX VIMIN KA TC TB KM TM VMMAX VMMIN KG KP KI VBMAX KC XL VGMAX THETAP",
+        held={"TA": 0.0, "VRMAX": 9999.0, "VRMIN": -9999.0},
+        spelled=(
+            {"KA": "kj", "KM": "ka", "TM": "ta", "VMMAX": "vrmax", "VMMIN": "vrmin"}
+            | {"THETAP": "angp"}
+        ),
+        doubt=OF_A_LIST,
     ),
 )
 
