@@ -114,7 +114,7 @@ def machine_current(
     ``load`` has the rows of the load and of what is behind it, None where the source is the far
     bus itself; ``far`` is the voltage of that bus at the start.
     """
-    stator, fault = Matrix(0.0, -at.xq, at.xd, 0.0), complex_number(line.G, line.B)
+    stator, fault = Matrix(at.ra, -at.xq, at.xd, at.ra), complex_number(line.G, line.B)
     kept = IDENTITY.plus(stator.times(fault)).inverse
     inner, source = kept.of(at.voltage), Axes(E * sin(delta), E * cos(delta))
     towards = kept.times(stator).plus(complex_number(line.R, line.X)).inverse

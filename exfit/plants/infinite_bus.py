@@ -44,6 +44,7 @@ FLOW: Sheet = sheet(
     ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
     ("R", 0.0, *UP_TO_10, "resistance to the source"),
     ("X", 0.3, *UP_TO_10, "reactance to the source"),
+    ("Ra", 0.0, *UP_TO_10, "resistance of the stator"),
     ("Rc", 0.0, *WITHIN_10, "resistance of the load compensation"),
     ("Xc", 0.0, *WITHIN_10, "reactance of the load compensation"),
     ("P", 0.8, *WITHIN_10, "active power at the start"),
@@ -139,7 +140,7 @@ def infinite_bus(
         if breaker is not None:
             dw = breaker.dw
             factor = 1.0 if dialect == "powerworld" else breaker.factor  # which the source has
-        at = unit.source(fluxes, dw, of_machine)
+        at = unit.source(fluxes, dw, of_machine)._replace(ra=n.Ra)
         if meshed:
             line = FaultedLine(R, X, changed.fault_G, changed.fault_B)
             drawing = Names(**{**unloaded, **vars(n)}) if load else None

@@ -1,5 +1,8 @@
 """A machine on load: at rest, behind an impedance to a voltage, and with a breaker that opens.
 
+The resistance Ra of its stator is one of the network to the equations of the machine: they have the
+voltage behind it. What leaves the terminals is less by its losses, which the turbine gives.
+
 A stator whose breaker has opened has no current, and its voltage follows the speed. On load the
 equations neglect speed in the stator's voltages, as PSS/E does. From rest at rated speed nothing is
 lost by that, as the source keeps the speed; and when the breaker opens the speed is still 1, so
@@ -38,6 +41,15 @@ class Stator(NamedTuple):
     delta: Signal
 
 
+def behind_resistance(vt: Signal, at: Flow, Ra: Signal) -> tuple[Signal, Flow]:
+    """Return the voltage behind the stator's resistance, and the flow with it as the real axis."""
+    x, y = vt + Ra * at.i_p, -Ra * at.i_q
+    size = modulus(x, y)
+    c, s = x / size, y / size
+    i_p, i_q = c * at.i_p - s * at.i_q, c * at.i_q + s * at.i_p
+    return size, Flow(i_p, i_q, c * at.ex + s * at.ey, c * at.ey - s * at.ex)
+
+
 def behind(vt: Signal, p: Signal, q: Signal, R: Signal, X: Signal) -> Flow:
     """Return the terminals at vt, p and q, and the source that holds them behind R + jX."""
     i_p, i_q = p / vt, q / vt
@@ -74,24 +86,38 @@ class LoadedMachine(NamedTuple):
     ifd: Signal
 
 
-def loaded_at_rest(vt: Signal, at: Flow, machine: Machine, p: Names) -> LoadedMachine:
+def loaded_at_rest(
+    vt: Signal, at: Flow, machine: Machine, p: Names, Ra: Signal = 0.0
+) -> LoadedMachine:
     """Rest of the machine that holds vt and a current; efd is then its field current."""
-    stator, fluxes = rotor_frame(vt, at, machine, p), Names()
+    stator, fluxes = rotor_frame(*behind_resistance(vt, at, Ra), machine, p), Names()
     machine.rest(stator.v, stator.i, p, fluxes)
-    return LoadedMachine(stator, fluxes, machine.field(fluxes, stator.i, p))
+    ifd = machine.field(fluxes, stator.i, p)
+    return LoadedMachine(stator._replace(v=terminals(stator.v, stator.i, Ra)), fluxes, ifd)
+
+
+def terminals(v: Axes, i: Axes, Ra: Signal) -> Axes:
+    """Return the voltage of the terminals from the one behind the stator's resistance."""
+    return Axes(v.d - Ra * i.d, v.q - Ra * i.q)
+
+
+def losses(i: Axes, Ra: Signal) -> Signal:
+    """Return the losses in the stator's resistance."""
+    return Ra * (i.d * i.d + i.q * i.q)
 
 
 def current(at: Source, E: Signal, R: Signal, X: Signal, delta: Signal) -> Axes:
     """Current of a machine into E behind R + jX."""
     drop_d, drop_q = at.voltage.d - E * sin(delta), at.voltage.q - E * cos(delta)
-    xd, xq = at.xd + X, at.xq + X
+    xd, xq, R = at.xd + X, at.xq + X, at.ra + R
     scale = 1.0 / (R * R + xd * xq)
     return Axes((R * drop_d + xq * drop_q) * scale, (R * drop_q - xd * drop_d) * scale)
 
 
 def voltage(at: Source, i: Axes, factor: Signal = 1.0) -> Axes:
     """Return the voltage of a machine at a current, times a factor of its speed."""
-    return Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
+    d, q = at.voltage.d + at.xq * i.q, at.voltage.q - at.xd * i.d
+    return terminals(Axes(factor * d, factor * q), i, at.ra)
 
 
 def compensated(v: Axes, i: Axes, n: Names) -> Signal:

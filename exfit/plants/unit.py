@@ -10,7 +10,7 @@ from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, STABILISER, Dialect, SaturationForm, Stabilised
 from exfit.plants.controls import listening
 from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
-from exfit.plants.loaded_machine import Flow, Terminals, compensated, loaded_at_rest
+from exfit.plants.loaded_machine import Flow, Terminals, compensated, loaded_at_rest, losses
 from exfit.plants.parts import (
     Names,
     Part,
@@ -115,10 +115,10 @@ def unit_at_rest(
 ) -> Rest:
     """Return the unit at rest at vt and a power, with the current and the source of ``at``.
 
-    Of the ``network`` Rc and Xc compensate the load.
+    Of the ``network`` Rc and Xc compensate the load, and Ra is that of the stator.
     """
     of_machine = named_parameters(p, MACHINE, unit.machine.sheet)
-    stator, fluxes, ifd = loaded_at_rest(vt, at, unit.machine, of_machine)
+    stator, fluxes, ifd = loaded_at_rest(vt, at, unit.machine, of_machine, network.Ra)
     vc1 = compensated(stator.v, stator.i, network)
     u = exciter_inputs(vt=vt, vc1=vc1, ifd=ifd, p=power, q=vt * at.i_q)
     exciter = rest_of(unit.exciter, ifd, u, exciter_parameters(p, unit.exciter, unit.saturation))
@@ -127,9 +127,10 @@ def unit_at_rest(
     if unit.stabiliser is not None:
         heard = listening(unit.stabiliser, Names(speed=0.0, p=power, vt=vt, pa=0.0, none=0.0))
         states |= states_at_rest(STABILISER, unit.stabiliser.model, 0.0, heard, p)[1]
-    held = {"Pm": power}
+    mechanical = power + losses(stator.i, network.Ra)
+    held = {"Pm": mechanical}
     if unit.governor is not None:
-        pref, found = states_at_rest(GOVERNOR, unit.governor, power, Names(dw=0.0, p=power), p)
+        pref, found = states_at_rest(GOVERNOR, unit.governor, mechanical, Names(dw=0.0, p=power), p)
         kept = [GOVERNOR + name for name in unit.governor.setpoints]
         held = {REFERENCE: pref, **{name: found.pop(name) for name in kept}}
         states |= found
@@ -148,19 +149,21 @@ def unit_motion(
     """Write the slopes of a unit's states but delta into ``d``, and return what it shows.
 
     ``state`` holds its states, and the setpoints that held it at rest. The speed follows from
-    2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power; in ANDES Pm is a torque, not divided,
-    and in PowerWorld, where the stator's voltage follows the speed, Te is the power by the speed.
+    2H d(dw)/dt = (Pm - D dw) / (1 + dw) - Te, Te the power of the air gap, which has the losses of
+    the stator; in ANDES Pm is a torque, not divided, and in PowerWorld, where the stator's voltage
+    follows the speed, Te is that power by the speed.
     """
     of_machine = named_parameters(p, MACHINE, unit.machine.sheet)
     ifd = unit.machine.field(at.fluxes, at.i, of_machine)
     power, vt, vs = at.p, at.vt, controls.vs
+    braking = power + losses(at.i, network.Ra)
     if unit.governor is None:
         Pm = state["Pm"]
     else:
         seen = Names(dw=at.dw, p=power, pref=state[REFERENCE] + controls.pref)
         Pm = output_of(GOVERNOR, unit.governor, seen, p, state, d)
     if unit.stabiliser is not None:
-        heard = Names(speed=at.dw, p=power, vt=vt, pa=Pm - power, none=0.0)
+        heard = Names(speed=at.dw, p=power, vt=vt, pa=Pm - braking, none=0.0)
         seen = listening(unit.stabiliser, heard)
         vs = vs + output_of(STABILISER, unit.stabiliser.model, seen, p, state, d)
     vc1 = compensated(at.v, at.i, network)
@@ -169,7 +172,7 @@ def unit_motion(
     efd, signals = limited_exciter(unit.exciter, unit.saturation, unit.limiters, u, p, state, d)
     unit.machine.slopes(at.fluxes, efd, ifd, at.i, of_machine, d)
     unit.machine.q_slopes(at.fluxes, at.i, of_machine, d)
-    driving, braking = Pm - of_machine.D * state["dw"], power
+    driving = Pm - of_machine.D * state["dw"]
     if unit.dialect != "andes":
         driving = driving / (1.0 + state["dw"])
     if unit.dialect == "powerworld":

@@ -103,7 +103,7 @@ def in_a_dip(name):
     """Return the differences of a unit whose source dips, and the reference's columns."""
     told, columns = read(f"andes_load_{name}")
     unit, values = unit_of(told)
-    network = {"Rc": 0.0, "Xc": 0.0} | told["network"]
+    network = {"Ra": 0.0, "Rc": 0.0, "Xc": 0.0} | told["network"]
     values |= {VT0: network.pop("vt0")}
     values |= {NETWORK + symbol: value for symbol, value in network.items()}
     system = infinite_bus(
@@ -141,7 +141,7 @@ def played_back(name, every=1):
     columns = {signal: column[::every] for signal, column in columns.items()}
     unit, values = unit_of(told)
     f0 = told["network"]["f0"]
-    values |= {NETWORK + "f0": f0} | {NETWORK + key: 0.0 for key in ("R", "X", "Rc", "Xc")}
+    values |= {NETWORK + "f0": f0} | {NETWORK + key: 0.0 for key in ("R", "X", "Ra", "Rc", "Xc")}
     values |= {f"{signal}0": columns[signal][0] for signal in ("vt", "p", "q", "speed")}
     time, vt, angle = columns["t"], columns["vt"], columns["angle"]
     driving = {"vt": SplinedInput(time, vt - vt[0]), "angle": SplinedInput(time, angle - angle[0])}

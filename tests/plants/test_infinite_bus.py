@@ -19,7 +19,7 @@ from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import HEARD, MACHINE, NETWORK, STABILISER, VT0, Stabilised
-from exfit.plants.infinite_bus import infinite_bus
+from exfit.plants.infinite_bus import flow_sheet, infinite_bus
 from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
@@ -65,7 +65,7 @@ def test_a_step_on_load_is_that_of_another_simulator(name, power, dialect, angle
     with (REFERENCE / f"andes_ac8b_{name}_smib.csv").open() as file:
         header, *rows = csv.reader(file)
     columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
-    network = {"f0": 60.0, "R": 0.0, "X": 0.3, "Rc": 0.0, "Xc": 0.0, "P": power, "E": 1.0}
+    network = typical(flow_sheet("E")) | {"P": power}
     values = {**OF_EXCITER[name], **UNLIMITED, VT0: 1.0}
     values |= {MACHINE + symbol: value for symbol, value in OF_MACHINE.items()}
     values |= {NETWORK + symbol: value for symbol, value in network.items()}
@@ -88,7 +88,7 @@ def test_a_step_on_load_is_that_of_another_simulator(name, power, dialect, angle
 @pytest.mark.parametrize("time", [0.0, 0.7])
 def test_a_round_rotor_without_a_winding_on_its_q_axis_is_a_salient_pole(time):
     """Xq = X'q, without saturation, whatever T'q0: rounding is all that differs."""
-    network = {"f0": 60.0, "R": 0.0, "X": 0.3, "Rc": 0.0, "Xc": 0.0, "P": 0.6, "E": 1.0}
+    network = typical(flow_sheet("E")) | {"P": 0.6}
     values = {**OF_EXCITER["ieee"], **UNLIMITED, VT0: 1.0}
     values |= {NETWORK + symbol: value for symbol, value in network.items()}
     own = {**OF_MACHINE, "Xpq": OF_MACHINE["Xq"], "Tpq0": time, "S10": 0.0, "S12": 0.0}
@@ -109,6 +109,38 @@ def test_a_round_rotor_without_a_winding_on_its_q_axis_is_a_salient_pole(time):
 def test_a_winding_needs_a_time_constant():
     faults = MACHINES["GENROU"].faults({**OF_MACHINE, "Tpq0": 0.0})
     assert [symbol for symbol, _ in faults] == ["Tpq0"]
+
+
+@pytest.mark.parametrize("dialect", ["standard", "powerworld", "andes"])
+def test_a_resistance_of_the_stator_is_one_of_the_line_whose_drop_is_compensated(machine, dialect):
+    """The flux, the torque and the speed do not know where it is; vt is compensated by as much."""
+    r, power, reactive, vt = 0.02, 0.8, 0.2, 1.02
+    inner = abs(vt + r * (power - 1j * reactive) / vt)
+    inside = {"network_Ra": r, "network_Rc": r, "network_Q": reactive}
+    outside = {
+        "network_R": 0.02 + r,
+        "network_P": power + r * (power**2 + reactive**2) / vt**2,
+        "network_Q": reactive,
+        "vt0": inner,
+    }
+    steps = (InputStep(0.3, 0.2, "X"), InputStep(0.5, JUMP, "angle"), InputStep(1.0, -0.1, "E"))
+    got = [
+        Simulator(
+            system(machine, exciter="SEXS", inputs=("vref", "E", "angle", "X"), dialect=dialect),
+            Inputs(0.0, CLOCK[-1], steps),
+            CLOCK,
+            1e-3,
+        )
+        .response(
+            values_on_load(machine, exciter="SEXS", **{"network_Rc": 0.0, "network_Xc": 0.0} | own)
+        )
+        .signals
+        for own in (inside, outside)
+    ]
+    for signal in ("efd", "ifd", "delta", "speed", "it"):
+        assert np.abs(got[0][signal] - got[1][signal]).max() < 1e-9, signal
+    lost = r * got[0]["it"] ** 2
+    assert np.abs(got[1]["p"] - got[0]["p"] - lost).max() < 1e-9
 
 
 # --- equations typed again ------------------------------------------------------------------------

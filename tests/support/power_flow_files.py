@@ -9,7 +9,7 @@ OF_THREE_WINDINGS = (
 )
 
 
-def power_flow(version=33, buses=(1, 9), cz=1, kv=KV, mva=MVA, named=True, own_x=0.0):
+def power_flow(version=33, buses=(1, 9), cz=1, kv=KV, mva=MVA, named=True, own_x=0.0, ra=0.0):
     """Return the text of a file: a machine 1 at each bus behind a transformer to bus 900.
 
     With ``own_x`` the machines have their transformer in their own rows, and there is no other.
@@ -23,7 +23,7 @@ def power_flow(version=33, buses=(1, 9), cz=1, kv=KV, mva=MVA, named=True, own_x
         ] + [f"900,'GRID / EAST ',{HIGH_KV},3,1,1,1,1.0,0.0"],
         "LOAD": ["900,'1 ',1,1,1,100.0,20.0,0,0,0,0,1,1,0"],
         "GENERATOR": [
-            f"{bus},'1 ',80.0,10.0,50.0,-50.0,1.01,0,{nreg}{mva:10.3f}, 0.0,0.2,0.0,{own_x},1.0,1"
+            f"{bus},'1 ',80.0,10.0,50.0,-50.0,1.01,0,{nreg}{mva:10.3f}, {ra},0.2,0.0,{own_x},1.0,1"
             for bus in buses
         ],
         "BRANCH": ["900,901,'1 ',0.01,0.1,0.0"],

@@ -71,7 +71,7 @@ class TwoBuses:
             governor=governor,
             dialect=dialect,
         )
-        network = {"f0": 60.0, "R": 0.0, "X": LINE, "Rc": 0.0, "Xc": 0.0, "P": P, "Q": Q}
+        network = {"f0": 60.0, "R": 0.0, "X": LINE, "Ra": 0.0, "Rc": 0.0, "Xc": 0.0, "P": P, "Q": Q}
         network |= {"Rs": 0.0, "Xs": SOURCE}
         if "load" in told:
             load = {"PL": LOAD[0], "QL": LOAD[1]}

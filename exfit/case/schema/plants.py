@@ -93,7 +93,7 @@ class InfiniteBus(WithMachine, WithNetwork):
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     network: Frozen[Number] = Field(
         description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
-        "at the start; Rc and Xc of the load compensation. PL, QL, IP, IQ, YP and YQ: a load at "
+        "at the start; Ra of the stator; Rc and Xc of the load compensation. PL, QL, IP, IQ, YP and YQ: a load at "
         "the far bus, where R and X end, of constant power, current and admittance, each at 1 pu "
         "of voltage; Rs and Xs from there to the source. pu on the base of the machine."
     )
@@ -109,8 +109,8 @@ class GridPlayback(WithMachine, WithNetwork):
     type: Literal["grid-playback"] = Field(description="Kind of plant.")
     network: Frozen[Number] = Field(
         description="f0 (Hz); R and X of the step-up transformer, where vt and its angle are "
-        "recorded on its other side; P and Q at the start where p or q is not recorded; Rc and Xc "
-        "of the load compensation; pu on the base of the machine."
+        "recorded on its other side; P and Q at the start where p or q is not recorded; Ra of "
+        "the stator; Rc and Xc of the load compensation; pu on the base of the machine."
     )
     dialect: Dialect = Field(default="standard", description=DIALECT)
     power_at: PowerAt = Field(
@@ -282,7 +282,7 @@ class OnLine(WithNetwork):
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     whole: ClassVar[WholePlant] = InfiniteBus
     network: Frozen[Number] = Field(
-        description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc, a load at "
+        description="As plant.network: f0, R and X to the source, P and Q or E, Ra, Rc, Xc, a load at "
         "the far bus."
     )
     dialect: Dialect = Field(default="standard", description=DIALECT)

@@ -37,6 +37,7 @@ TRANSFORMER: Sheet = sheet(
     ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
     ("R", 0.0, "pu", (0.0, 10.0), "resistance from the terminals to the recorded voltage"),
     ("X", 0.0, "pu", (0.0, 10.0), "reactance from the terminals to the recorded voltage"),
+    ("Ra", 0.0, "pu", (0.0, 10.0), "resistance of the stator"),
     ("Rc", 0.0, "pu", (-10.0, 10.0), "resistance of the load compensation"),
     ("Xc", 0.0, "pu", (-10.0, 10.0), "reactance of the load compensation"),
 )
@@ -111,7 +112,7 @@ def grid_playback(
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
         n = named_parameters(p, NETWORK, network)
         fluxes = values_named(x, machine.states)
-        at = unit.source(fluxes, x["dw"], of_machine)
+        at = unit.source(fluxes, x["dw"], of_machine)._replace(ra=n.Ra)
         recorded, delta = p[VT0] + u["vt"], x["delta"]
         delta = delta - u["angle"]
         i = current(at, recorded, n.R, n.X, delta)

@@ -56,7 +56,7 @@ class ImportPlan:
         files = (None,) if planned is None else (planned.raw, None)
         found = (self.power_flows.get(file, {}).get(key, NO_RATINGS) for file in files)
         ratings = given
-        for other in (*found, Ratings(unit.kv, unit.mva)):
+        for other in (*found, Ratings(unit.kv, unit.mva, ra=unit.ra)):
             ratings = ratings.over(other)
         return ratings
 
@@ -349,7 +349,7 @@ class CaseMaker:
                 raise ExfitError(units)
             unit = _unit_of(case, units, case.dyr)
             planner = unit_data(unit, relative(case.dyr, folder))
-            ratings = Ratings(unit.kv, unit.mva)
+            ratings = Ratings(unit.kv, unit.mva, ra=unit.ra)
             flow = {} if case.raw is None else self.power_flows[case.raw]
             if isinstance(flow, str):
                 raise ExfitError(flow)

@@ -21,7 +21,7 @@ BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
 TITLE_LINES = 3
 SBASE, REV, BASFRQ = 1, 2, 5  # fields of the first line
 BASKV = 2  # of a bus
-MBASE, XT = 8, 12  # of a generator; one later in version 35, which has NREG before them
+MBASE, ZR, XT = 8, 9, 12  # of a generator; one later in version 35, which has NREG before them
 WITH_NREG = 35
 THIRD_BUS, CZ, STAT = 2, 5, 11  # of a transformer
 ON_SYSTEM_BASE, ON_OWN_BASE = 1.0, 2.0  # CZ: of its reactance
@@ -99,14 +99,14 @@ def _ratings(
             faults.append(DynamicsFault(row.line, f"bus {bus}: not in the section of the buses"))
             continue
         mva = _number(row, MBASE + later, "MBASE", faults)
-        own = _number(row, XT + later, "XT", faults)
+        own, ra = (_number(row, at + later, name, faults) for at, name in ((XT, "XT"), (ZR, "ZR")))
         step_up = StepUp(own, None) if own > 0.0 else None
         beside = step_ups.get(bus, ())
         if step_up is None and at_bus[bus] == len(beside) == 1:
             step_up = StepUp(float(f"{beside[0].x * mva:.6g}"), beside[0].kv)
         kv, power, frequency = (value or None for value in (buses[bus].kv, mva, f0))
         key = UnitKey(int(bus), machine_id or "1")
-        ratings[key] = Ratings(kv, power, f0=frequency, step_up=step_up)
+        ratings[key] = Ratings(kv, power, f0=frequency, step_up=step_up, ra=ra)
     return ratings
 
 

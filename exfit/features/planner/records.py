@@ -25,6 +25,7 @@ from exfit.util.text import rounded, show, show_value
 PSSE, PSLF = "PSS/E", "PSLF"
 LIMITER = "limiter"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
+RESISTANCE = "RA"  # of the stator: it acts on load, where it is Ra of the network
 RATING, SHARE = "Trate", "Trate_Mbase"  # of a turbine: MW, and over the machine's base
 SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
 FLAGS = ("OEL", "UEL")  # of the places where limiters act
@@ -248,6 +249,11 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         *_unmodelled(definition, given),
         *_unusual(definition.model, values),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
+        *(
+            (name, f"{show(value)} acts on load: it is Ra of a network")
+            for name, value in given.items()
+            if name == RESISTANCE and value != 0.0
+        ),
         *(
             (
                 row.symbol,

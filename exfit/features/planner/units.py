@@ -13,6 +13,7 @@ from exfit.features.planner.psse import PSSE_FILES
 from exfit.features.planner.records import (
     FLAGS,
     LIMITER,
+    RESISTANCE,
     SHARE,
     FileFormat,
     Head,
@@ -59,8 +60,8 @@ def format_of(file: str | Path) -> FileFormat:
 class Unit:
     """A unit; ``warnings`` say, by line, what of the file its models do not represent.
 
-    ``unknown`` are the names of its records that exfit has no model of, which are left out; ``kv``
-    and ``mva`` are None where the file does not state them.
+    ``unknown`` are the names of its records that exfit has no model of, which are left out; ``kv``,
+    ``mva`` and ``ra``, of the stator, are None where the file does not state them.
     """
 
     bus: int
@@ -74,6 +75,7 @@ class Unit:
     unknown: tuple[str, ...] = ()
     kv: float | None = None
     mva: float | None = None
+    ra: float | None = None
 
     @property
     def added(self) -> tuple[Reading, ...]:
@@ -238,12 +240,14 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     return unit, []
 
 
-def _ratings(heads: Iterable[Head]) -> tuple[float | None, float | None]:
-    """Return the kV and the MVA that the record of the machine states."""
+def _ratings(heads: Iterable[Head]) -> tuple[float | None, float | None, float | None]:
+    """Return the kV, the MVA and the resistance that the record of the machine states."""
     for head in heads:
         if head.definition is not None and head.definition.kind == "machine":
-            return head.kv, head.base or None
-    return None, None
+            fields = dict(zip(head.definition.names, head.fields, strict=True))
+            ra = number(fields[RESISTANCE]) if RESISTANCE in fields else None
+            return head.kv, head.base or None, ra
+    return None, None, None
 
 
 def _parts(

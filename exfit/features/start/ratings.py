@@ -28,7 +28,7 @@ class StepUp(NamedTuple):
 
 @dataclass(frozen=True)
 class Ratings:
-    """What is known of a unit; None is not known."""
+    """What is known of a unit; None is not known. ``ra`` is the resistance of its stator, pu."""
 
     kv: float | None = None
     mva: float | None = None
@@ -36,6 +36,7 @@ class Ratings:
     angle_unit: str | None = None
     f0: float | None = None
     step_up: StepUp | None = None
+    ra: float | None = None
 
     def over(self, other: "Ratings") -> "Ratings":
         """Return these ratings, and those of another source where there is none."""
@@ -112,11 +113,14 @@ def answered(
             given[value] = answer
     draft = draft.filled(given)
     kind = KINDS.get(draft.kind_of_plant)
-    if ratings.step_up is None or kind is None or not kind.finds_rest:  # only events are behind one
+    if kind is None or not kind.on_load:
         return draft
-    plant = draft.sections["plant"]
-    x = Noted(ratings.step_up.x, "pu, the step-up transformer's: recorded behind it")
-    network = {**plant["network"], "X": x}
+    plant, known = draft.sections["plant"], dict[str, Noted]()
+    if ratings.step_up is not None and kind.finds_rest:  # only events are behind one
+        known["X"] = Noted(ratings.step_up.x, "pu, the step-up transformer's: recorded behind it")
+    if ratings.ra:
+        known["Ra"] = Noted(ratings.ra, "pu, the stator's")
+    network = {**plant["network"], **known}
     return replace(draft, sections={**draft.sections, "plant": {**plant, "network": network}})
 
 

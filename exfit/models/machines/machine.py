@@ -2,8 +2,8 @@
 
 Per unit as excitation studies have it: 1 pu of efd and of ifd gives 1 pu of terminal voltage on the
 air-gap line; power, current and reactances are on the machine's own base. The rotor's q axis leads
-its d axis. Neglected, as in PSS/E: armature resistance, the stator's own transients, and speed in
-the stator's voltages, until a breaker opens (`plants.loaded_machine`).
+its d axis. Neglected, as in PSS/E: the stator's own transients, and speed in the stator's voltages,
+until a breaker opens. The armature resistance is a part of the plant (`plants.loaded_machine`).
 
 A d axis has a field and a damper winding: T'd0 dE'q/dt = efd - ifd and T''d0 dpsi/dt = E'q - psi
 - (X'd - Xl) id; the voltage behind X'' is the subtransient flux, of which E'q and psi have shares
@@ -40,11 +40,15 @@ class Axes(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A machine as its stator sees it: a voltage behind a reactance on each axis."""
+    """A machine as its stator sees it: a voltage behind a reactance on each axis.
+
+    ``ra`` is the resistance of the stator, which the plant knows.
+    """
 
     voltage: Axes
     xd: Signal
     xq: Signal
+    ra: Signal = 0.0
 
 
 class Machine(NamedTuple):
@@ -150,7 +154,7 @@ def power_order(values: Mapping[str, float]) -> Faults:
         yield "S10", "0 lies on no exponential saturation curve; give both as 0, or neither"
 
 
-# how PSLF names them, and its armature resistance and compensation, which no machine here has
+# how PSLF names them; its armature resistance is the network's Ra, its compensation nothing here
 PSLF_NAMES = {
     **{"Tpd0": "tpdo", "Tppd0": "tppdo", "Tpq0": "tpqo", "Tppq0": "tppqo"},
     **{"Xd": "ld", "Xq": "lq", "Xpd": "lpd", "Xpq": "lpq", "Xppd": "lppd", "Xl": "ll"},
@@ -163,8 +167,8 @@ def pslf_record(name: str, cons: str) -> Records:
     return record(
         name,
         f"{cons} RA RCOMP XCOMP ACCEL",
-        absent={"RA": 0.0, "RCOMP": 0.0, "XCOMP": 0.0},
-        ignored="ACCEL",
+        absent={"RCOMP": 0.0, "XCOMP": 0.0},
+        ignored="RA ACCEL",
         spelled=PSLF_NAMES,
     )
 

@@ -33,7 +33,7 @@ OF_EXCITER = {
     "VFEMAX": 999.0, "VEMIN": 0.0, "KC": 0.55, "KD": 1.1, "KE": 1.0,
     "E1": 6.5, "SE1": 0.3, "E2": 9.0, "SE2": 3.0,
 }  # fmt: skip
-OF_TRANSFORMER = {"f0": 60.0, "R": 0.0, "X": 0.0, "Rc": 0.0, "Xc": 0.0}
+OF_TRANSFORMER = {"f0": 60.0, "R": 0.0, "X": 0.0, "Ra": 0.0, "Rc": 0.0, "Xc": 0.0}
 OF_GOVERNOR = {"R": 0.05, "VMAX": 1.2, "VMIN": 0.0, "T1": 0.4, "T2": 2.1, "T3": 7.0, "Dt": 0.0}
 STEP = 1e-3
 
@@ -207,6 +207,18 @@ def test_halving_the_step_cuts_the_error_of_a_playback_fourfold():
     runs = [response(made, inputs, time, values, step / 2**k)["p"] for k in range(4)]
     errors = [np.abs(run - runs[-1]).max() for run in runs[:2]]
     assert 3.5 < errors[0] / errors[1] < 5.5  # 4.2 against a run that is itself not exact
+
+
+def test_a_resistance_of_the_stator_is_one_of_the_transformer_whose_drop_is_compensated():
+    columns = recorded("playback_ac8b")
+    made = grid_playback(UnitOnLoad(MODELS["AC8B"], GENROU, QUADRATIC))
+    time, values = columns["t"], values_of(columns)
+    inside, outside = (
+        response(made, played(time, columns["vt"], columns["angle"]), time, values | of_network)
+        for of_network in ({"network.Ra": 0.01, "network.Rc": 0.01}, {"network.R": 0.01})
+    )
+    for signal in ("efd", "p", "q", "speed"):
+        assert np.abs(inside[signal] - outside[signal]).max() < 1e-9, signal
 
 
 def test_the_frequency_drives_as_the_angle_whose_slope_it_is():

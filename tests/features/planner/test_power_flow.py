@@ -101,6 +101,14 @@ def test_a_voltage_that_was_recorded_behind_the_transformer_has_its_reactance_an
     assert case.plant.network["X"] == pytest.approx(X, rel=1e-5)
 
 
+@pytest.mark.parametrize("version", [33, 35])
+def test_the_resistance_of_the_stator_is_that_of_the_power_flow_file(run, version):
+    event()
+    Path("net.raw").write_text(power_flow(version, ra=0.003))
+    network = load_case(imported(run, "--raw", "net.raw")).plant.network
+    assert network["Ra"] == 0.003
+
+
 def test_options_answer_what_they_name(run):
     event(angle="V Angle", frequency="")
     path = imported(run, "--kv", KV, "--mva", MVA, "--connection", "phase-to-ground",
@@ -183,9 +191,12 @@ def test_a_file_of_pslf_answers_kv_and_mva_itself(run):
 
     event()
     Path("records", "9_1.csv").rename(Path("records", "1_1.csv"))
-    Path("units.dyd").write_text(PSLF_UNIT)
+    text = PSLF_UNIT.replace("0.12 0.4 0.0", "0.12 0.4 0.004")
+    Path("units.dyd").write_text(text)
     ran = run("import", "--all", "units.dyd", "-o", "cases", "--records", "records")
     assert ran.code == 0, ran.err
     text = Path("cases", "bus-1-1.yaml").read_text()
     assert '"?"' not in text
-    assert yaml.safe_load(text)["record"]["phasors"]["kV"] == KV
+    content = yaml.safe_load(text)
+    assert content["record"]["phasors"]["kV"] == KV
+    assert content["plant"]["network"]["Ra"] == 0.004
