@@ -93,9 +93,10 @@ class InfiniteBus(WithMachine, WithNetwork):
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     network: Frozen[Number] = Field(
         description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
-        "at the start; Ra of the stator; Rc and Xc of the load compensation. PL, QL, IP, IQ, YP and YQ: a load at "
-        "the far bus, where R and X end, of constant power, current and admittance, each at 1 pu "
-        "of voltage; Rs and Xs from there to the source. pu on the base of the machine."
+        "at the start; Ra of the stator; Rc and Xc of the load compensation. PL, QL, IP, IQ, YP "
+        "and YQ: a load at the far bus, where R and X end, of constant power, current "
+        "and admittance, each at 1 pu of voltage; Rs and Xs from there to the source. pu on the "
+        "base of the machine."
     )
     dialect: Dialect = Field(default="standard", description=DIALECT)
 
@@ -282,8 +283,8 @@ class OnLine(WithNetwork):
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     whole: ClassVar[WholePlant] = InfiniteBus
     network: Frozen[Number] = Field(
-        description="As plant.network: f0, R and X to the source, P and Q or E, Ra, Rc, Xc, a load at "
-        "the far bus."
+        description="As plant.network: f0, R and X to the source, P and Q or E, Ra, Rc, Xc, a "
+        "load at the far bus."
     )
     dialect: Dialect = Field(default="standard", description=DIALECT)
     sources: Sources = STATED
