@@ -99,7 +99,8 @@ def _ratings(
             faults.append(DynamicsFault(row.line, f"bus {bus}: not in the section of the buses"))
             continue
         mva = _number(row, MBASE + later, "MBASE", faults)
-        own, ra = (_number(row, at + later, name, faults) for at, name in ((XT, "XT"), (ZR, "ZR")))
+        own = _number(row, XT + later, "XT", faults)
+        ra = _number(row, ZR + later, "ZR", faults)
         step_up = StepUp(own, None) if own > 0.0 else None
         beside = step_ups.get(bus, ())
         if step_up is None and at_bus[bus] == len(beside) == 1:

@@ -250,11 +250,6 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         *_unusual(definition.model, values),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
         *(
-            (name, f"{show(value)} acts on load: it is Ra of a network")
-            for name, value in given.items()
-            if name == RESISTANCE and value != 0.0
-        ),
-        *(
             (
                 row.symbol,
                 f"0 has no effect, since {row.search and row.search.needs} is 0; the typical value "
@@ -354,6 +349,8 @@ def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Texts:
         known = known or (name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH)
         if not known and value != modelled and name not in explained:
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
+    if given.get(RESISTANCE, 0.0) != 0.0:
+        yield RESISTANCE, f"{show(given[RESISTANCE])} acts on load: it is Ra of a network"
 
 
 def _without_effect(

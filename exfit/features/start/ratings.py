@@ -111,7 +111,11 @@ def answered(
             answer = _power(key.lower(), bases, inspections[0])
         if answer is not None:
             given[value] = answer
-    draft = draft.filled(given)
+    return _with_network(draft.filled(given), ratings)
+
+
+def _with_network(draft: CaseDraft, ratings: Ratings) -> CaseDraft:
+    """Fill in what ratings tell of the network of a machine on load."""
     kind = KINDS.get(draft.kind_of_plant)
     if kind is None or not kind.on_load:
         return draft
