@@ -36,7 +36,11 @@ def widened(values, exciter):
     """Return the limits among values that are some, a thousand times as wide."""
     rates = ("VRMAX", "VRMIN") if exciter in RHEOSTATS else ()
     limits = (name for name in values if re.search(r"(MAX|MIN)\d?$", name) and name not in rates)
-    return {name: WIDE * values[name] for name in limits if 0.0 < abs(values[name]) < NO_LIMIT}
+    acting = {name: values[name] for name in limits if 0.0 < abs(values[name]) < NO_LIMIT}
+    return {
+        name: limit / WIDE if limit > 0.0 and "MIN" in name else limit * WIDE
+        for name, limit in acting.items()
+    }
 
 
 def compared(name):

@@ -15,6 +15,7 @@ from places import REFERENCE
 
 from exfit.features.planner.units import read_unit
 from exfit.models import GOVERNORS
+from exfit.models.speed_multiplier import times_speed
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.unit import UnitOnLoad
@@ -63,8 +64,9 @@ class TwoBuses:
             governor = GOVERNORS[added["model"]]
             values |= prefixed(GOVERNOR, added["parameters"])
         dialect = "powerworld" if told["program"] == "PowerWorld" else "standard"
+        exciter = parts.exciter.definition.model.in_dialect(dialect)
         self.unit = UnitOnLoad(
-            parts.exciter.definition.model.in_dialect(dialect),
+            times_speed(exciter) if "efd_times_speed" in told else exciter,
             parts.machine.definition.model,
             SATURATION["quadratic"],
             stabiliser,
