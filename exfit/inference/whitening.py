@@ -13,6 +13,7 @@ Rows = NDArray[np.intp]
 ROWS_TOGETHER = 400  # that are whitened by one factor
 ROWS_BEFORE = 1200  # that tell what noise comes next: more add nothing, and cost their square
 ROWS_OF_A_PART = 200  # of a factor: its other half is zero
+ROUNDING = 1e-13  # of the largest response: less is none
 
 BIAS_KNOWN_TO = 0.12  # of itself, as the variance of noise by fourth differences of 720 samples
 
@@ -87,18 +88,43 @@ def whitening(noise: PropagatedNoise, order: Rows, scale: float) -> Whitening:
 
 
 def _parts(noise: PropagatedNoise, order: Rows, scale: float) -> Iterator[WhitenedRows]:
-    done = 0
-    while done < len(order):
-        first = max(done - ROWS_BEFORE, 0)
-        window = order[first : first + ROWS_BEFORE + ROWS_TOGETHER]
-        from scipy.linalg.lapack import dpotrf, dtrtri
+    from scipy.linalg.blas import dtrsm
+    from scipy.linalg.lapack import dpotrf, dtrtri
 
-        factor, _ = dpotrf(noise.covariance(window), lower=1, clean=1)
-        inverse, _ = dtrtri(factor, lower=1)
-        matrix = scale * np.asarray(inverse)
-        for row in range(done - first, len(window), ROWS_OF_A_PART):
-            rows = slice(row, min(row + ROWS_OF_A_PART, len(window)))
-            yield WhitenedRows(
-                window[rows], window[: rows.stop], np.ascontiguousarray(matrix[rows, : rows.stop])
-            )
-        done = first + len(window)
+    own, (carried, begun) = noise.own[order], _in_time(noise.carried, order)
+    covariance, first, done = np.empty((0, 0), order="F"), 0, 0
+    while done < len(order):
+        before, first = first, max(done - ROWS_BEFORE, 0)
+        kept, end = done - first, min(first + ROWS_BEFORE + ROWS_TOGETHER, len(order))
+        known = covariance[first - before :, first - before :]
+        covariance = np.zeros((end - first, end - first), order="F")  # its lower triangle
+        covariance[:kept, :kept] = known
+        sources = np.searchsorted(begun, end)
+        covariance[kept:] = carried[done:end, :sources] @ carried[first:end, :sources].T
+        new = np.arange(kept, end - first)
+        covariance[new, new] += own[done:end]
+        factor, _ = dpotrf(covariance, lower=1, clean=1)
+        # of its inverse the rows of the new errors
+        inverse, _ = dtrtri(factor[kept:, kept:], lower=1)
+        matrix = np.empty((end - done, end - first), order="F")
+        matrix[:, kept:] = inverse
+        matrix[:, :kept] = -inverse @ factor[kept:, :kept]
+        if kept:
+            matrix[:, :kept] = dtrsm(1.0, factor[:kept, :kept], matrix[:, :kept], side=1, lower=1)
+        for row in range(done, end, ROWS_OF_A_PART):
+            behind = min(row + ROWS_OF_A_PART, end)
+            part = scale * matrix[row - done : behind - done, : behind - first]
+            yield WhitenedRows(order[row:behind], order[first:behind], np.ascontiguousarray(part))
+        done = end
+
+
+def _in_time(carried: Array, order: Rows) -> tuple[Array, Rows]:
+    """Return what sources carry, errors by ``order`` and sources as they begin, and at which row.
+
+    So products leave out sources that have not begun.
+    """
+    carried = carried[order]
+    nothing = ROUNDING * max(np.max(carried, initial=0.0), -np.min(carried, initial=0.0))
+    begun = np.argmax((carried > nothing) | (carried < -nothing), axis=0)
+    in_turn = np.argsort(begun, kind="stable")
+    return carried[:, in_turn], begun[in_turn]

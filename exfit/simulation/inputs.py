@@ -155,23 +155,27 @@ class SplinedInput:
 
     def slope(self, times: Array) -> Array:
         """Slope at some instants (n,) between the first and last, per s."""
-        values: Array = self._polynomials.derivative()(times)
+        values: Array = self._slopes(times)
         return values
 
-    def slope_beside(self, times: Array, side: float) -> Array:
-        """Slope (n,) just after some instants (``side`` 1) or before them (-1), per s.
+    def between(self, times: Array) -> Array:
+        """Polynomials (n, 4) of the share that has passed of each interval between times (n + 1,).
 
-        Before the first sample and after the last it is zero.
+        They have its values and slopes at both ends; at a jump those on either side differ, and
+        before the first sample and after the last the slope is zero.
         """
-        place = np.searchsorted(self.time, times, side="right" if side > 0.0 else "left")
-        inside = (place > 0) & (place < len(self.time))
-        k = place.clip(1, len(self.time) - 1) - 1
-        derivative = self._polynomials.derivative()
-        away = times - self.time[k]
-        values = np.zeros(len(times))
-        for row in derivative.c:
-            values = values * away + row[k]
-        return np.where(inside, values, 0.0)
+        first, last = self.time[0], self.time[-1]
+        inside = times.clip(first, last)
+        values, slopes = self._polynomials(inside), self._slopes(inside)
+        before = slopes.copy()
+        for k in {row for jump in self.jumps for row in jump if row}:
+            away = self.time[k] - self.time[k - 1]
+            before[times == self.time[k]] = np.polyval(self._slopes.c[:, k - 1], away)
+        length, rise = np.diff(times), np.diff(values)
+        d0 = length * np.where((times >= first) & (times < last), slopes, 0.0)[:-1]
+        d1 = length * np.where((times > first) & (times <= last), before, 0.0)[1:]
+        polynomials = values[:-1], d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
+        return np.stack(polynomials, axis=1)
 
     @cached_property
     def _polynomials(self) -> Any:
@@ -187,6 +191,10 @@ class SplinedInput:
             first = after
         polynomials = PPoly(np.concatenate(parts, axis=1), self.time)
         return polynomials.antiderivative() if self.integrated else polynomials
+
+    @cached_property
+    def _slopes(self) -> Any:
+        return self._polynomials.derivative()
 
     def _line(self, after: int) -> Array:
         """Return the coefficients (4, 1) of the line from a sample to the next one."""

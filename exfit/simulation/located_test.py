@@ -192,14 +192,9 @@ def _share(change: InputStep, times: Array) -> Array:
 
 def _recorded(recorded: RecordedInput | SplinedInput, times: Array) -> Array:
     """Polynomials (n, 4) of a recorded input in intervals whose ends its samples are among."""
-    h = np.diff(times)
     if isinstance(recorded, SplinedInput):
-        a, b = recorded.at(times[:-1]), recorded.at(times[1:])
-        # the slopes within the intervals: at a jump those on either side differ
-        d0, d1 = (
-            h * recorded.slope_beside(t, m) for t, m in ((times[:-1], 1.0), (times[1:], -1.0))
-        )
-        return np.column_stack([a, d0, 3.0 * (b - a) - 2.0 * d0 - d1, 2.0 * (a - b) + d0 + d1])
+        return recorded.between(times)
+    h = np.diff(times)
     if median_step(recorded.time) < DENSEST * (1.0 - ON_GRID):
         part = GridSegment(float(times[0]), float(h.mean()), len(h))
         values = np.interp(times, part.times, recorded.on(part))
