@@ -22,9 +22,10 @@ from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
 DRAWN = 8  # times the starts that are taken
-MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did
+MERGED = 3.0  # standard errors: first legs that end so near go on as one; 480 linear ones did
 LINEAR_ITERATIONS = 40  # with 25 of them one start in fifty ends elsewhere
 COARSENESS = 5  # times the step: it moves minima by 0.2 standard errors at most in sample cases
+LOCATED_STEP = 0.01  # s: the least of a search where crossings of limits are located
 COARSE_ITERATIONS = 50  # where limits make the cost creep from kink to kink
 NEAR = 1e-3  # of the cost: what the next leg gains in an iteration or two
 NEAR_STEP = 1e-6  # units
@@ -45,11 +46,6 @@ class FurtherStarts:
     legs: tuple[Descent, ...]
     ways: tuple[Way, ...]
     why_direct: str
-
-    @property
-    def merged(self) -> float | None:
-        """Within how many standard errors the ends of linear phases go on as one."""
-        return None if self.why_direct else MERGED
 
     @property
     def first_legs(self) -> tuple[int, ...]:
@@ -129,8 +125,8 @@ def coarse_form(residuals: Residuals) -> Residuals:
     values, experiments = residuals.values(residuals.start), list[Experiment]()
     for experiment in residuals.experiments:
         own = experiment.simulator
-        # where crossings are located the own grid is as coarse as the search can use
-        coarse = own if own.located else own.remade(step=COARSENESS * own.step, least=1)
+        step = LOCATED_STEP if own.located else COARSENESS * own.step
+        coarse = own if step <= own.step else own.remade(step=step, least=1, rough=True)
         try:
             experiments.append(replace(experiment, simulator=coarse).with_enough_substeps(values))
         except SimulationError:

@@ -230,7 +230,8 @@ class CaseSearches:
 
     def further(self, earlier: Sequence[estimate.Result]) -> FurtherDescents:
         """Find the minima from further starts, beside earlier descents."""
-        from exfit.fitting.further_starts import further_starts  # which no local search needs
+        # which no local search needs
+        from exfit.fitting.further_starts import MERGED, further_starts
 
         counter = SimulationCounter()  # the sub-steps are those of a coarse grid
         starts = further_starts(self.problem, self.options.starts, counter)
@@ -238,7 +239,7 @@ class CaseSearches:
             starts.points,
             starts.legs,
             first_legs=starts.first_legs,
-            merged=starts.merged,
+            merged=MERGED,
             workers=self.residuals.threads,
             watch=self.progress,
             earlier=earlier,
