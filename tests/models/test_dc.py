@@ -16,10 +16,11 @@ from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 CONTINUOUS = ("DC1A", "DC2A", "DC1C", "DC2C", "IEEET1", "IEEEX1", "EXDC2")
-COMPUTING = (*CONTINUOUS, "IEEET2", "DC4B")  # where KE = 0 and VRMAX = 0 are computed
+BY_VR = ("IEEET2", "EXDC2A")  # whose rate feedback is taken from VR
+COMPUTING = (*CONTINUOUS, *BY_VR, "DC4B")  # where KE = 0 and VRMAX = 0 are computed
 GIVEN = ("DC3A", "DC4C")  # where they are as they are given
 ALL = (*COMPUTING, *GIVEN)
-BUS_FED = ("DC2A", "DC2C", "EXDC2", "DC4B", "DC4C")  # limits proportional to VT
+BUS_FED = ("DC2A", "DC2C", "EXDC2", "EXDC2A", "DC4B", "DC4C")  # limits proportional to VT
 NOT_NEGATIVE = ("DC1A", "DC2A")  # EFD >= 0
 TD0 = 6.0
 PLAIN = {"Tpd0": TD0, "S10": 0.0, "S12": 0.0}  # a machine that is a lag: vt = efd / (1 + s Td0)
@@ -88,9 +89,10 @@ def continuous_loop(p, vt0):
 
 
 def brushless_loop(p, vt0):
-    """Return vt / vref of IEEET2, whose rate feedback is taken from VR through two lags."""
+    """Return vt / vref with a rate feedback that is taken from VR through two lags."""
     feedback = washout(p["KF"], p["TF1"]) * lag(1.0, p["TF2"])
-    regulator = lag(p["KA"], p["TA"]).fed_back(feedback)
+    chain = lead_lag(p.get("TC", 0.0), p.get("TB", 0.0)) * lag(p["KA"], p["TA"])
+    regulator = chain.fed_back(feedback)
     forward = regulator * field_of(p, effective_KE(p, vt0), vt0)
     return (forward * lag(1.0, TD0)).fed_back(lag(1.0, p["TR"]))
 
@@ -129,7 +131,12 @@ def rheostat_loop(p, vt0):
     return forward.fed_back(lag(1.0, p["TR"]))
 
 
-LOOPS = {"IEEET2": brushless_loop, "DC4B": pid_loop, "DC4C": fed_pid_loop, "DC3A": rheostat_loop}
+LOOPS = {
+    **dict.fromkeys(BY_VR, brushless_loop),
+    "DC4B": pid_loop,
+    "DC4C": fed_pid_loop,
+    "DC3A": rheostat_loop,
+}
 
 
 @pytest.mark.parametrize("vt0", [0.9, 1.1])
@@ -140,7 +147,7 @@ def test_a_small_step_is_that_of_the_transfer_function(name, KE, vt0):
     if name in GIVEN and KE == 0.0:
         pytest.skip(f"{name} computes no KE")
     size = 1e-6
-    gain = {"KA": 25.0} if name in (*CONTINUOUS, "IEEET2") else {}
+    gain = {"KA": 25.0} if name in (*CONTINUOUS, *BY_VR) else {}
     loaded = {"KC1": 0.2, "VBMAX": 9.0} if name == "DC4C" else {}
     limits = {"VRMAX": 9.0, "VRMIN": -9.0} if name != "DC3A" else {}  # far away
     values = values_of(name, vt0, KE=KE, **gain, **loaded, **limits)
@@ -241,8 +248,7 @@ def test_values_that_are_given_are_kept(name):
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_start_beyond_the_ceiling_is_named(name):
-    limit = "VRMAX" if name in GIVEN else "VRMAX0"
-    with pytest.raises(SimulationError, match=f"above {limit} = 0.5"):
+    with pytest.raises(SimulationError, match=r"above VRMAX = 0\.5"):
         respond(name, values_of(name, KE=1.0, VRMAX=0.5), (0.1, 0.01))
 
 

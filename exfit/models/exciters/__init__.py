@@ -9,7 +9,7 @@ FAMILIES = {  # files that hold several models; any other is named after its own
     "ac6": "AC6A AC6C",
     "ac7": "AC7B AC7C",
     "ac8": "AC8B AC8C ESAC8B",
-    "dc1": "DC1A DC1C DC2A DC2C IEEET1 IEEEX1 EXDC2",
+    "dc1": "DC1A DC1C DC2A DC2C IEEET1 IEEEX1 EXDC2 EXDC2A",
     "dc4": "DC4B DC4C",
     "st1": "ST1A ST1C EXST1",
     "st2": "ST2A ST2C EXST2 IEEET3",

@@ -6,14 +6,18 @@ from exfit.models.blocks import (
     commutator_start,
     exciter,
     inf,
+    lag,
     larger,
     lead_lag,
     limited_lag,
+    washout,
 )
 from exfit.models.exciter_parts import error_less_feedback
 from exfit.models.sheet import (
+    LAG_OF_KF,
     OF_A_LIST,
     OF_TWO_PROGRAMS,
+    POSITIVE_TIME,
     Records,
     documented,
     record,
@@ -21,6 +25,7 @@ from exfit.models.sheet import (
     renamed,
     shared,
     sheet,
+    with_typical,
 )
 
 STATES, SETPOINTS = "VC VL VR EFD VF", "KE0 VRMAX0 VRMIN0"
@@ -354,4 +359,59 @@ EXDC2 = documented(
         doubt=OF_A_LIST,
     ),
     setpoints=SETPOINTS,
+)
+
+
+def exdc2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """EXDC2A: commutator exciter, bus-fed regulator with a feedback of its own (PSLF exdc2a).
+
+                                        VT VRMAX
+    vref + vs ─►(+)─►[1 + sTC]─►[  KA  ]──┬──►(+)─►[  1  ]─┬─► efd
+               -▲ ▲- [1 + sTB]  [1+sTA]   │   -▲   [ sTE ] │
+                │ │             VT VRMIN  │    └── VFE ◄───┘
+    vc1 ►[  1  ]┘ │                       │
+         [1+sTR]  └─[   1   ]◄─[  sKF  ]◄─┘
+                    [1 + sTF2] [1 + sTF1]
+
+    VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative. KE = 0
+    and VRMAX = 0 are computed at the start as for EXDC2; the values in use are the
+    setpoints KE0, VRMAX0, VRMIN0.
+
+    InterPSS writes this: EXDC2 with the rate feedback of VR, as in IEEET2. CIM's
+    ExcDC2A has one more block in the feedback, too, but PowerWorld says that with
+    TF2 = 0 it is EXDC2, whose feedback is of EFD: TF2 = 0 is refused. No curve
+    decides. InterPSS multiplies efd by the speed, which a case does with
+    efd_times_speed. Typical data are DC2A's but for KA, TA, KF, TF1 and TF2, which
+    are those of a record of InterPSS. Not modelled: UEL or OEL.
+    """
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - s.VF2, s.VL, p.TC, p.TB)
+    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, u.vt * s.VRMIN0, u.vt * s.VRMAX0)
+    vf, d.VF1 = washout(vr, s.VF1, p.KF, p.TF1)
+    _, d.VF2 = lag(vf, s.VF2, 1.0, p.TF2)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def exdc2a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vr = commutator_start(efd, p, x)
+    error = vr / p.KA
+    x.VC, x.VL, x.VR, x.EFD, x.VF1, x.VF2 = u.vc1, error, vr, efd, vr, 0.0
+    return u.vc1 + error - u.vs
+
+
+EXDC2A = documented(
+    exdc2a,
+    exdc2a_rest,
+    sheet(
+        *with_typical(renamed(DC2A.sheet, TF="TF1"), KA=40.0, TA=0.02, KF=0.03, TF1=1.0),
+        ("TF2", 0.25, *POSITIVE_TIME, "second stabilising feedback time constant", LAG_OF_KF),
+    ),
+    "VC VL VR EFD VF1 VF2",
+    pslf_records=record(
+        "exdc2a", "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2", doubt=OF_A_LIST
+    ),
+    setpoints=SETPOINTS,
+    doubt="rests on one public program, InterPSS; no other source says that VR is fed back",
 )
