@@ -348,7 +348,8 @@ def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Texts:
         known = known or (name in FLAGS and value in dict(record.places))
         known = known or (name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH)
         if not known and value != modelled and name not in explained:
-            yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
+            signal = f", {definition.signals[int(modelled)]}" if name in definition.codes else ""
+            yield name, f"{show(value)} is not modelled; {show(modelled)} is taken{signal}"
     if given.get(RESISTANCE, 0.0) != 0.0:
         yield RESISTANCE, f"{show(given[RESISTANCE])} acts on load: it is Ra of a network"
 

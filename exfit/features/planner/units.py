@@ -41,7 +41,7 @@ OTHERS: Mapping[str, str] = {
             WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
         "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PTIST1 PTIST3
             STAB3 STAB4 STABNI STBSVC""",
-        "excitation limiter": "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL4C UEL2",
+        "excitation limiter": "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1 OEL1B OEL4C UEL2",
         "compensator": "CCOMP COMP COMPCC IEEEVC REMCMP",
         "meter": "AMETA FMETA IMETR VMETA",
     }.items()

@@ -184,3 +184,17 @@ def test_the_suffix_says_the_program():
         read_unit("", "a.dyr")
     with pytest.raises(DynamicsError, match="no record of a unit: model, bus, name, kV"):
         read_unit("", "a.dyd")
+
+
+@pytest.mark.parametrize(
+    ("code", "signal", "says"),
+    [(1, "speed", ""), (2, "pa", ""), (3, "speed", "ICS: 3 is not modelled; 1 is taken, speed")],
+)
+def test_the_codes_of_wsccst_are_its_own(code, signal, says):
+    definition = DEFINITIONS["wsccst"]
+    text = record_text(definition, typical(definition.model.sheet) | {"ICS": code}, 1, "1")
+    _, read = read_back(text)
+    assert read.inputs == (signal,)
+    assert definition.codes_for(("p",)) == {}
+    assert definition.codes_for(read.inputs) == {"ICS": code if signal == "pa" else 1}
+    assert [warning.text for warning in read.warnings] == ([f"wsccst: {says}"] if says else [])
