@@ -35,9 +35,18 @@ CONNECTIONS, ANGLE_UNITS = ("phase-to-ground", "phase-to-phase"), ("deg", "rad")
 BUSES = click.IntRange(1, MOST_BUSES)
 
 
+def _number_or_name(
+    context: click.Context, option: click.Parameter, value: str | None
+) -> int | str | None:
+    """Return the number of a bus where the text is one."""
+    if value is not None and value.lstrip("-").isdecimal():
+        return int(BUSES.convert(int(value), option, context))
+    return value
+
+
 @click.command("import", short_help="Make cases from a planner's dynamics file.")
 @click.argument("dyr", type=GivenFile(Kind.DYNAMICS), metavar="UNIT")
-@click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
+@click.option("--bus", callback=_number_or_name, metavar="N|NAME", help="Bus of the unit.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
 @click.option("--all", "every", is_flag=True, help="Make a case of every unit, in the folder -o.")
 @click.option(
@@ -55,7 +64,7 @@ BUSES = click.IntRange(1, MOST_BUSES)
     "--raw",
     type=click.Path(path_type=Path, exists=True),
     metavar="FILE",
-    help="With --records: power flow file of PSS/E (.raw) with kV and MVA of the units.",
+    help="Power flow file of PSS/E (.raw) with names of buses, kV and MVA of the units.",
 )
 @click.option("--kv", type=ABOVE_ZERO, metavar="KV", help="With --records: rated voltage.")
 @click.option("--mva", type=ABOVE_ZERO, metavar="MVA", help="With --records: rated power.")
@@ -72,7 +81,7 @@ BUSES = click.IntRange(1, MOST_BUSES)
 @force_option
 def import_(
     dyr: Path,
-    bus: int | None,
+    bus: int | str | None,
     machine_id: str | None,
     every: bool,
     records: Path | None,
@@ -98,14 +107,11 @@ def import_(
     units, --bus and --id select one, and --all makes a case of each. With --records a case has the
     tests of its records, as `exfit new` makes it.
     """
-    from exfit.case.suggestion import relative
-    from exfit.features.planner.fields import located
     from exfit.features.planner.import_all import columns_by_signal, import_units
-    from exfit.features.planner.import_case import import_unit, imported_case
 
     in_table = (sizes, clock, unit, sheet, channels)
     ratings = (kv, mva, connection, angle_unit)
-    given = any((bases, raw, *ratings, *in_table))
+    given = any((bases, *ratings, *in_table))
     if every:
         if bus is not None or machine_id is not None:
             raise click.UsageError("--bus and --id: not allowed with --all.")
@@ -113,8 +119,8 @@ def import_(
             raise click.UsageError("Missing option '-o': the folder of the cases.")
         if records is None and given:
             raise click.UsageError(
-                "--step, --base, --time, --time-unit, --sheet, --channel, --raw and ratings: only "
-                "with --records."
+                "--step, --base, --time, --time-unit, --sheet, --channel and ratings: only with "
+                "--records."
             )
         if records is not None and not records.is_dir() and any(in_table):
             raise click.UsageError(
@@ -131,9 +137,32 @@ def import_(
             "--records, its options and ratings: only with --all; "
             "exfit new makes a case of one record."
         )
+    _import_one(dyr, bus, machine_id, raw, output, force)
+
+
+def _import_one(
+    dyr: Path,
+    bus: int | str | None,
+    machine_id: str | None,
+    raw: Path | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Write the case of one unit."""
+    from exfit.case.suggestion import relative
+    from exfit.features.planner.buses import NO_BUSES
+    from exfit.features.planner.fields import located
+    from exfit.features.planner.import_all import key_of
+    from exfit.features.planner.import_case import import_unit, imported_case
+    from exfit.features.planner.power_flow import read_buses, read_power_flow
+    from exfit.features.planner.units import with_rating
+    from exfit.features.start.ratings import NO_RATINGS
+
     if output is not None:
         refuse_existing(output, force)
-    imported = import_unit(dyr, bus, machine_id)
+    imported = import_unit(dyr, bus, machine_id, NO_BUSES if raw is None else read_buses(raw))
+    if raw is not None:
+        imported = with_rating(imported, read_power_flow(raw).get(key_of(imported), NO_RATINGS).mva)
     file = relative(dyr, Path() if output is None else output.parent)
     write_text(imported_case(imported, file).text, output, located(imported.warnings, str(dyr)))
     if output is not None:

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 from exfit.case.suggestion import Base, RecordSettings, bases_of, relative
 from exfit.errors import DynamicsError, ExfitError, FileError
+from exfit.features.planner.buses import NO_BUSES
 from exfit.features.planner.fields import located
 from exfit.features.planner.import_case import imported_case, unit_data, units_of_file
-from exfit.features.planner.power_flow import read_power_flow
-from exfit.features.planner.units import DynamicsUnits, RefusedUnit, Unit
+from exfit.features.planner.power_flow import read_buses, read_power_flow
+from exfit.features.planner.units import DynamicsUnits, RefusedUnit, Unit, with_rating
 from exfit.features.start.ratings import NO_RATINGS, Ratings
 from exfit.features.start.record_files import UnitKey, records_in, unit_named
 from exfit.features.start.starting_case import (
@@ -86,6 +87,7 @@ class ImportedUnit(NamedTuple):
     """A unit of the file and what became of it: a row of units.csv."""
 
     bus: int
+    name: str
     id: str
     line: int
     machine: str
@@ -119,7 +121,7 @@ def plan_import(dyr: Path, records: Path | None = None, raw: Path | None = None)
 
     Raises DynamicsError where the file cannot be read, ExfitError where the folder or table cannot.
     """
-    units = units_of_file(dyr)
+    units = units_of_file(dyr, NO_BUSES if raw is None else read_buses(raw))
     known = [key_of(unit) for unit in units.units]
     faults = located(units.faults, str(dyr))
     flows: dict[Path | None, Mapping[UnitKey, Ratings]] = {}
@@ -181,7 +183,7 @@ def import_units(
         connection: of their phasors: "phase-to-ground" or "phase-to-phase".
         angle_unit: of their phasors: "deg" or "rad".
         channels: columns of their records by signal: {"efd": "Field [V]"}.
-        raw: a power flow file of PSS/E (.raw) with ratings of the machines.
+        raw: a power flow file of PSS/E (.raw) with names of buses and ratings of the machines.
 
     Raises DynamicsError where the dynamics file cannot be read, ExfitError where records or options
     cannot be used. A unit that cannot be imported raises nothing: its ``status`` and ``notes`` say
@@ -210,6 +212,7 @@ def import_units(
     file = relative(plan.dyr, folder)
     for unit in plan.units.units:
         key, name = key_of(unit), plan.name_of(unit)
+        unit = with_rating(unit, plan.ratings_of(unit, options.ratings).mva)
         planned = plan.rows.get(key)
         files = plan.files.get(key, ()) if planned is None else tuple(planned.settings)
         notes = [f"line {fault.line}: {fault.text}" for fault in unit.warnings]
@@ -263,6 +266,7 @@ def _row(
     added = {part.definition.kind: part.definition.record.name for part in unit.added}
     return ImportedUnit(
         bus=unit.bus,
+        name=unit.bus_name,
         id=unit.id,
         line=unit.machine.line,
         machine=unit.machine.definition.record.name,
@@ -281,7 +285,8 @@ def _refused(unit: RefusedUnit) -> ImportedUnit:
     """Make the row of a unit that has no case."""
     status = REFUSED if unit.modelled else NO_MODEL
     text = "; ".join(f"line {fault.line}: {fault.text}" for fault in unit.faults)
-    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", "", "", status, "", "", text)
+    place = (unit.bus, unit.bus_name, unit.id, unit.line)
+    return ImportedUnit(*place, "", "", "", "", "", status, "", "", text)
 
 
 def _made(

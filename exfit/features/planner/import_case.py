@@ -11,6 +11,7 @@ from exfit.case.case_draft import (
     with_sources,
 )
 from exfit.errors import DynamicsError, ExfitError
+from exfit.features.planner.buses import NO_BUSES, Buses
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.records import PSSE, SPEED_FLAG, Reading
 from exfit.features.planner.units import DynamicsUnits, Unit, read_unit, read_units
@@ -23,14 +24,19 @@ LARGEST_FILE = 32_000_000  # bytes; that of a whole interconnection has fewer
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}
 
 
-def import_unit(path: Path, bus: int | None = None, machine_id: str | None = None) -> Unit:
+def import_unit(
+    path: Path,
+    bus: int | str | None = None,
+    machine_id: str | None = None,
+    buses: Buses = NO_BUSES,
+) -> Unit:
     """Read a unit of a file as ``read_unit`` does; raises DynamicsError."""
-    return read_unit(text_of(read_file(path), str(path)), str(path), bus, machine_id)
+    return read_unit(text_of(read_file(path), str(path)), str(path), bus, machine_id, buses)
 
 
-def units_of_file(path: Path) -> DynamicsUnits:
+def units_of_file(path: Path, buses: Buses = NO_BUSES) -> DynamicsUnits:
     """Read all units of a file; raises DynamicsError where it cannot be read."""
-    return read_units(text_of(read_file(path), str(path)), path)
+    return read_units(text_of(read_file(path), str(path)), path, buses)
 
 
 def read_file(path: Path) -> bytes:
@@ -74,7 +80,7 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
         "parameters": {"fixed": fixed, **values},
         "as_found": as_found(unit, file),
     }
-    heading = f"Unit {unit.id} at bus {unit.bus} of {Path(file).name}, on open circuit."
+    heading = f"Unit {unit.id} at bus {_bus_of(unit)} of {Path(file).name}, on open circuit."
     return CaseDraft(
         sections, (heading, *(f"Line {line}: {text}." for line, text in unit.warnings))
     )
@@ -121,6 +127,11 @@ def unit_data(unit: Unit, file: str) -> UnitData:
     return UnitData(exciter.model.name, exciter, machine, added, limiters, found)
 
 
+def _bus_of(unit: Unit) -> str:
+    """Return the number of the bus of a unit and, if it is known, its name."""
+    return in_comment(f"{unit.bus} {unit.bus_name}".strip())
+
+
 def as_found(unit: Unit, file: str) -> Section:
     """Make the section of what the file holds of the unit, for the report to compare with.
 
@@ -134,7 +145,7 @@ def as_found(unit: Unit, file: str) -> Section:
                 values[prefix + row.symbol] = part.values[row.symbol]
         unused |= {prefix + symbol: value for symbol, value in part.unused}
     name = in_comment(unit.id)
-    source = f"{Path(file).name}, bus {unit.bus}, machine {name}"
+    source = f"{Path(file).name}, bus {_bus_of(unit)}, machine {name}"
     return {
         "source": Noted(source, above="the model in the planner's base, for the report"),
         "bus": unit.bus,

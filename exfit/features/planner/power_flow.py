@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from exfit.errors import DynamicsError
+from exfit.features.planner.buses import Bus, Buses
 from exfit.features.planner.fields import DynamicsFault, Field, lines_of, located, number, text_of
 from exfit.features.planner.import_case import read_file
 from exfit.features.planner.psse import COMMENTS, read_line
@@ -45,17 +46,38 @@ def read_power_flow(path: Path) -> Mapping[UnitKey, Ratings]:
     Raises DynamicsError with all faults, each with its line, and for another version of the file.
     """
     faults = list[DynamicsFault]()
+    (base, version, f0), sections = _read(path, faults)
+    ratings = _ratings(sections, base, version, f0, faults)
+    if faults:
+        raise DynamicsError(located(faults, str(path)))
+    return ratings
+
+
+def read_buses(path: Path) -> Buses:
+    """Read the names and the kV of buses from a power flow file; raises as ``read_power_flow``."""
+    faults = list[DynamicsFault]()
+    _, sections = _read(path, faults)
+    buses = _buses(sections, faults)
+    if faults:
+        raise DynamicsError(located(faults, str(path)))
+    return {
+        int(number): Bus(bus.name, bus.kv or None)
+        for number, bus in buses.items()
+        if number.isdigit()
+    }
+
+
+def _read(
+    path: Path, faults: list[DynamicsFault]
+) -> tuple[tuple[float, float, float], dict[str, list[_Row]]]:
+    """Return the heading and the sections of a file, none where the heading has faults."""
     lines = [
         (place, line)
         for place, (_, line) in enumerate(lines_of(text_of(read_file(path), str(path))), start=1)
         if not line.lstrip().startswith(COMMENTS)
     ]
-    base, version, f0 = _heading(lines, faults)
-    if not faults:
-        ratings = _ratings(_sections(lines[TITLE_LINES:], int(version)), base, version, f0, faults)
-    if faults:
-        raise DynamicsError(located(faults, str(path)))
-    return ratings
+    heading = _heading(lines, faults)
+    return heading, {} if faults else _sections(lines[TITLE_LINES:], int(heading[1]))
 
 
 def _heading(
@@ -64,7 +86,7 @@ def _heading(
     """Return base, version and frequency of the first line; add what is wrong with them."""
     place, line = lines[0] if lines else (1, "")
     head = _Row(place, read_line(line, place, 0, True).fields)
-    for at, name in ((SBASE, "SBASE"), (REV, "REV"), (BASFRQ, "BASFRQ")):
+    for at, name in ((SBASE, "SBASE"), (REV, "REV")):
         if at >= len(head.fields):
             faults.append(DynamicsFault(head.line, f"{name}: missing"))
     base, version = _number(head, SBASE, "SBASE", faults), _number(head, REV, "REV", faults)
@@ -83,11 +105,7 @@ def _ratings(
     faults: list[DynamicsFault],
 ) -> dict[UnitKey, Ratings]:
     """Return the ratings of the machines of a file; add what is wrong with its rows."""
-    buses = {
-        row.fields[0].text: _Bus(row.fields[1].text, _number(row, BASKV, "BASKV", faults))
-        for row in sections.get("BUS", ())
-        if len(row.fields) > BASKV
-    }
+    buses = _buses(sections, faults)
     generators = [row for row in sections.get("GENERATOR", ()) if len(row.fields) > 1]
     at_bus = Counter(row.fields[0].text for row in generators)
     step_ups = _step_ups(sections.get("TRANSFORMER", ()), base, buses, faults)
@@ -109,6 +127,15 @@ def _ratings(
         key = UnitKey(int(bus), machine_id or "1")
         ratings[key] = Ratings(kv, power, f0=frequency, step_up=step_up, ra=ra)
     return ratings
+
+
+def _buses(sections: Mapping[str, Sequence[_Row]], faults: list[DynamicsFault]) -> dict[str, _Bus]:
+    """Return the buses by their numbers; add what is wrong with their rows."""
+    return {
+        row.fields[0].text: _Bus(row.fields[1].text, _number(row, BASKV, "BASKV", faults))
+        for row in sections.get("BUS", ())
+        if len(row.fields) > BASKV
+    }
 
 
 def _sections(lines: Sequence[tuple[int, str]], version: int) -> dict[str, list[_Row]]:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from itertools import zip_longest
 from typing import NamedTuple
 
+from exfit.features.planner.buses import NO_BUSES, Buses
 from exfit.features.planner.fields import DynamicsFault, Field, lines_of, number
 from exfit.features.planner.records import (
     PSLF,
@@ -47,7 +48,7 @@ class _LogicalLine(NamedTuple):
     unclosed: bool = False
 
 
-def heads(text: str) -> Heads:
+def heads(text: str, _: Buses = NO_BUSES) -> Heads:
     """Return the records of a file that belong to a unit."""
     faults: list[DynamicsFault] = []
     found: list[Head] = []
@@ -144,7 +145,7 @@ def _head_fault(record: _LogicalLine, name: str, definition: Definition | None) 
 
 def _head(definition: Definition | None, record: _LogicalLine) -> Head:
     """Return the head of a record with its values, in the order of its definition."""
-    name, bus, _, _, machine_id = (field.text for field in record.fields[:HEAD_FIELDS])
+    name, bus, bus_name, _, machine_id = (field.text for field in record.fields[:HEAD_FIELDS])
     base, given, faults = None, list[Field](), list[DynamicsFault]()
     for field in record.fields[HEAD_FIELDS:]:
         if field.quoted:
@@ -163,8 +164,10 @@ def _head(definition: Definition | None, record: _LogicalLine) -> Head:
     line, kv = record.number, None
     with suppress(ValueError):  # ! stands for what is not given
         kv = number(record.fields[HEAD_FIELDS - 2]) or None
-    found = tuple(faults)
-    return Head(int(bus), name.lower(), machine_id, line, values, definition, PSLF, base, found, kv)
+    found, label = tuple(faults), "" if bus_name == UNKNOWN else bus_name
+    return Head(
+        int(bus), name.lower(), machine_id, line, values, definition, PSLF, base, found, kv, label
+    )
 
 
 def _arranged(definition: Definition, line: int, fields: tuple[Field, ...]) -> Arranged:

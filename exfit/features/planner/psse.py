@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from exfit.case.case_draft import in_comment
+from exfit.features.planner.buses import NO_BUSES, Buses, numbers_of
 from exfit.features.planner.fields import DynamicsFault, Field, lines_of
 from exfit.features.planner.records import (
     PSSE,
@@ -102,7 +103,7 @@ def read_line(line: str, number: int, start: int, after_comma: bool) -> _Line:
     return _Line(tuple(fields), after_comma)
 
 
-def heads(text: str) -> Heads:
+def heads(text: str, buses: Buses = NO_BUSES) -> Heads:
     """Return the records of a file that belong to a unit."""
     records, faults = sound_records(text)
     found: list[Head] = []
@@ -113,15 +114,24 @@ def heads(text: str) -> Heads:
                 what = f"{show_value(begin)} is not bus, 'model' and id"
                 faults.append(DynamicsFault(line, what))
             continue  # of a line or a device: their records begin otherwise
-        bus, name, machine_id = (field.text for field in fields[:3])
-        wrong, definition = [*wrong_place(fields[0], machine_id)], definition_of(name)
+        place = _by_number(fields[0], buses)
+        bus, name, machine_id = place.text, fields[1].text, fields[2].text
+        wrong, definition = [*wrong_place(place, machine_id)], definition_of(name)
         if not wrong:
             own = name.upper() == "USRMDL" and fields[3:]  # a user's model has its own name
             label = in_comment(f"{name} {fields[3].text}" if own else name).upper()
-            found.append(Head(int(bus), label, machine_id, line, fields[3:], definition))
+            known = buses[int(bus)].name.strip() if int(bus) in buses else ""
+            head = Head(int(bus), label, machine_id, line, fields[3:], definition)
+            found.append(head._replace(bus_name=known))
         elif definition is not None:
             faults += [DynamicsFault(line, f"{name.upper()}: {what}") for what in wrong]
     return Heads(found, faults)
+
+
+def _by_number(field: Field, buses: Buses) -> Field:
+    """Return the field of a bus with its number, if it is the name of one alone."""
+    numbers = numbers_of(field.text, buses) if field.quoted else []
+    return field._replace(text=str(numbers[0]), quoted=False) if len(numbers) == 1 else field
 
 
 def record_text(

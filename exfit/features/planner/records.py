@@ -7,6 +7,7 @@ from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple, TypeVar
 
+from exfit.features.planner.buses import Buses
 from exfit.features.planner.fields import DynamicsFault, Field, number, whole
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
@@ -100,8 +101,8 @@ class Head(NamedTuple):
     """A record by what it begins with, and the fields behind.
 
     ``definition`` is what exfit has a model of, None if it has none; ``base`` the MVA or MW that
-    its values are on, and ``kv`` that of the bus, where the record says so; ``faults`` are those of
-    its fields.
+    its values are on, ``kv`` and ``bus_name`` those of the bus, where they are known; ``faults``
+    are those of its fields.
     """
 
     bus: int
@@ -114,6 +115,7 @@ class Head(NamedTuple):
     base: float | None = None
     faults: tuple[DynamicsFault, ...] = ()
     kv: float | None = None
+    bus_name: str = ""
 
 
 class Heads(NamedTuple):
@@ -127,7 +129,8 @@ class Heads(NamedTuple):
 class FileFormat:
     """The files of a program.
 
-    ``heads(text)`` are the records of a file; ``record_text(definition, values, bus, id)`` is one
+    ``heads(text, buses)`` are the records of a file, in which a bus may stand by the name that
+    ``buses`` give it; ``record_text(definition, values, bus, id)`` is one
     of them; ``comment`` begins a line that is none; ``begins`` says how a record begins.
     """
 
@@ -135,7 +138,7 @@ class FileFormat:
     suffix: str
     comment: str
     begins: str
-    heads: Callable[[str], Heads]
+    heads: Callable[[str, Buses], Heads]
     record_text: Callable[[Definition, Mapping[str, float], int, str], str]
 
 
@@ -143,7 +146,7 @@ def wrong_place(bus: Field, machine_id: str) -> Iterator[str]:
     """Refuse a field that is not the number of a bus, and a text that is no machine's id."""
     whole = not bus.quoted and bus.text.isascii() and bus.text.isdigit()
     if not whole or not 0 < int(bus.text[:LONGEST_BUS]) < MOST_BUSES:
-        advice = "; write the number in place of the name" if bus.quoted else ""
+        advice = "; write the number in place of the name, or give --raw" if bus.quoted else ""
         yield f"{show_value(bus.text)} is not the number of a bus{advice}"
     if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
         yield f"{show_value(machine_id)} is not a machine id of one or two characters"

@@ -7,12 +7,14 @@ from functools import cache
 from pathlib import Path
 
 from exfit.errors import DynamicsError
+from exfit.features.planner.buses import NO_BUSES, Bus, Buses, numbers_of
 from exfit.features.planner.fields import DynamicsFault, located, number
 from exfit.features.planner.pslf import PSLF_FILES
 from exfit.features.planner.psse import PSSE_FILES
 from exfit.features.planner.records import (
     FLAGS,
     LIMITER,
+    RATING,
     RESISTANCE,
     SHARE,
     FileFormat,
@@ -20,6 +22,7 @@ from exfit.features.planner.records import (
     Reading,
     definition_of,
     definitions,
+    outside,
     read_values,
 )
 from exfit.models.sheet import Model
@@ -61,7 +64,8 @@ class Unit:
     """A unit; ``warnings`` say, by line, what of the file its models do not represent.
 
     ``unknown`` are the names of its records that exfit has no model of, which are left out; ``kv``,
-    ``mva`` and ``ra``, of the stator, are None where the file does not state them.
+    ``mva`` and ``ra``, of the stator, are None, ``bus_name`` is "", where the file does not state
+    them.
     """
 
     bus: int
@@ -76,6 +80,7 @@ class Unit:
     kv: float | None = None
     mva: float | None = None
     ra: float | None = None
+    bus_name: str = ""
 
     @property
     def added(self) -> tuple[Reading, ...]:
@@ -97,6 +102,7 @@ class RefusedUnit:
     records: tuple[str, ...]
     modelled: bool
     faults: tuple[DynamicsFault, ...]
+    bus_name: str = ""
 
 
 @dataclass(frozen=True)
@@ -115,12 +121,13 @@ class DynamicsUnits:
     devices: Mapping[str, int] = field(default_factory=dict)
 
 
-def read_units(text: str, file: str | Path) -> DynamicsUnits:
+def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> DynamicsUnits:
     """Return every unit of a dynamics file, whose suffix gives the program.
 
-    What is wrong with one does not hinder the others.
+    What is wrong with one does not hinder the others. ``buses`` are those of a power flow file, for
+    files that have their names.
     """
-    heads, faults = format_of(file).heads(text)
+    heads, faults = format_of(file).heads(text, buses)
     units, refused, classical = list[Unit](), list[RefusedUnit](), 0
     devices = Counter[str]()
     for own in _by_unit(heads).values():
@@ -145,20 +152,27 @@ def read_units(text: str, file: str | Path) -> DynamicsUnits:
                 not missing
                 or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
                 tuple(sorted(wrong, key=lambda fault: fault.line)),
+                first.bus_name,
             )
         )
     return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical, devices)
 
 
-def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | None = None) -> Unit:
-    """Return a unit of a dynamics file: the only one, or that of a bus and a machine id.
+def read_unit(
+    text: str,
+    file: str,
+    bus: int | str | None = None,
+    machine_id: str | None = None,
+    buses: Buses = NO_BUSES,
+) -> Unit:
+    """Return a unit of a dynamics file: the only one, or that of a bus, or its name, and an id.
 
     Records that cannot be read are warnings if the unit is whole without them. Raises DynamicsError
     with all faults, each as ``file:line: what is wrong``, and where the unit is not in the file, is
     not the only one, or has no machine or exciter that exfit knows.
     """
     files = format_of(file)
-    heads, unread = files.heads(text)
+    heads, unread = files.heads(text, buses)
     if not heads:
         none = f"{file}: has no record of a unit: {files.begins}"
         raise DynamicsError([*located(unread, file), none])
@@ -184,14 +198,21 @@ def _by_unit(heads: Iterable[Head]) -> dict[tuple[int, str], list[Head]]:
 
 
 def _chosen(
-    units: Mapping[tuple[int, str], list[Head]], file: str, bus: int | None, machine_id: str | None
+    units: Mapping[tuple[int, str], list[Head]],
+    file: str,
+    bus: int | str | None,
+    machine_id: str | None,
 ) -> list[Head]:
     """Return the records of one unit; raises DynamicsError where it is not exactly one."""
     wanted_id = None if machine_id is None else machine_id.strip().upper()
+    wanted = [bus]
+    if isinstance(bus, str):
+        named = {own[0].bus: Bus(own[0].bus_name, own[0].kv) for own in units.values()}
+        wanted = [*numbers_of(bus, named)]
     meant = {
         key: records
         for key, records in units.items()
-        if bus in (None, key[0]) and wanted_id in (None, key[1])
+        if (bus is None or key[0] in wanted) and wanted_id in (None, key[1])
     }
     if len(meant) > 1:
         meant = {key: own for key, own in meant.items() if not _all_classical(own)}
@@ -200,15 +221,15 @@ def _chosen(
     if meant:
         text = f"{file}: {len(meant)} units; select one by --bus and --id"
         raise DynamicsError([text, *_listed(meant)])
-    given = {"bus": bus, "id": machine_id}
-    wanted = (f"{label} {value!r}" for label, value in given.items() if value is not None)
-    text = f"{file}: no record of {', '.join(wanted)}; the file has"
+    given = [f"{label} {value!r}" for label, value in (("bus", bus), ("id", machine_id)) if value]
+    text = f"{file}: no record of {', '.join(given)}; the file has"
     raise DynamicsError([text, *_listed(units)])
 
 
 def _listed(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
     for (bus, machine_id), heads in list(units.items())[:MOST_LISTED]:
-        yield f"  bus {bus}, id {machine_id}: {', '.join(head.name for head in heads)}"
+        name = f" {heads[0].bus_name}" if heads[0].bus_name else ""
+        yield f"  bus {bus}{name}, id {machine_id}: {', '.join(head.name for head in heads)}"
     if len(units) > MOST_LISTED:
         yield f"  and {len(units) - MOST_LISTED} more"
 
@@ -236,6 +257,7 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
         tuple(sorted(warnings, key=lambda warning: warning.line)),
         tuple(head.name for head in unknown),
         *_ratings(heads),
+        heads[0].bus_name,
     )
     return unit, []
 
@@ -337,6 +359,20 @@ def _on_its_base(
     )
     warnings.append(DynamicsFault(governor.line, text))
     return governor
+
+
+def with_rating(unit: Unit, mva: float | None) -> Unit:
+    """Return a unit whose turbine has the share of its rating, MW, in the machine's base, MVA."""
+    governor = unit.governor
+    rating = 0.0 if governor is None else dict(governor.unused).get(RATING, 0.0)
+    if governor is None or rating == 0.0 or mva is None:
+        return unit
+    values = {**governor.values, SHARE: float(f"{rating / mva:.6g}")}
+    if [*outside(governor.definition.model.sheet, values)]:
+        return unit
+    asked = f"{governor.definition.record.name}: {RATING}: "
+    warnings = tuple(each for each in unit.warnings if not each.text.startswith(asked))
+    return replace(unit, governor=replace(governor, values=values), warnings=warnings)
 
 
 def _missing_kinds(heads: Iterable[Head]) -> list[str]:

@@ -151,7 +151,7 @@ def test_a_file_that_is_none_is_reported(run, arguments, words):
     "arguments",
     [
         ["import"],
-        ["import", "unit.dyr", "--bus", "one"],
+        ["import", "unit.dyr", "--bus", "1000000"],
         ["import", "unit.dyr", "--bus", "0"],
         ["export"],
         ["export", "run", "--format", "xml"],

@@ -177,8 +177,9 @@ def odd_file_of_pslf(definition, random):
         for own, values in partners(definition, random):
             text += loose_dyd(own, values, random, bus, "G1")
         text += f'ieeeg3 {bus} ! ! "G1" : mwcap=9 0.050 3.0 # {bus} governor\'s\n'
-        text += f"imetr {bus} ! ! ! 7 ! ! ! : #9 0.0\n"
-    return text.encode(str(random.choice(ENCODINGS[:4])))
+        text += f"imetr {bus} ! ! ! 7 ! ! ! : #9\t0.0,\n"
+    ends = str(random.choice(["\n", "\r\n", "\r"]))
+    return text.replace("\n", ends).encode(str(random.choice(ENCODINGS[:4])))
 
 
 ODD_FILES = {PSSE: odd_file, PSLF: odd_file_of_pslf}

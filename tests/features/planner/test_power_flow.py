@@ -1,5 +1,6 @@
 """Ratings of units from power flow files: each is an answer that a case then does not ask for."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ from power_flow_files import HIGH_KV, X, power_flow
 from exfit.case.load import load_case
 from exfit.errors import DynamicsError
 from exfit.features.planner.power_flow import read_power_flow
+from exfit.features.planner.psse import record_text
+from exfit.features.planner.records import definition_of
+from exfit.models.sheet import typical
 
 
 @pytest.fixture(autouse=True)
@@ -77,6 +81,38 @@ def test_all_faults_of_a_file_are_named_with_line_value_and_limit(old, new, says
         read_power_flow(Path("net.raw"))
     assert says in str(raised.value)
     assert len(str(raised.value).splitlines()) == text.count(old)
+
+
+def test_a_heading_may_end_before_the_frequency():
+    Path("net.raw").write_text(power_flow().replace(", 0, 0, 60.00", ""))
+    assert {own.f0 for own in read_power_flow(Path("net.raw")).values()} == {None}
+
+
+def test_a_power_flow_file_names_the_buses_of_a_dyr_file(run):
+    Path("net.raw").write_text(power_flow(34))
+    Path("named.dyr").write_text(THREE.replace("9 GENROU", "'UNIT 9' GENROU"))
+    alone = run("import", "named.dyr", "--bus", "unit 9", "--raw", "net.raw", "-o", "nine.yaml")
+    assert alone.code == 0, alone.err
+    assert "# Unit 1 at bus 9 UNIT 9 of named.dyr" in Path("nine.yaml").read_text()
+    ran = run("import", "--all", "named.dyr", "-o", "cases", "--raw", "net.raw")
+    assert ran.code == 0, ran.err
+    assert load_case(Path("cases", "bus-9-1.yaml")).as_found.bus == 9
+    with Path("cases", "units.csv").open(newline="") as file:
+        assert [row["name"] for row in csv.DictReader(file)] == ["UNIT 1", "UNIT 1", "UNIT 9"]
+    assert run("import", "named.dyr", "--bus", "9").code == 1
+
+
+def test_the_rating_of_a_turbine_becomes_its_share_of_the_machine_s_base(run):
+    definition = definition_of("GGOV1")
+    record = record_text(definition, {**typical(definition.model.sheet), "Trate": 90.0}, 9, "1")
+    Path("units.dyr").write_text(f"{THREE}{record}\n")
+    Path("net.raw").write_text(power_flow())
+    event()
+    alone = run("import", "units.dyr", "--bus", 9, "--raw", "net.raw", "-o", "nine.yaml")
+    assert alone.code == 0, alone.err
+    for path in (Path("nine.yaml"), imported(run, "--raw", "net.raw")):
+        assert load_case(path).values()["governor.Trate_Mbase"] == 90.0 / MVA
+        assert "Trate_Mbase in the case" not in path.read_text()
 
 
 @pytest.mark.parametrize("power", [True, False])

@@ -172,6 +172,18 @@ def test_a_fault_of_one_unit_leaves_the_others():
     assert units.devices == {"wlwscc": 1}
 
 
+@pytest.mark.parametrize("name", ["gen: 1/#", " GEN:  1/# 18.0", "GEN: 1/# 18"])
+def test_a_unit_is_asked_for_by_the_name_of_its_bus_and_its_kv(name):
+    other = PSLF_UNIT.replace(" 1 ", " 2 ").replace('"GEN: 1/#"', '"GEN 2"')
+    unit = read_unit(PSLF_UNIT + other, "a.dyd", name)
+    assert (unit.bus, unit.bus_name) == (1, "GEN: 1/#")
+    assert "bus 1 GEN: 1/#" in imported_case(unit, "a.dyd").text
+    with pytest.raises(DynamicsError) as raised:
+        read_unit(PSLF_UNIT + other, "a.dyd", "GEN: 1/# 21")
+    assert "no record of bus 'GEN: 1/# 21'" in str(raised.value)
+    assert "bus 2 GEN 2, id 1: genrou, exac4" in str(raised.value)
+
+
 def test_the_end_of_a_record_may_be_marked_as_other_writers_do():
     ended = PSLF_UNIT.replace("0.0 0.0 0.0\n", "0.0 0.0 0.0 /\n").replace('"kc" 0.0', '"kc" 0.0 /')
     usual, other = (read_unit(text, "a.dyd", 1).machine.values for text in (PSLF_UNIT, ended))

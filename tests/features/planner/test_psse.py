@@ -15,6 +15,7 @@ from tiers import few_of
 from exfit.case.load import parse_case
 from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
+from exfit.features.planner.buses import Bus
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.import_case import import_unit, imported_case
 from exfit.features.planner.psse import record_text, sound_records
@@ -287,6 +288,19 @@ def test_names_and_ids_may_be_quoted_and_a_bus_needs_its_number():
         DynamicsError, match=r"'NORTH 21\.6' is not the number of a bus; write the n"
     ):
         read_unit(text.replace('1 "GENROU"', "'NORTH 21.6' 'GENROU'"), "unit.dyr")
+
+
+def test_buses_by_their_names_have_the_numbers_of_a_power_flow_file():
+    buses = {1: Bus("NORTH G1", 18.0), 2: Bus("SOUTH", 18.0), 9: Bus("SOUTH", 110.0)}
+    for name in ("NORTH G1", "NORTH G1    18.000"):
+        text = SOUND.replace("1 GENROU", f"'{name}' GENROU").replace("1 ESAC1A", f"'{name}' ESAC1A")
+        for wanted in (None, 1, "north g1"):
+            unit = read_unit(text, "unit.dyr", wanted, None, buses)
+            assert (unit.bus, unit.bus_name) == (1, "NORTH G1")
+    for name, known in (("SOUTH", buses), ("NORTH", buses), ("NORTH G1", {})):
+        text = SOUND.replace("1 GENROU", f"'{name}' GENROU")
+        with pytest.raises(DynamicsError, match=f"'{name}' is not the number of a bus"):
+            read_unit(text, "unit.dyr", None, None, known)
 
 
 @pytest.mark.parametrize("points", ["0 0 0 0", "0 0 4.18 .1"])
