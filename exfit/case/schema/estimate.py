@@ -222,7 +222,8 @@ class SimulationSection(Section):
         default=1e-6,
         ge=1e-9,
         le=1e-3,
-        description="Largest error of the compared signals by the steps, pu, where step is auto.",
+        description="Largest error of the compared signals by the steps, pu, where step is auto; "
+        "others may err more, such as efd (1.4e-4) where a limiter takes over and vt is compared.",
     )
     output_step: Positive = Field(
         default=0.005, description="Spacing of the output if there is no record, s."

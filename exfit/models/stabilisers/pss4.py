@@ -135,10 +135,12 @@ def pss4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
     The first input is the speed, the second the electrical power. The standard of
     2005 prints PE; IEC 61970-302 says that it should read -PE, the sign of the
-    swing equation, which is taken here. With typical data the power's transducer is
-    -80 s² / ((s³ + 82 s² + 161 s + 80) 2 H s): the standard's but for the sign. M
-    is 2 H; programs that read M = 0 as the 2 H of the machine need its value here.
-    Typical data are the standard's, as CIM has them, but for M.
+    swing equation, which is taken here. PSS/E 36.7 takes PE, and 1/(1 + sM) for
+    1/(sM), as its states show that InterPSS keeps (ipss-plugin, f727fb59). With
+    typical data the power's transducer is -80 s² / ((s³ + 82 s² + 161 s + 80) 2 H
+    s): the standard's but for the sign. M is 2 H; programs that read M = 0 as the
+    2 H of the machine need its value here. Typical data are the standard's, as CIM
+    has them, but for M.
     """
     low, high = transduced(s, u, p, d)
     bands = band("L", low, s, p, d) + band("I", low, s, p, d) + band("H", high, s, p, d)
@@ -188,7 +190,8 @@ PSS4B = documented(
         "TL4 TL5 TL6 KL2 KL17 TL7 TL8 TL9 TL10 TL11 TL12 KL VLMAX VLMIN KI1 KI11 TI1 TI2 TI3 TI4 "
         "TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN KH1 KH11 TH1 TH2 TH3 TH4 TH5 "
         "TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN VSTMAX VSTMIN",
-        doubt="its power has the sign of IEC 61970-302",
+        doubt="PSS/E 36.7 does not turn the sign of the power, so that KH of its records has the "
+        "other sign here, and it has 1/(1 + sM) for 1/(sM)",
     ),
 )
 
