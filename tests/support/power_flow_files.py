@@ -9,28 +9,34 @@ OF_THREE_WINDINGS = (
 )
 
 
-def power_flow(version=33, buses=(1, 9), cz=1, kv=KV, mva=MVA, named=True, own_x=0.0, ra=0.0):
+def power_flow(
+    version=33, buses=(1, 9), cz=1, kv=KV, mva=MVA, named=True, own_x=0.0, ra=0.0, units=None
+):
     """Return the text of a file: a machine 1 at each bus behind a transformer to bus 900.
 
     With ``own_x`` the machines have their transformer in their own rows, and there is no other.
+    ``units`` are kV, MVA, R and X on its base by bus, in place of the same of all ``buses``.
     """
-    reactance = X * SBASE / mva if cz == 1 else X * 50.0 / mva
+    base = SBASE if cz == 1 else 50.0
+    units = units or dict.fromkeys(buses, (kv, mva, 0.002 * mva / base, X))
     ends = [end for end in ENDS if version >= 34 or end != "SYSTEM SWITCHING DEVICE"]
     nreg = " 0," if version >= 35 else ""
     rows = {
         "BUS": [
-            f"{bus},'UNIT {bus}     ',{kv:9.4f},2,   1,   1,   1,1.01,-3.5" for bus in buses
+            f"{bus},'UNIT {bus}     ',{kv:9.4f},2,   1,   1,   1,1.01,-3.5"
+            for bus, (kv, *_) in units.items()
         ] + [f"900,'GRID / EAST ',{HIGH_KV},3,1,1,1,1.0,0.0"],
         "LOAD": ["900,'1 ',1,1,1,100.0,20.0,0,0,0,0,1,1,0"],
         "GENERATOR": [
             f"{bus},'1 ',80.0,10.0,50.0,-50.0,1.01,0,{nreg}{mva:10.3f}, {ra},0.2,0.0,{own_x},1.0,1"
-            for bus in buses
+            for bus, (_, mva, *_) in units.items()
         ],
         "BRANCH": ["900,901,'1 ',0.01,0.1,0.0"],
         "TRANSFORMER": [OF_THREE_WINDINGS] if own_x else [
             OF_THREE_WINDINGS,
             *(f"900, {bus},   0,'1 ',1,{cz},1,0.0,0.0,2,'T{bus}          ',1,   1,1.0\n"
-              f" 0.002, {reactance:.6f}, {50.0}\n1.0,0.0,0.0\n1.0, 0.0" for bus in buses),
+              f" {r * base / mva:.6f}, {x * base / mva:.6f}, {50.0}\n1.0,0.0,0.0\n1.0, 0.0"
+              for bus, (_, mva, r, x) in units.items()),
         ],
     }  # fmt: skip
     text = f"0,  {SBASE}, {version}, 0, 0, {F0}.00 / a grid, 2026\nTITLE\n\n"

@@ -26,7 +26,7 @@ from exfit.features.planner.units import DynamicsUnits, Unit, read_units
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.tables import csv_text
-from exfit.util.text import show
+from exfit.util.text import listed, show
 from exfit.util.vocabulary import TYPICAL
 
 DIGITS = 6  # significant, of a number that is written: more than any interval resolves
@@ -95,16 +95,13 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
     left = list[LeftUnit]()
     verified: dict[tuple[int | None, str], list[FittedUnit]] = {}
     for fit in fits:
-        if fit.result.holds:
-            found = fit.result.as_found
-            unit_of_fit = (
-                (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
-            )
-            verified.setdefault(unit_of_fit, []).append(fit)
-        else:
-            result = fit.result
-            why = f"not verified: {outcome_of(result)}: {explanation_of(result)}"
-            left.append(LeftUnit(fit.name, why, verified=False))
+        why = _why_not_verified(fit.result)
+        if why is not None:
+            left.append(LeftUnit(fit.name, f"not verified: {why}", verified=False))
+            continue
+        found = fit.result.as_found
+        unit_of_fit = (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
+        verified.setdefault(unit_of_fit, []).append(fit)
     edits, changes = list[_Edit](), list[ChangedValue]()
     for place, of_unit in verified.items():
         for fit in of_unit:
@@ -127,6 +124,25 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
         end = field.end
     edited = "".join([*pieces, text[end:]])
     return FittedFile(encoded(edited, data), tuple(changes), tuple(left))
+
+
+def _why_not_verified(result: FitResult) -> str | None:
+    """Why the values of a fit are not written, None if they are.
+
+    The intervals of grid events are computed of the noise alone: they hold if nothing else is in
+    the residuals.
+    """
+    if not result.holds:
+        return f"{outcome_of(result)}: {explanation_of(result)}"
+    tests = result.verdict.residuals if result.comparison.is_event else ()
+    others = [
+        f"{test.signal} of {test.record}" if len(result.comparisons) > 1 else test.signal
+        for test in tests
+        if not test.are_noise
+    ]
+    if not others:
+        return None
+    return f"the residuals of {listed(others)} are not noise: the intervals are too narrow"
 
 
 def changes_table(changes: Iterable[ChangedValue]) -> str:

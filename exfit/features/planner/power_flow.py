@@ -22,10 +22,15 @@ BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
 TITLE_LINES = 3
 SBASE, REV, BASFRQ = 1, 2, 5  # fields of the first line
 BASKV = 2  # of a bus
-MBASE, ZR, XT = 8, 9, 12  # of a generator; one later in version 35, which has NREG before them
+MBASE, ZR, RT, XT = (
+    8,
+    9,
+    11,
+    12,
+)  # of a generator; one later in version 35, which has NREG before them
 WITH_NREG = 35
 THIRD_BUS, CZ, STAT = 2, 5, 11  # of a transformer
-ON_SYSTEM_BASE, ON_OWN_BASE = 1.0, 2.0  # CZ: of its reactance
+ON_SYSTEM_BASE, ON_OWN_BASE = 1.0, 2.0  # CZ: of its impedance
 
 
 class _Row(NamedTuple):
@@ -117,12 +122,13 @@ def _ratings(
             faults.append(DynamicsFault(row.line, f"bus {bus}: not in the section of the buses"))
             continue
         mva = _number(row, MBASE + later, "MBASE", faults)
+        resistance = _number(row, RT + later, "RT", faults)
         own = _number(row, XT + later, "XT", faults)
         ra = _number(row, ZR + later, "ZR", faults)
-        step_up = StepUp(own, None) if own > 0.0 else None
+        step_up = StepUp(resistance, own, None) if own > 0.0 else None
         beside = step_ups.get(bus, ())
         if step_up is None and at_bus[bus] == len(beside) == 1:
-            step_up = StepUp(float(f"{beside[0].x * mva:.6g}"), beside[0].kv)
+            step_up = beside[0].on_base(mva)
         kv, power, frequency = (value or None for value in (buses[bus].kv, mva, f0))
         key = UnitKey(int(bus), machine_id or "1")
         ratings[key] = Ratings(kv, power, f0=frequency, step_up=step_up, ra=ra)
@@ -158,10 +164,15 @@ def _sections(lines: Sequence[tuple[int, str]], version: int) -> dict[str, list[
 
 
 class _Transformer(NamedTuple):
-    """A transformer as one of its buses sees it: its reactance, pu of 1 MVA, and the other's kV."""
+    """A transformer as one of its buses sees it: its impedance, pu of 1 MVA, and the other's kV."""
 
+    r: float
     x: float
     kv: float
+
+    def on_base(self, mva: float) -> StepUp:
+        """Return it per unit of a machine."""
+        return StepUp(float(f"{self.r * mva:.6g}"), float(f"{self.x * mva:.6g}"), self.kv)
 
 
 def _step_ups(
@@ -172,6 +183,7 @@ def _step_ups(
     for first, second in _of_two_windings(rows):
         ends = [buses.get(field.text) for field in first.fields[:2]]
         code = _number(first, CZ, "CZ", faults)
+        resistance = _number(second, 0, "R1-2", faults)
         reactance = _number(second, 1, "X1-2", faults)
         if (
             None in ends
@@ -183,7 +195,8 @@ def _step_ups(
         kv = [bus.kv for bus in ends if bus is not None]
         if power > 0.0 and kv[0] != kv[1]:
             low = first.fields[kv.index(min(kv))].text
-            found.setdefault(low, []).append(_Transformer(reactance / power, max(kv)))
+            own = _Transformer(resistance / power, reactance / power, max(kv))
+            found.setdefault(low, []).append(own)
     return found
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 from math import sqrt
 from typing import NamedTuple
 
-from exfit.case.case_draft import CaseDraft, Noted, OpenValue
+from exfit.case.case_draft import CaseDraft, Noted, OpenValue, with_sources
 from exfit.case.suggestion import Base, rated_bases
 from exfit.plants import KINDS
 from exfit.records.inspection import Inspection
@@ -17,11 +17,12 @@ LIKE_RATED = (0.85, 1.15)  # of the rated voltage: where a unit rests on load
 
 
 class StepUp(NamedTuple):
-    """A step-up transformer: its reactance, pu of the machine, and the kV of its other side.
+    """A step-up transformer: its impedance, pu of the machine, and the kV of its other side.
 
     The kV is None where the bus of the machine is that side.
     """
 
+    r: float
     x: float
     kv: float | None
 
@@ -121,11 +122,16 @@ def _with_network(draft: CaseDraft, ratings: Ratings) -> CaseDraft:
         return draft
     plant, known = draft.sections["plant"], dict[str, Noted]()
     if ratings.step_up is not None and kind.finds_rest:  # only events are behind one
-        known["X"] = Noted(ratings.step_up.x, "pu, the step-up transformer's: recorded behind it")
+        r, x, _ = ratings.step_up
+        known["R"] = Noted(r, "pu, the step-up transformer's")
+        known["X"] = Noted(x, "pu, the step-up transformer's: recorded behind it")
     if ratings.ra:
         known["Ra"] = Noted(ratings.ra, "pu, the stator's")
-    network = {**plant["network"], **known}
-    return replace(draft, sections={**draft.sections, "plant": {**plant, "network": network}})
+    stated = plant["sources"].value if "sources" in plant else {}
+    sources = {name: word for name, word in stated.items() if name not in known}
+    plant = {name: section for name, section in plant.items() if name != "sources"}
+    plant = with_sources({**plant, "network": {**plant["network"], **known}}, sources)
+    return replace(draft, sections={**draft.sections, "plant": plant})
 
 
 def _power(signal: str, bases: Mapping[str, Base], inspection: Inspection) -> float | None:

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from dynamics import THREE
 from pmu_records import F0, KV, MVA, degrees, phasors_of, smooth_course, stamps, write_table
-from power_flow_files import HIGH_KV, X, power_flow
+from power_flow_files import HIGH_KV, SBASE, X, power_flow
 
 from exfit.case.load import load_case
 from exfit.errors import DynamicsError
@@ -59,9 +59,10 @@ def test_each_version_gives_the_ratings_of_its_machines(version, named):
         assert [*ratings] == [(1, "1"), (9, "1")]
         for own in ratings.values():
             assert (own.kv, own.mva, own.f0) == (KV, MVA, F0)  # X has six decimals
-            assert own.step_up == pytest.approx((X, HIGH_KV), rel=1e-4)
+            r = 0.002 * MVA / (SBASE if cz == 1 else 50.0)
+            assert own.step_up == pytest.approx((r, X, HIGH_KV), rel=1e-4)
     Path("net.raw").write_text(power_flow(version, named=named, own_x=0.12))
-    assert {own.step_up for own in read_power_flow(Path("net.raw")).values()} == {(0.12, None)}
+    assert {own.step_up for own in read_power_flow(Path("net.raw")).values()} == {(0.0, 0.12, None)}
 
 
 @pytest.mark.parametrize(
@@ -135,6 +136,8 @@ def test_a_voltage_that_was_recorded_behind_the_transformer_has_its_reactance_an
     case = load_case(imported(run, "--raw", "net.raw"))
     assert case.recordings[0].record.phasors.kV == HIGH_KV
     assert case.plant.network["X"] == pytest.approx(X, rel=1e-5)
+    assert case.plant.network["R"] == pytest.approx(0.002 * MVA / SBASE, rel=1e-5)
+    assert not {"R", "X"} & case.plant.sources.keys()
 
 
 @pytest.mark.parametrize("version", [33, 35])
