@@ -27,6 +27,7 @@ from exfit.dsp.sampling import sampling_of
 from exfit.estimate import LocalMinimum, Progress, Stop
 from exfit.fitting.descents import descent_near, stopped
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
+from exfit.fitting.further_starts import LOCATED_STEP
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
@@ -121,6 +122,9 @@ def responses_to_samples(experiment: Experiment, values: Values, signal: str) ->
     much later or earlier.
     """
     simulator = experiment.with_inputs(values)
+    if simulator.located:  # of what is small, the step's error is as small a share
+        step = max(simulator.step, LOCATED_STEP)
+        simulator = simulator.remade(step=step, least=1, rough=True)
     places = pulse_places(simulator.inputs.recorded[signal].time)
     pulses = PULSE * np.eye(len(simulator.inputs.recorded[signal].time))[places]
     tests = [*(with_added(simulator, {signal: pulse}) for pulse in pulses), simulator]
