@@ -54,11 +54,12 @@ class Autoregression(NamedTuple):
 
         The root is the response of the errors to what v was within them and as long before.
         """
-        from scipy.signal import lfilter
+        from scipy.linalg import solve_banded  # far quicker to import than scipy.signal
 
         backwards = np.concatenate([rows[:, ::-1], np.zeros_like(rows)], axis=1)
-        denominator = np.concatenate([[1.0], -self.coefficients])
-        return np.asarray(np.sqrt(self.share) * lfilter([1.0], denominator, backwards, axis=1))
+        bands = np.tile([[1.0], *([-a] for a in self.coefficients)], backwards.shape[1])
+        filtered = solve_banded((len(self.partial), 0), bands, backwards.T)
+        return np.asarray(np.sqrt(self.share) * filtered.T)
 
 
 class Noise(NamedTuple):
