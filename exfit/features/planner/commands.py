@@ -44,9 +44,14 @@ def _number_or_name(
     return value
 
 
+bus_option = click.option(
+    "--bus", callback=_number_or_name, metavar="N|NAME", help="Bus of the unit in the file."
+)
+
+
 @click.command("import", short_help="Make cases from a planner's dynamics file.")
 @click.argument("dyr", type=GivenFile(Kind.DYNAMICS), metavar="UNIT")
-@click.option("--bus", callback=_number_or_name, metavar="N|NAME", help="Bus of the unit.")
+@bus_option
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
 @click.option("--all", "every", is_flag=True, help="Make a case of every unit, in the folder -o.")
 @click.option(

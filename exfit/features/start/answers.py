@@ -70,7 +70,7 @@ class Answers(Section):
     step: Annotated[Values, BeforeValidator(_of_all)] = NONE  # pu; {up: 0.05, at-312s: 0.02}
     tests: Text | None = None  # a table of tests
     dyr: Text | None = None
-    bus: Bus | None = None
+    bus: Bus | Text | None = None  # its number, or its name in a .dyd
     id: Annotated[MachineId, BeforeValidator(_as_text)] | None = None
     model: Text | None = None  # of the exciter
     machine_model: Text | None = None

@@ -31,7 +31,7 @@ from exfit.cli.records import (
 )
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
-from exfit.features.planner.commands import BUSES
+from exfit.features.planner.commands import bus_option
 from exfit.util.text import dotted
 
 if TYPE_CHECKING:
@@ -61,7 +61,6 @@ dyr_option = click.option(
     metavar="FILE",
     help="Planner's file (.dyr or .dyd) with machine, exciter, stabiliser and governor.",
 )
-bus_option = click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit in it.")
 id_option = click.option(
     "--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1."
 )
@@ -129,7 +128,7 @@ def new(
     kv: float | None,
     mva: float | None,
     dyr: Path | None,
-    bus: int | None,
+    bus: int | str | None,
     machine_id: str | None,
     machine_from: Path | None,
     facts: tuple[str, ...],

@@ -21,10 +21,10 @@ from exfit.cli.options import (
 from exfit.cli.records import bases_option, steps_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
+from exfit.features.planner.commands import bus_option
 from exfit.features.start import command
 from exfit.features.start.command import (
     answers_option,
-    bus_option,
     dyr_option,
     id_option,
     kv_option,

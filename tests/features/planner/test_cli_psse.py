@@ -611,7 +611,10 @@ def test_a_file_of_pslf_becomes_a_case_and_gives_a_new_one_its_data(run):
     record = ROOT / "sample_data" / "ac1a_up.csv"
     options = ["--record", record, "--step", "0.02", "-o", "new.yaml"]
     assert run("new", "--planner", sample, *options)[0] == 0
-    assert "those of unit.dyd" in Path("new.yaml").read_text()
+    by_hand = Path("new.yaml").read_text()
+    assert "those of unit.dyd" in by_hand
+    assert run("new", "--planner", sample, "--bus", "NORTH G1", *options, "--force")[0] == 0
+    assert Path("new.yaml").read_text() == by_hand
     assert run("import", "--all", sample, "-o", "cases")[0] == 0
     assert Path("cases/bus-101-1.yaml").exists()
 

@@ -10,6 +10,8 @@ import pytest
 import yaml
 from dynamics import THREE, replaced
 from dyr_words import changed_words
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from loose_dyd import PSLF_UNIT, loose_dyd
 from loose_records import loose, sound
 from records import TEST, TIME, case_of, one, synthetic
@@ -211,6 +213,12 @@ def there_and_back(fit, definition, random):
 @pytest.mark.parametrize("name", [*DEFINITIONS, *OF_PSLF])
 def test_values_go_into_every_kind_of_record_and_back_and_nothing_else_changes(fit, name):
     there_and_back(fit, (DEFINITIONS | OF_PSLF)[name], np.random.default_rng(0))
+
+
+@settings(max_examples=10, derandomize=True, deadline=None)
+@given(name=st.sampled_from([*DEFINITIONS, *OF_PSLF]), seed=st.integers(0, 2**32 - 1))
+def test_a_file_in_any_layout_keeps_every_byte_but_fitted_values(fit, name, seed):
+    there_and_back(fit, (DEFINITIONS | OF_PSLF)[name], np.random.default_rng(seed))
 
 
 def test_only_fields_whose_values_changed_are_written_again(fit):
