@@ -54,7 +54,14 @@ GOVERNORS = Catalogue(governors)
 LIMITERS = Catalogue(limiters)
 
 
-MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "ONE_AXIS")  # known without their files
+MACHINE_NAMES = (
+    "GENROU",
+    "GENROE",
+    "GENSAL",
+    "GENSAE",
+    "GENTPJ",
+    "ONE_AXIS",
+)  # known without their files
 
 
 def find(name: str, folder: Path, sha256: str = "") -> Model:

@@ -8,7 +8,7 @@ from typing import Literal
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal, sqrt
 from exfit.models.blocks import modulus
-from exfit.models.machines import Machine
+from exfit.models.machines import Axes, Machine, Source
 from exfit.models.sheet import UP_TO_10, WITHIN_10, Model, Sheet, sheet
 from exfit.plants import (
     BREAKER,
@@ -139,15 +139,20 @@ def infinite_bus(
         breaker = breaker_of(u, dw) if BREAKER in inputs else None
         if breaker is not None:
             dw = breaker.dw
-            factor = 1.0 if dialect == "powerworld" else breaker.factor  # which the source has
-        at = unit.source(fluxes, dw, of_machine)._replace(ra=n.Ra)
-        if meshed:
+            factor = 1.0 if unit.speed_in_stator else breaker.factor  # which the source has
+
+        def drives(at: Source) -> Axes:
+            if not meshed:
+                return current(at, E, R, X, delta)
             line = FaultedLine(R, X, changed.fault_G, changed.fault_B)
             drawing = Names(**{**unloaded, **vars(n)}) if load else None
-            closed = machine_current(at, line, E, delta, drawing, r.get("far", 1.0))
-        else:
-            closed = current(at, E, R, X, delta)
-        i = closed if breaker is None else breaker.current(closed)
+            return machine_current(at, line, E, delta, drawing, r.get("far", 1.0))
+
+        def flowing(at: Source) -> Axes:
+            return drives(at) if breaker is None else breaker.current(drives(at))
+
+        at, i = unit.connected(fluxes, dw, of_machine, n.Ra, flowing)
+        closed = drives(at)
         terminals = Terminals(fluxes, voltage(at, i, factor), i, dw)
         it = modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]

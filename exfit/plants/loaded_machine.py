@@ -10,6 +10,7 @@ that it starts to count without a jump: then vt = speed times flux, per unit. (A
 speed may be off by a thousandth there, and vt jumps by as much.)
 """
 
+from collections.abc import Callable
 from math import pi
 from typing import NamedTuple
 
@@ -20,6 +21,8 @@ from exfit.models.machines import Axes, Machine, Source
 from exfit.plants import BREAKER, SPEED
 from exfit.plants.parts import Names
 
+ROUNDS = 3  # to a saturation: each leaves a thousandth of the error
+NO_STEP, NO_CURRENT = 1e-14, 1e-24  # squares that rounding does not tell from none
 NEWTON_STEPS = 4  # to an angle: each cubes the error, which is 0.33 at first
 HALF_OPEN = 0.5  # of a breaker between closed, 0, and open, 1
 
@@ -123,6 +126,47 @@ def voltage(at: Source, i: Axes, factor: Signal = 1.0) -> Axes:
 def compensated(v: Axes, i: Axes, n: Names) -> Signal:
     """Return VC1 = |vt + (Rc + jXc) it| (IEEE Std 421.5-2005, 4): a positive Xc is a droop."""
     return modulus(v.d + n.Rc * i.d - n.Xc * i.q, v.q + n.Rc * i.q + n.Xc * i.d)
+
+
+def connected(
+    machine: Machine,
+    source: Callable[[], Source],
+    drives: Callable[[Source], Axes],
+    fluxes: Names,
+    p: Names,
+    speed: Signal = 1.0,
+) -> tuple[Source, Axes]:
+    """Return a machine's source and the current that it ``drives``.
+
+    Where X'' saturates, by the flux and the current that it is to give, its saturation is found in
+    rounds with a slope that the first two show, and added to the ``fluxes``.
+    """
+    if machine.saturated is None:
+        at = source()
+        return at, drives(at)
+    saturated = machine.saturated
+
+    def following(saturation: Signal) -> tuple[Signal, Source, Axes]:
+        fluxes.SAT = saturation
+        at = source()
+        i = drives(at)
+        gap_d, gap_q = at.voltage.d + (at.xq - p.Xl) * i.q, at.voltage.q - (at.xd - p.Xl) * i.d
+        it = sqrt(i.d * i.d + i.q * i.q + NO_CURRENT)
+        return saturated(modulus(gap_q, gap_d) / speed, it, p), at, i
+
+    fluxes.SAT = 0.0
+    idle = source().voltage
+    first = saturated(modulus(idle.q, idle.d) / speed, 0.0, p)
+    second, _, _ = following(first)
+    third, _, _ = following(second)
+    step = second - first
+    slope = (third - second) * step / (step * step + NO_STEP)
+    now = third
+    for _ in range(ROUNDS):
+        found, _, _ = following(now)
+        now = now + (found - now) / (1.0 - slope)
+    _, at, i = following(now)
+    return at, i
 
 
 class Terminals(NamedTuple):

@@ -7,7 +7,14 @@ from exfit.models.blocks import modulus
 from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import WITHIN_10, Sheet, sheet
 from exfit.plants import BREAKER, MACHINE, NETWORK, SPEED, VT0, Equipment, PlantKind
-from exfit.plants.loaded_machine import Flow, Terminals, breaker_of, loaded_at_rest, voltage
+from exfit.plants.loaded_machine import (
+    Flow,
+    Terminals,
+    breaker_of,
+    connected,
+    loaded_at_rest,
+    voltage,
+)
 from exfit.plants.parts import (
     Names,
     motion,
@@ -48,7 +55,9 @@ def machine_on_load(machine: Machine, inputs: tuple[str, ...] = (BREAKER,)) -> S
         breaker, closed = breaker_of(u, x["dw"]), Axes(r["id"], r["iq"])
         i, factor = breaker.current(closed), breaker.factor
         fluxes = values_named(x, machine.states)
-        at = machine.source(fluxes, values)
+        at, _ = connected(
+            machine, lambda: machine.source(fluxes, values), lambda at: i, fluxes, values
+        )
         terminals = Terminals(fluxes, voltage(at, i, factor), i, breaker.dw)
         ifd, efd = machine.field(fluxes, i, values), r["efd"] + u.get("efd", 0.0)
         machine.slopes(fluxes, efd, ifd, i, values, slopes)

@@ -1,6 +1,6 @@
 """A unit on load: exciter, stabiliser and governor on a machine whose speed follows the power."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from exfit.engine.system import Rest, Signals
@@ -10,7 +10,14 @@ from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, STABILISER, Dialect, SaturationForm, Stabilised
 from exfit.plants.controls import listening
 from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
-from exfit.plants.loaded_machine import Flow, Terminals, compensated, loaded_at_rest, losses
+from exfit.plants.loaded_machine import (
+    Flow,
+    Terminals,
+    compensated,
+    connected,
+    loaded_at_rest,
+    losses,
+)
 from exfit.plants.parts import (
     Names,
     Part,
@@ -40,13 +47,23 @@ class UnitOnLoad(NamedTuple):
     governor: Model | None = None
     limiters: Limiters = ()
 
-    def source(self, fluxes: Names, dw: Signal, p: Names) -> Source:
-        """Return the voltage behind the stator; in PowerWorld it follows the speed."""
-        at = self.machine.source(fluxes, p)
-        if self.dialect != "powerworld":
-            return at
-        speed = 1.0 + dw
-        return at._replace(voltage=Axes(speed * at.voltage.d, speed * at.voltage.q))
+    @property
+    def speed_in_stator(self) -> bool:
+        """Whether the voltage behind the stator follows the speed."""
+        return self.dialect == "powerworld" or self.machine.speed == "voltage"
+
+    def connected(
+        self, fluxes: Names, dw: Signal, p: Names, Ra: Signal, drives: Callable[[Source], Axes]
+    ) -> tuple[Source, Axes]:
+        """Return the voltage behind the stator, and the current that it ``drives``."""
+        speed = 1.0 + dw if self.speed_in_stator else 1.0
+
+        def source() -> Source:
+            at = self.machine.source(fluxes, p)
+            voltage = Axes(speed * at.voltage.d, speed * at.voltage.q)
+            return at._replace(voltage=voltage, ra=Ra)
+
+        return connected(self.machine, source, drives, fluxes, p, speed)
 
     @property
     def added(self) -> tuple[tuple[str, Model], ...]:
@@ -175,7 +192,7 @@ def unit_motion(
     driving = Pm - of_machine.D * state["dw"]
     if unit.dialect != "andes":
         driving = driving / (1.0 + state["dw"])
-    if unit.dialect == "powerworld":
+    if unit.speed_in_stator or unit.machine.speed:
         braking = braking / (1.0 + state["dw"])
     d.dw = (driving - braking) / (2.0 * of_machine.H)
     return Excited(efd, ifd, vc1, signals)

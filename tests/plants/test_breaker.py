@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from on_load import QUADRATIC, system, values_on_load
 from oracle import MACHINE_SATURATION
-from typed_rejection import Lag, Load, TypedMachine, rejection
+from typed_rejection import Lag, Load, rejection, typed_machine
 
 from exfit.engine.system import trace
 from exfit.models import MODELS
@@ -68,6 +68,8 @@ def test_a_reactive_current_on_the_d_axis_leaves_a_sum_of_exponentials(machine, 
     Unsaturated, at constant efd, and at rated speed as P = 0. The share of each exponential follows
     from the slope of psi'' after the opening, which only psi1d gives: (X'd - Xl) id is its change.
     """
+    if machine.name == "GENTPJ":
+        pytest.skip("its damper does not see the leakage: typed again below")
     m = data_of(machine, **UNSATURATED)
     i_d, t = load.Q / load.vt, AFTER - OPENS
     efd = load.vt + m["Xd"] * i_d
@@ -110,6 +112,8 @@ def test_on_the_q_axis_the_voltage_along_d_dies_with_the_times_of_the_q_axis(mac
 
     The voltage along q stays: no current was on the d axis.
     """
+    if machine.name == "GENTPJ":
+        pytest.skip("its damper does not see the leakage: typed again below")
     m = data_of(machine, H=1e9, **UNSATURATED)  # the speed stays
     i_q, xq = 0.4, m["Xq"]
     delta = np.arcsin(xq * i_q)  # vd = Xq iq at vt = 1
@@ -208,8 +212,8 @@ def test_the_current_becomes_zero_at_once_and_the_fluxes_do_not_jump(machine):
 def test_vt_jumps_by_the_current_in_the_reactance_behind_which_the_flux_is(machine):
     load = Load(0.4, -0.2)
     before, after = on_both_sides(machine, load)
-    x, _, i_d, i_q = TypedMachine(machine.name, data_of(machine)).start(load)
-    typed = TypedMachine(machine.name, data_of(machine))
+    x, _, i_d, i_q = typed_machine(machine.name, data_of(machine)).start(load)
+    typed = typed_machine(machine.name, data_of(machine))
     assert before["vt"] == pytest.approx(np.hypot(*typed.voltages(x, i_d, i_q)), rel=1e-9)
     assert after["vt"] == pytest.approx(np.hypot(*typed.voltages(x, 0.0, 0.0)), rel=1e-9)
 

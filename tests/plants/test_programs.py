@@ -19,6 +19,7 @@ DRIFTS = {
     "powerworld_dc4b": 1.5,
     "powerworld_exst1": 1.2,
     "powerworld_st6b": 1.8,
+    "psse_gentpj1": 4.0,
 }
 
 

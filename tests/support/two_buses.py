@@ -53,7 +53,8 @@ class TwoBuses:
     """The unit of a case, with the values that its records are imported as, or some changed."""
 
     def __init__(self, told, **changes):
-        parts = read_unit(MACHINE_RECORD + "\n".join(told["records"]), "case.dyr")
+        records = told["records"] if "machine" in told else [MACHINE_RECORD, *told["records"]]
+        parts = read_unit("\n".join(records), "case.dyr")
         values = {**parts.exciter.values, **prefixed(MACHINE, parts.machine.values)}
         stabiliser, governor = None, None
         if (part := parts.stabiliser) is not None:

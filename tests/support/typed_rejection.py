@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import fsolve
+from scipy.optimize import brentq, fsolve
 
 
 @dataclass(frozen=True)
@@ -125,12 +125,63 @@ class TypedMachine:
         return z[:4], z[4], *current(z[5])
 
 
+class TypedTypeJ(TypedMachine):
+    """GENTPJ by its specification; ``x`` are E'q, E''q, -E'd, -E''d."""
+
+    def __init__(self, name, data):
+        super().__init__(name, data)
+        self.round = True
+
+    def factors(self, x, i_d, i_q):
+        """Return 1 + Sd and 1 + Sq: S is at the air-gap voltage that it itself leaves."""
+        m = self.m
+
+        def off(s):
+            v_d = -x[3] + (m["Xppq"] - m["Xl"]) / (1.0 + s * m["Xq"] / m["Xd"]) * i_q
+            v_q = x[1] - (m["Xppd"] - m["Xl"]) / (1.0 + s) * i_d
+            at = np.hypot(v_d, v_q) + m["Kis"] * np.hypot(i_d, i_q)
+            return self._curve(at) / at - s
+
+        s = brentq(off, -1e-3, 20.0, xtol=1e-15)
+        return 1.0 + s, 1.0 + s * m["Xq"] / m["Xd"]
+
+    def behind(self, x):
+        return x[1], x[3], None, None
+
+    def voltages(self, x, i_d, i_q):
+        m, (of_d, of_q) = self.m, self.factors(x, i_d, i_q)
+        x_d, x_q = (
+            (m[name] - m["Xl"]) / by + m["Xl"] for name, by in (("Xppd", of_d), ("Xppq", of_q))
+        )
+        return -x[3] + x_q * i_q, x[1] - x_d * i_d
+
+    def ifd(self, x, i_d, i_q=0.0):
+        m = self.m
+        first = x[1] + (x[0] - x[1]) * (m["Xd"] - m["Xppd"]) / (m["Xpd"] - m["Xppd"])
+        return self.factors(x, i_d, i_q)[0] * first
+
+    def slopes(self, x, efd, i_d, i_q):
+        m, (of_d, of_q) = self.m, self.factors(x, i_d, i_q)
+        first = x[3] + (x[2] - x[3]) * (m["Xq"] - m["Xppq"]) / (m["Xpq"] - m["Xppq"])
+        return [
+            (efd - self.ifd(x, i_d, i_q)) / m["Tpd0"],
+            (of_d * (x[0] - x[1]) - (m["Xpd"] - m["Xppd"]) * i_d) / m["Tppd0"],
+            -of_q * first / m["Tpq0"],
+            (of_q * (x[2] - x[3]) - (m["Xpq"] - m["Xppq"]) * i_q) / m["Tppq0"],
+        ]
+
+
+def typed_machine(name, data):
+    """Return a machine by its name."""
+    return (TypedTypeJ if name == "GENTPJ" else TypedMachine)(name, data)
+
+
 def rejection(name, data, load, time, exciter=None, after=None):
     """Return vt, ifd, efd and speed at ``time`` (M,) in s from the opening of the breaker on.
 
     The field voltage is constant, or that of an ``exciter``; ``after`` (t) may give its change.
     """
-    machine = TypedMachine(name, data)
+    machine = typed_machine(name, data)
     x, efd0, _, _ = machine.start(load)
     vref = load.vt + (0.0 if exciter is None else efd0 / exciter.K)
 
@@ -159,7 +210,7 @@ def recorded_rejection(name, data, load, opens, time, noise=0.0, seed=0):
     """Return vt, ifd, efd and speed (M,) as a recorder shows a rejection at ``opens`` (s)."""
     after = time > opens
     signals = rejection(name, data, load, np.concatenate([[0.0], time[after] - opens]))
-    _, efd, _, _ = TypedMachine(name, data).start(load)
+    _, efd, _, _ = typed_machine(name, data).start(load)
     at_rest = {"vt": load.vt, "ifd": efd, "efd": efd, "speed": 1.0}
     rng, shown = np.random.default_rng(seed), {}
     for signal, samples in signals.items():

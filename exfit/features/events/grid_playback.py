@@ -112,10 +112,11 @@ def grid_playback(
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
         n = named_parameters(p, NETWORK, network)
         fluxes = values_named(x, machine.states)
-        at = unit.source(fluxes, x["dw"], of_machine)._replace(ra=n.Ra)
         recorded, delta = p[VT0] + u["vt"], x["delta"]
         delta = delta - u["angle"]
-        i = current(at, recorded, n.R, n.X, delta)
+        at, i = unit.connected(
+            fluxes, x["dw"], of_machine, n.Ra, lambda at: current(at, recorded, n.R, n.X, delta)
+        )
         terminals = Terminals(fluxes, voltage(at, i), i, x["dw"])
         vref = r["vref"] + u["vref"]
         controls = Controls(vref, u.get("vs", 0.0), pref=u.get("pref", 0.0))

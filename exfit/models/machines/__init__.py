@@ -17,6 +17,7 @@ class Machines(Mapping[str, Machine]):
         "GENROE": "round_rotor",
         "GENSAL": "salient_pole",
         "GENSAE": "salient_pole",
+        "GENTPJ": "gentpj",
         "ONE_AXIS": "one_axis",
     }
 

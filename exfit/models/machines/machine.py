@@ -19,6 +19,7 @@ from exfit.engine.trace import Signal, exp, log, where
 from exfit.models.blocks import SHORTEST, lag, modulus, quadratic
 from exfit.models.sheet import (
     LONG_TIME,
+    NONE,
     POSITIVE_TIME,
     UP_TO_10,
     UP_TO_100,
@@ -61,7 +62,10 @@ class Machine(NamedTuple):
     ``rest(v, i, p, x)`` writes the states that hold v and i; ``quadrature(vt, i_p, i_q, p)`` is the
     reactance behind which, at rest, the voltage lies on the q axis, where the current seen from vt
     is i_p - j i_q; ``faults(values)`` yields (symbol, text) for data that contradict each other;
-    ``saturation`` is the form of the curve through S10 and S12.
+    ``saturation`` is the form of the curve through S10 and S12. Where X'' saturates,
+    ``saturated(flux, it, p)`` is the saturation at an air-gap flux and a current of the stator,
+    which the states then have as ``SAT``. ``speed`` is where the speed counts in any dialect: in
+    the torque, or in the stator's voltage too.
     """
 
     name: str
@@ -81,6 +85,8 @@ class Machine(NamedTuple):
     saturation: Literal["quadratic", "exponential"] = "quadratic"
     pslf_records: Records = ()
     doubt: str = ""
+    saturated: Callable[..., Signal] | None = None
+    speed: Literal["", "torque", "voltage"] = ""
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -157,19 +163,30 @@ def power_order(values: Mapping[str, float]) -> Faults:
 # how PSLF names them; its armature resistance is the network's Ra, its compensation nothing here
 PSLF_NAMES = {
     **{"Tpd0": "tpdo", "Tppd0": "tppdo", "Tpq0": "tpqo", "Tppq0": "tppqo"},
-    **{"Xd": "ld", "Xq": "lq", "Xpd": "lpd", "Xpq": "lpq", "Xppd": "lppd", "Xl": "ll"},
+    **{
+        "Xd": "ld",
+        "Xq": "lq",
+        "Xpd": "lpd",
+        "Xpq": "lpq",
+        "Xppd": "lppd",
+        "Xppq": "lppq",
+        "Xl": "ll",
+    },
     **{"S10": "s1", "S12": "s12"},
 }
 
 
-def pslf_record(name: str, cons: str) -> Records:
+def pslf_record(
+    name: str, cons: str, behind: str = "", held: Mapping[str, float] = NONE
+) -> Records:
     """Return PSLF's record of a machine: what it has more is taken as none."""
     return record(
         name,
-        f"{cons} RA RCOMP XCOMP ACCEL",
+        f"{cons} RA RCOMP XCOMP ACCEL {behind}",
         absent={"RCOMP": 0.0, "XCOMP": 0.0},
         ignored="RA ACCEL",
         spelled=PSLF_NAMES,
+        held=held,
     )
 
 
@@ -221,6 +238,11 @@ def d_rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
 def curve(flux: Signal, p: Signal) -> Signal:
     """Compute the field current of saturation: quadratic through both points."""
     return quadratic(flux, 1.0, p.S10, 1.2, p.S12).vx
+
+
+def factor(flux: Signal, p: Signal) -> Signal:
+    """Compute the saturation by which inductances are divided: quadratic, over the flux."""
+    return curve(flux, p) / flux
 
 
 def power_curve(flux: Signal, p: Signal) -> Signal:

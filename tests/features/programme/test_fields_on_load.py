@@ -80,6 +80,13 @@ def balanced_field(name, data, p, q, vt):
     excess = power_excess if name in ("GENROE", "GENSAE") else quadratic_excess
     of_flux = name in ("GENROU", "GENROE", "GENSAE")
 
+    if name == "GENTPJ":
+        share = excess(abs(vt + 1j * xl * current) + data["Kis"] * abs(current))
+        x_q = (data["Xq"] - xl) / (1.0 + share * data["Xq"] / data["Xd"]) + xl
+        turned = current * np.exp(-1j * np.angle(vt + 1j * x_q * current))
+        behind = abs(vt + 1j * x_q * current) - turned.imag * ((data["Xd"] - xl) / (1.0 + share))
+        return (1.0 + share) * (behind - turned.imag * (xl - x_q))
+
     def along(angle):
         at = np.exp(-1j * angle)
         v, i = vt * at, current * at  # real part along q, minus imaginary part along d
