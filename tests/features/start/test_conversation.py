@@ -47,7 +47,7 @@ CONVERSATION = (
     ("15.75", ""),
     ("5", "5 % is 0.05 pu"), ("0.02", "changes by +5 % there"), ("0.05", ""),
     ("unit.dry", "cannot be read"), ("", ""),  # no planner's file
-    ("4", "4 is not in the catalogue"), ("2", ""), ("AC1B", "did you mean AC1A"), ("AC1A", ""),
+    ("4", "4 is not in the catalogue"), ("2", ""), ("AC1B", "AC11C or AC1A?"), ("AC1A", ""),
     ("square", "square is not a machine model"), ("", ""),
     ("6.0", ""), ("35", "35 s is far from the typical 0.06"), ("0.035", ""),  # T'd0, T''d0
     ("18", "18 lies outside 0.01 ... 10 pu"), ("1.8", ""), ("", ""), ("", ""), ("0.2", ""),  # Xl
