@@ -31,7 +31,8 @@ SHEET = sheet(
     ("Xpq", 0.5, "pu", (0.001, 10.0), "q-axis transient reactance, on load"),
     *of_machine(Xppd=0.25),
     ("Xppq", 0.25, "pu", (0.001, 10.0), "q-axis subtransient reactance, on load"),
-    *of_machine(Xl=0.154, S10=0.0, S12=0.0),
+    ("Xl", 0.154, *UP_TO_10, "leakage reactance, on load"),
+    *of_machine(S10=0.0, S12=0.0),
     ("Kis", 0.0, *UP_TO_10, "share of the stator's current in the saturation, on load"),
 )
 
