@@ -15,7 +15,7 @@ from math import pi
 from typing import NamedTuple
 
 from exfit.engine.system import Signals
-from exfit.engine.trace import Signal, cos, sin, sqrt, where
+from exfit.engine.trace import Signal, cos, is_zero, sin, sqrt, where
 from exfit.models.blocks import modulus
 from exfit.models.machines import Axes, Machine, Source
 from exfit.plants import BREAKER, SPEED
@@ -151,7 +151,8 @@ def connected(
         at = source()
         i = drives(at)
         gap_d, gap_q = at.voltage.d + (at.xq - p.Xl) * i.q, at.voltage.q - (at.xd - p.Xl) * i.d
-        it = sqrt(i.d * i.d + i.q * i.q + NO_CURRENT)
+        square = i.d * i.d + i.q * i.q
+        it = 0.0 if is_zero(square) else sqrt(square + NO_CURRENT)
         return saturated(modulus(gap_q, gap_d) / speed, it, p), at, i
 
     fluxes.SAT = 0.0
