@@ -16,6 +16,7 @@ from exfit.case.schema import (
     ExternalPlant,
     FmuPlant,
     FreeSection,
+    FurtherUnitSection,
     Governor,
     Limit,
     Limiter,
@@ -73,6 +74,7 @@ class Case:
     stabiliser: Stabiliser | None
     governor: Governor | None
     limiters: tuple[Limiter, ...]
+    further_units: tuple[FurtherUnitSection, ...]
     test: BumpTest | None
     record: RecordFile | None
     records: tuple[Recording, ...]

@@ -22,7 +22,17 @@ from exfit.models.sheet import (
     exponential_faults,
     typical,
 )
-from exfit.plants import EVENTS, GOVERNOR, KINDS, MACHINE, NETWORK, STABILISER, Attached, PlantKind
+from exfit.plants import (
+    EVENTS,
+    GOVERNOR,
+    KINDS,
+    MACHINE,
+    NETWORK,
+    STABILISER,
+    Attached,
+    FurtherUnit,
+    PlantKind,
+)
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.signals import RECORDED
 from exfit.util.text import Place, near
@@ -68,7 +78,7 @@ class Part:
     @property
     def free(self) -> Place | None:
         """Where the file gives its free parameters; None: it has none."""
-        return None if self.kind == "network" else (*self.section, "free")
+        return None if self.values == "network" else (*self.section, "free")
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -92,6 +102,7 @@ class Parts(NamedTuple):
     governor: Model | None
     all: tuple[Part, ...]
     limiters: tuple[Attached, ...] = ()
+    further: tuple[FurtherUnit, ...] = ()
 
 
 def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = "") -> Parts:
@@ -134,7 +145,7 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
         parts.append(exciter_part(exciter, exponential))
     if machine is not None:
         kinds = (kind, *map(kind_of, plants_of_records(data).values()))
-        parts.append(_machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
+        parts.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
     if kind.on_load:
         parts.append(network_part(_mapping(plant.get("network")), kind))
     parts += [
@@ -157,7 +168,20 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
             name = entry["model"].upper()
             text = f"{name}: a second one beside {first.model.name}; at most one of each kind"
             faults.append(Fault(place, text))
-    return Parts(exciter, machine, **models, all=tuple(parts), limiters=tuple(limiters.values()))
+    units: tuple[FurtherUnit, ...] = ()
+    if "further_units" in data and kind.beside:
+        from exfit.case.further_units import further_units
+
+        units, of_units = further_units(_entries(data["further_units"]), kind, named)
+        parts += of_units
+    return Parts(
+        exciter,
+        machine,
+        **models,
+        all=tuple(parts),
+        limiters=tuple(limiters.values()),
+        further=units,
+    )
 
 
 def kind_of(plant: Data) -> PlantKind:
@@ -309,7 +333,9 @@ def added_part(kind: str, prefix: str, model: Model, section: Place = ()) -> Par
     return Part(kind, model.name, prefix, model.sheet, section or (kind,))
 
 
-def _machine_part(machine: Machine, on_load: bool) -> Part:
+def machine_part(machine: Machine, on_load: bool) -> Part:
+    """Return the part of a machine, which ``on_load`` needs a damper of its d axis."""
+
     def check(values: Mapping[str, float]) -> Contradictions:
         if len(values) == len(machine.sheet):
             yield from machine.faults(values)

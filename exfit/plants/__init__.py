@@ -21,6 +21,7 @@ SATURATION: Mapping[str, SaturationForm] = {
 
 # how the names of parameters begin, and the states of a stabiliser and a governor
 MACHINE, NETWORK, STABILISER, GOVERNOR = "machine.", "network.", "stabiliser.", "governor."
+FURTHER = "unit"  # and of those of further units, before their number
 VT0 = "vt0"
 DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
 MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
@@ -88,12 +89,23 @@ def inputs_at(limiter: Attached) -> dict[str, str]:
     return {signal: f"v{side}{gate}" for side, signal in limiter.signals.items()}
 
 
+class FurtherUnit(NamedTuple):
+    """A unit beside the case's at the same point of measurement; ``prefix`` begins its names."""
+
+    exciter: Model
+    machine: Machine
+    stabiliser: Stabilised | None
+    governor: Model | None
+    prefix: str
+
+
 class Equipment(NamedTuple):
     """Parts and data from which a plant is built.
 
     ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
     ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
-    ``dialect`` says whose equations are solved, ``power_at`` is the place of recorded powers.
+    ``dialect`` says whose equations are solved, ``power_at`` is the place of recorded powers;
+    ``further`` are units beside this one, the sum of which is recorded.
     """
 
     exciter: Model | None
@@ -107,6 +119,7 @@ class Equipment(NamedTuple):
     power_at: PowerAt = "recorded-voltage"
     governor: Model | None = None
     limiters: tuple[Attached, ...] = ()
+    further: tuple[FurtherUnit, ...] = ()
 
 
 def no_network(given: Collection[str]) -> Sheet:
@@ -123,9 +136,10 @@ class PlantKind:
     ones must be recorded, ``required_one_of`` some others, those ``required_if_used`` where the
     exciter uses them; ``levels`` are recorded signals whose level at the start is a parameter,
     ``scaled`` driving ones whose scale is one. ``network`` is the data sheet of the network of
-    which these values are given, ``network_required`` those that must be. ``per_unit`` says that
-    voltages are those of a machine: per unit, and above zero at rest; ``finds_rest`` that the rest
-    before the event is found in the record, ``has_equations`` that exfit simulates it.
+    which these values are given, ``network_required`` those that must be; ``beside`` is that of a
+    further unit, where there may be some. ``per_unit`` says that voltages are those of a machine:
+    per unit, and above zero at rest; ``finds_rest`` that the rest before the event is found in the
+    record, ``has_equations`` that exfit simulates it.
     """
 
     name: str
@@ -140,6 +154,7 @@ class PlantKind:
     required_if_used: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
     scaled: tuple[str, ...] = ()
+    beside: Sheet = ()
     network: Callable[[Collection[str]], Sheet] = no_network
     network_required: tuple[str, ...] = ()
     per_unit: bool = True

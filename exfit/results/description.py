@@ -1,5 +1,6 @@
 """What was fitted to what: the tests, the models with their data sheets; what the fit does."""
 
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,6 +9,7 @@ from math import nan
 from typing import Annotated, NamedTuple
 
 from exfit import __version__
+from exfit.plants import FURTHER
 from exfit.simulation.limit_hits import LIMITER_PREFIXES, LimitHit
 from exfit.simulation.small_signal import SmallSignal
 from exfit.util.vocabulary import NOT_STATED, TYPICAL
@@ -18,6 +20,8 @@ PARTS = (
     *("machine", "network", "stabiliser", "governor"),
     *(prefix.removesuffix(".") for prefix in LIMITER_PREFIXES),
 )
+
+FURTHER_UNIT = re.compile(rf"{FURTHER}\d+\.")
 
 
 class SheetRow(NamedTuple):
@@ -68,10 +72,15 @@ class PartDescription:
     @property
     def heading(self) -> str:
         """Its kind and name, as a heading of a table has them."""
-        if self.kind == "network":
-            return "Network"
-        kind = "limiter" if self.prefix in LIMITER_PREFIXES else self.kind
-        return f"{kind.capitalize()} {self.name}"
+        of_unit, _, kind = self.kind.partition(".") if self.further else ("", "", self.kind)
+        kind = "limiter" if self.prefix in LIMITER_PREFIXES else kind or "exciter"
+        named = "Network" if kind == "network" else f"{kind.capitalize()} {self.name}"
+        return f"{named} of {of_unit}" if of_unit else named
+
+    @property
+    def further(self) -> bool:
+        """Flag of a part of a further unit."""
+        return FURTHER_UNIT.match(self.prefix) is not None
 
 
 @dataclass(frozen=True)
@@ -153,14 +162,19 @@ class Behaviour(NamedTuple):
 
 
 def values_of_part(values: Mapping[str, float], prefix: str) -> dict[str, float]:
-    """Return the values of one part by symbol; the exciter's prefix is empty."""
-    if not prefix:
-        others = tuple(f"{kind}." for kind in PARTS)
-        return {name: value for name, value in values.items() if not name.startswith(others)}
-    return {
+    """Return the values of one part by symbol; the prefix of an exciter is that of its unit."""
+    own = {
         name.removeprefix(prefix): value
         for name, value in values.items()
         if name.startswith(prefix)
+    }
+    if prefix and not FURTHER_UNIT.fullmatch(prefix):
+        return own
+    others = tuple(f"{kind}." for kind in PARTS)
+    return {
+        name: value
+        for name, value in own.items()
+        if not (name.startswith(others) or FURTHER_UNIT.match(name))
     }
 
 

@@ -233,8 +233,9 @@ class FitResult:
     ``parameters`` holds the fitted ones under their names in the system: KA, machine.Tpd0.
     ``fixed`` are the exciter's others, and helpers; ``machine``, ``network``, ``stabiliser`` and
     ``governor`` are all values of these parts by symbol, the fitted ones among them; their models
-    are None where the case has no such part; ``limiters`` holds those by kind (oel, uel). Values
-    that follow others by ``ties`` are among these.
+    are None where the case has no such part; ``limiters`` holds those by kind (oel, uel), ``units``
+    those of the parts of further units by their prefix (unit2, unit2.machine). Values that follow
+    others by ``ties`` are among these.
     ``sources`` says where every value comes from: typical, nameplate ..., not stated;
     ``typical_values`` the effect of each typical value that is not 0, if it were 20 % off.
 
@@ -292,6 +293,8 @@ class FitResult:
     governor_model: str | None = None
     limiters: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     limiter_models: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    unit_models: Mapping[str, str] = field(default_factory=dict)
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
@@ -339,7 +342,7 @@ class FitResult:
         every = dict(self.fixed)
         of_unit = {"machine": self.machine, "network": self.network}
         added = {"stabiliser": self.stabiliser, "governor": self.governor, **self.limiters}
-        for kind, own in {**of_unit, **added}.items():
+        for kind, own in {**of_unit, **added, **self.units}.items():
             every |= {f"{kind}.{symbol}": value for symbol, value in own.items()}
         others = {name: value for name, value in every.items() if name not in self.parameters}
         return {**others, **{name: parameter.value for name, parameter in self.parameters.items()}}

@@ -128,7 +128,7 @@ def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
     typical = {name: value for name, value in used.items() if values[name] == value}
     for part in case.parts.all:
         names = [symbol for symbol in part.symbols if part.prefix + symbol in typical]
-        if names and part.kind != "network":
+        if names and part.values != "network":
             listed = ", ".join(f"{symbol} {typical[part.prefix + symbol]:g}" for symbol in names)
             yield f"typical values taken for {part.name}: {listed}"
     if not (case.on_load or case.kind.plays_back):

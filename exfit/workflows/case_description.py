@@ -17,7 +17,9 @@ from exfit.fitting.nuisances import OPENING, prefix_from
 from exfit.fitting.program import Program
 from exfit.fitting.system import driving_after_opening
 from exfit.inference.confidence import closed
-from exfit.plants import NETWORK, REFERENCES
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model
+from exfit.plants import GOVERNOR, MACHINE, NETWORK, REFERENCES, STABILISER
 from exfit.plants.parts import initial
 from exfit.records.reading import file_hash
 from exfit.results.comparisons import Comparison
@@ -129,14 +131,20 @@ def fixed_values(case: Case, values: Mapping[str, float]) -> dict[str, float]:
 def parts_of(case: Case) -> Iterator[PartDescription]:
     """Yield the parts of a case with their data sheets and drawings."""
     parts = case.parts
-    models = {
+    models: dict[str, Model | Machine | None] = {
         "exciter": parts.exciter,
+        "machine": parts.machine,
         "stabiliser": parts.stabiliser,
         "governor": parts.governor,
         **{limiter.kind: limiter.model for limiter in parts.limiters},
     }
+    for each in parts.further:
+        stabiliser = None if each.stabiliser is None else each.stabiliser.model
+        found = (each.exciter, each.machine, stabiliser, each.governor)
+        names = ("", MACHINE, STABILISER, GOVERNOR)
+        models |= {(each.prefix + n)[:-1]: one for n, one in zip(names, found, strict=True)}
     for part in parts.all:
-        model = parts.machine if part.kind == "machine" else models.get(part.kind)
+        model = models.get(part.kind)
         yield PartDescription(
             kind=part.kind,
             name=part.name,

@@ -18,6 +18,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Uncertainty
+from exfit.plants import FURTHER
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import Behaviour, versions
@@ -149,6 +150,8 @@ def fit_result(
         governor_model=models.get("governor"),
         limiters={kind: own_values[kind] for kind in limiters},
         limiter_models={kind: models[kind] for kind in limiters},
+        units={kind: own for kind, own in own_values.items() if kind.startswith(FURTHER)},
+        unit_models={kind: name for kind, name in models.items() if kind.startswith(FURTHER)},
         cost=best.cost,
         comparisons=comparisons,
         knowledge=uncertainty,

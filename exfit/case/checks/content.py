@@ -33,7 +33,7 @@ from exfit.plants import KINDS, REFERENCES, PlantKind
 from exfit.util.vocabulary import DEFAULT_SEARCH
 
 OF_EXCITER = ("model", "saturation", "efd_times_speed", "stabiliser", "governor")
-EQUIPMENT = ("stabiliser", "governor", "limiters")
+EQUIPMENT = ("stabiliser", "governor", "limiters", "further_units")
 # key under estimate -> the key that decides on its use, the values without one, the others
 NEEDS = {
     ("difference_step",): (("jacobian",), ("exact",), "central, forward or backward"),
@@ -64,7 +64,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     driven = [(recording, _driving(recording, kind)) for recording in (content, *several)]
     balanced = content.at("estimate").content.get("weights") == "balanced"
     yield from weight_faults(driven, balanced)
-    yield from name_faults(several)
+    yield from name_faults(several, [each.prefix[:-1] for each in parts.further])
     yield from _estimate_faults(content, parts)
     yield from as_found_faults(content, parts)
     node = content.at("plant", "type")
@@ -119,6 +119,8 @@ def _plant_faults(
             if key in content:
                 text = f"not allowed with plant {kind.name}: it has no exciter"
                 yield content.at(key).fault(text)
+    if "further_units" in content and not kind.beside:
+        yield content.at("further_units").fault(f"not allowed with plant {kind.name}")
     for place in plants_of_records(content.content):
         own = content.at(*place)
         network, own_kind = own.at("network"), kind_of(own.content)
@@ -168,6 +170,7 @@ def _recording_faults(
     yield from record_faults(test, record)
     places = ("parameters", "plant", "stabiliser", "governor")
     sections = [*map(content.at, places), *content.at("limiters").entries]
+    sections += [part for unit in content.at("further_units").entries for _, part in unit.sections]
     fits = any(section.at("free").content for section in sections)
     yield from channels_faults(record, own, kind, fits or not kind.finds_rest)
     if kind.plays_back and "vs" in record.at("channels") and content.at("stabiliser").content:

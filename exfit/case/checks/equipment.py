@@ -6,7 +6,7 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
-from exfit.plants import HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
+from exfit.plants import FURTHER, HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
 from exfit.plants.controls import rests_with_output, why_no_rest
 from exfit.plants.limiting import inputs_for_limiters
 from exfit.util.text import show, show_value
@@ -29,6 +29,10 @@ def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Ite
         yield from _stabiliser_faults(stabiliser, parts.stabiliser, on_load)
     if governor.content and parts.governor is not None:
         yield from _governor_faults(governor, parts.governor, content)
+    for at, unit in enumerate(content.at("further_units").entries):
+        own = next((each for each in parts.further if each.prefix == f"{FURTHER}{at + 2}."), None)
+        if own is not None and own.stabiliser is not None:
+            yield from _stabiliser_faults(unit.at("stabiliser"), own.stabiliser.model, on_load)
     if kind.has_exciter:
         yield from _limiter_faults(content, parts, off_line)
 

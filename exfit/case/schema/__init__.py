@@ -12,6 +12,7 @@ from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSe
 from exfit.case.schema.plants import (
     ExternalPlant,
     FmuPlant,
+    FurtherUnitSection,
     Governor,
     Limiter,
     Plant,
@@ -77,6 +78,7 @@ __all__ = [
     "FindableStep",
     "FmuPlant",
     "FreeSection",
+    "FurtherUnitSection",
     "Governor",
     "Limit",
     "Limiter",
@@ -220,6 +222,13 @@ class CaseDocument(Section):
         default=(),
         description="Limiters of over- and underexcitation, at most one of each kind; on open "
         "circuit only limiters of the field current act.",
+    )
+    further_units: tuple[FurtherUnitSection, ...] = Field(
+        default=(),
+        min_length=1,
+        description="Further units at the same point of measurement, such as that of a PMU: p, q "
+        "and it are the sums of all; grid-playback only. Their parameters begin with unit2., "
+        "unit3. and so on.",
     )
     test: BumpTest | None = Field(
         default=None,

@@ -317,6 +317,27 @@ class Governor(AddedModel):
     model: Text = Field(description="Name of the governor model.")
 
 
+class UnitModel(AddedModel):
+    """The exciter or the machine of a further unit."""
+
+    model: Text = Field(description="Name of the model in the catalogue.")
+
+
+class FurtherUnitSection(Section):
+    """A further unit, the powers of which are recorded together with those of the case's."""
+
+    exciter: UnitModel = Field(description="Its exciter.")
+    machine: UnitModel = Field(description="Its machine.")
+    stabiliser: Stabiliser | None = Field(default=None, description="Its stabiliser.")
+    governor: Governor | None = Field(default=None, description="Its governor.")
+    network: Frozen[Number] = Field(
+        description="base: its MVA over those of the case's unit; share_P and share_Q: what it has "
+        "of p and q at the start; R, X, Ra, Rc and Xc as of the case's unit. pu on its base."
+    )
+    sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
+
+
 class Limiter(AddedModel):
     """A limiter of over- or underexcitation."""
 

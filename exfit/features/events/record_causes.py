@@ -19,6 +19,7 @@ from exfit.errors import SimulationError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.event import with_rest
 from exfit.fitting.recordings import record_of
+from exfit.plants import NETWORK
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
@@ -78,18 +79,27 @@ def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
         steady = record.steady_until
         if steady is not None:
             measured = record.setup.record
-            for cause in (*clock_causes(measured), *record_causes(measured, steady)):
+            rated = _rating(evidence.case)
+            for cause in (*clock_causes(measured), *record_causes(measured, steady, rated)):
                 yield Suspicion(cause, CERTAIN)
 
 
-def record_causes(record: Record, steady: float) -> tuple[Cause, ...]:
+def _rating(case: Case) -> float:
+    """Sum the ratings of all units whose powers are recorded, pu of the case's unit."""
+    values = case.values()
+    return 1.0 + sum(values[f"{each.prefix}{NETWORK}base"] for each in case.parts.further)
+
+
+def record_causes(record: Record, steady: float, rated: float = 1.0) -> tuple[Cause, ...]:
     """Find faults in the record of an event that begins after ``steady`` (s).
+
+    ``rated`` is the rating of all units whose powers are recorded, pu.
 
     It is seen without a response: levels at which no unit runs, held and single samples, angles
     that jump while the power does not.
     """
     return (
-        *rest_causes(record, steady),
+        *rest_causes(record, steady, rated),
         *_held(record, steady),
         *_spiky(record),
         *_jumping_angle(record),
@@ -114,7 +124,7 @@ def clock_causes(record: Record) -> Iterator[Cause]:
         )
 
 
-def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
+def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[Cause]:
     """Yield levels before the event at which no generator runs."""
     level = {}
     for name, samples in record.signals.items():
@@ -135,6 +145,7 @@ def rest_causes(record: Record, steady: float) -> Iterator[Cause]:
     p, q = level.get("p"), level.get("q", 0.0)
     if p is None:
         return
+    p, q = p / rated, q / rated
     if p < MOTORING:
         yield Cause(
             f"p rests at {p:.3g} pu: a generator feeds power, p is above {MOTORING:g} pu",
@@ -381,7 +392,7 @@ def event_causes(case: Case, recording: Recording) -> tuple[Cause, ...]:
     steady = with_rest(recording.test, record).steady
     if steady is None:
         return ()
-    of_record = record_causes(record, steady)
+    of_record = record_causes(record, steady, _rating(case))
     if of_record:
         return of_record
     comparison = _compared(case, recording)

@@ -201,6 +201,8 @@ def _of_fit(result: FitResult, program: str) -> Iterator[str]:
     weighty = [*by_weight(result.typical_values)]
     if weighty:
         yield f"fitted values depend on typical values: {first_of(weighty)}"
+    for unit in dict.fromkeys(kind.partition(".")[0] for kind in result.units):
+        yield f"{unit} is not written: export it from a case of its own"
     if result.saturation != "quadratic":
         yield as_quadratic(result, program)
 

@@ -56,7 +56,7 @@ def model(result: Reported) -> Iterator[Block]:
     """Yield what simulated, the models that were fitted with their drawings, the saturation."""
     yield from map(Note, other_program(result))
     for part in result.parts:
-        if part.kind == "network":
+        if part.kind.endswith("network"):
             continue
         if not part.drawing:
             yield Note(f"{part.heading}{f': {part.title}' if part.title else ''}.")
