@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from exfit.case.parts import Contradictions, Data, Part, added_part, machine_part
+from exfit.case.parts import Contradictions, Data, Part, Parts, added_part, machine_part
 from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.plants import FURTHER, NETWORK, FurtherUnit, PlantKind, Stabilised
+from exfit.plants import FURTHER, NETWORK, PlantKind, Stabilised
+from exfit.plants.further import FurtherUnit
 from exfit.util.text import Place
 
 OF_UNIT: Mapping[str, Mapping[str, Any]] = {
@@ -18,10 +19,10 @@ OF_UNIT: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def further_units(
-    entries: Sequence[Any], kind: PlantKind, named: Callable[..., Any]
-) -> tuple[tuple[FurtherUnit, ...], list[Part]]:
-    """Return the units that have an exciter and a machine, and the parts of all.
+def with_further_units(
+    own: Parts, entries: Sequence[Any], kind: PlantKind, named: Callable[..., Any]
+) -> Parts:
+    """Return parts with those of further units, and the units that have exciter and machine.
 
     ``named`` finds what a section names in a catalogue, and adds a fault where there is none.
     """
@@ -37,8 +38,8 @@ def further_units(
             if model is not None:
                 machine = key == "machine"
                 part = machine_part(model, True) if machine else added_part(key, "", model)
-                own = prefix if key == "exciter" else f"{prefix}{key}."
-                parts.append(replace(part, kind=own[:-1], prefix=own, section=(*place, key)))
+                begin = prefix if key == "exciter" else f"{prefix}{key}."
+                parts.append(replace(part, kind=begin[:-1], prefix=begin, section=(*place, key)))
         parts.append(_place_part(entry.get("network"), prefix + NETWORK, place, kind))
         if (model := found["stabiliser"]) is not None:
             heard = entry["stabiliser"].get("inputs")
@@ -46,7 +47,7 @@ def further_units(
             found["stabiliser"] = Stabilised(model, inputs)
         if found["exciter"] is not None and found["machine"] is not None:
             units.append(FurtherUnit(**found, prefix=prefix))
-    return tuple(units), parts
+    return own._replace(all=(*own.all, *parts), further=tuple(units))
 
 
 def _place_part(given: Any, prefix: str, place: Place, kind: PlantKind) -> Part:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from exfit.case.schema.values import FreeSection
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
@@ -22,20 +22,13 @@ from exfit.models.sheet import (
     exponential_faults,
     typical,
 )
-from exfit.plants import (
-    EVENTS,
-    GOVERNOR,
-    KINDS,
-    MACHINE,
-    NETWORK,
-    STABILISER,
-    Attached,
-    FurtherUnit,
-    PlantKind,
-)
+from exfit.plants import EVENTS, GOVERNOR, KINDS, MACHINE, NETWORK, STABILISER, Attached, PlantKind
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.signals import RECORDED
 from exfit.util.text import Place, near
+
+if TYPE_CHECKING:
+    from exfit.plants.further import FurtherUnit
 
 Data = Mapping[str, Any]
 Contradictions = Iterable[tuple[str, str]]
@@ -102,7 +95,7 @@ class Parts(NamedTuple):
     governor: Model | None
     all: tuple[Part, ...]
     limiters: tuple[Attached, ...] = ()
-    further: tuple[FurtherUnit, ...] = ()
+    further: "tuple[FurtherUnit, ...]" = ()
 
 
 def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = "") -> Parts:
@@ -125,7 +118,10 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
     kind = kind_of(plant)
     exciter = None
     if not kind.has_equations:
-        exciter = _named(plant, data)
+        from exfit.plants.outside import stand_in
+
+        fixed, free = (_at(data, ("parameters", key)) for key in ("fixed", "free"))
+        exciter = stand_in(plant, {**fixed, **free})
     elif kind.has_exciter:
         exciter = _exciter(data, folder, faults, model_sha256)
     machine: Machine | None = None
@@ -168,20 +164,13 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
             name = entry["model"].upper()
             text = f"{name}: a second one beside {first.model.name}; at most one of each kind"
             faults.append(Fault(place, text))
-    units: tuple[FurtherUnit, ...] = ()
+    added_models = (models["stabiliser"], models["governor"])
+    found = Parts(exciter, machine, *added_models, tuple(parts), tuple(limiters.values()))
     if "further_units" in data and kind.beside:
-        from exfit.case.further_units import further_units
+        from exfit.case.further_units import with_further_units
 
-        units, of_units = further_units(_entries(data["further_units"]), kind, named)
-        parts += of_units
-    return Parts(
-        exciter,
-        machine,
-        **models,
-        all=tuple(parts),
-        limiters=tuple(limiters.values()),
-        further=units,
-    )
+        return with_further_units(found, _entries(data["further_units"]), kind, named)
+    return found
 
 
 def kind_of(plant: Data) -> PlantKind:
@@ -388,18 +377,6 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
     except ModelError as error:
         faults.append(Fault(("model",), str(error)))
         return None
-
-
-def _named(plant: Data, data: Data) -> Model:
-    """Make the stand-in of a model that is elsewhere: the parameters that a case names."""
-    from exfit.plants.outside import model_of_names
-
-    command = plant.get("command")
-    words = [str(word) for word in command] if isinstance(command, list) else []
-    files = [word for word in words[1:] if not word.startswith("-")]
-    words += [str(plant[key]) for key in ("file", "type") if key in plant]
-    names = (name for key in ("fixed", "free") for name in _at(data, ("parameters", key)))
-    return model_of_names(Path([*files, *words][0]).stem.upper(), dict.fromkeys(names))
 
 
 def _at(data: Data, place: Place) -> dict[str, Any]:

@@ -59,9 +59,7 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
         power_at=getattr(case.plant, "power_at", "recorded-voltage"),
         governor=parts.governor,
         limiters=parts.limiters,
-        further=tuple(
-            each._replace(exciter=each.exciter.in_dialect(dialect)) for each in parts.further
-        ),
+        further=parts.further,
     )
     if kind.plays_back and parts.exciter is not None:
         _refuse_missing_drivers(case, parts.exciter, equipment.saturation)

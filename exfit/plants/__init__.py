@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from exfit.engine.system import System
 from exfit.models.blocks import Saturation, exponential, exponential_se, quadratic
@@ -11,6 +11,9 @@ from exfit.models.sheet import Model, Sheet
 from exfit.registry import LazyPart
 from exfit.registry import parts as parts_of_features
 from exfit.signals import COMPARED
+
+if TYPE_CHECKING:
+    from exfit.plants.further import FurtherUnit
 
 SaturationForm = Callable[..., Saturation]
 SATURATION: Mapping[str, SaturationForm] = {
@@ -89,23 +92,13 @@ def inputs_at(limiter: Attached) -> dict[str, str]:
     return {signal: f"v{side}{gate}" for side, signal in limiter.signals.items()}
 
 
-class FurtherUnit(NamedTuple):
-    """A unit beside the case's at the same point of measurement; ``prefix`` begins its names."""
-
-    exciter: Model
-    machine: Machine
-    stabiliser: Stabilised | None
-    governor: Model | None
-    prefix: str
-
-
 class Equipment(NamedTuple):
     """Parts and data from which a plant is built.
 
     ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
     ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
-    ``dialect`` says whose equations are solved, ``power_at`` is the place of recorded powers;
-    ``further`` are units beside this one, the sum of which is recorded.
+    ``dialect`` says whose equations are solved, ``power_at`` is the place of recorded powers, and
+    ``further`` are units the powers of which are recorded with this one's.
     """
 
     exciter: Model | None
@@ -119,7 +112,7 @@ class Equipment(NamedTuple):
     power_at: PowerAt = "recorded-voltage"
     governor: Model | None = None
     limiters: tuple[Attached, ...] = ()
-    further: tuple[FurtherUnit, ...] = ()
+    further: "tuple[FurtherUnit, ...]" = ()
 
 
 def no_network(given: Collection[str]) -> Sheet:
@@ -136,10 +129,9 @@ class PlantKind:
     ones must be recorded, ``required_one_of`` some others, those ``required_if_used`` where the
     exciter uses them; ``levels`` are recorded signals whose level at the start is a parameter,
     ``scaled`` driving ones whose scale is one. ``network`` is the data sheet of the network of
-    which these values are given, ``network_required`` those that must be; ``beside`` is that of a
-    further unit, where there may be some. ``per_unit`` says that voltages are those of a machine:
-    per unit, and above zero at rest; ``finds_rest`` that the rest before the event is found in the
-    record, ``has_equations`` that exfit simulates it.
+    which these values are given, ``network_required`` those that must be, ``beside`` that of a
+    further unit. ``per_unit`` says that voltages are those of a machine: per unit, above 0 at rest;
+    ``finds_rest`` that the record shows the rest, ``has_equations`` that exfit simulates it.
     """
 
     name: str

@@ -1,9 +1,10 @@
 """A unit that another program simulates, of which exfit knows the names of its parameters alone."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from math import inf
+from pathlib import Path
 from typing import Any
 
 from exfit.engine.system import Motion, Rest, Signals, System
@@ -30,6 +31,15 @@ def model_of_names(name: str, parameters: Iterable[str]) -> Model:
         equations=_nowhere,
         rest=_nowhere,
     )
+
+
+def stand_in(plant: Mapping[str, Any], names: Iterable[str]) -> Model:
+    """Make the stand-in of a model that is elsewhere, by the section of its plant."""
+    command = plant.get("command")
+    words = [str(word) for word in command] if isinstance(command, list) else []
+    files = [word for word in words[1:] if not word.startswith("-")]
+    words += [str(plant[key]) for key in ("file", "type") if key in plant]
+    return model_of_names(Path([*files, *words][0]).stem.upper(), names)
 
 
 def _nowhere(*_: Any) -> Any:

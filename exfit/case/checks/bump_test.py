@@ -20,10 +20,13 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
         yield from _step_faults(test, name)
         yield from _table_faults(test.at(name), duration)
         for place, at in _moves(test.at(name)):
-            yield from _place_faults(place, at, duration)
+            yield from place_faults(place, at, duration)
         if name not in kind.events and name in test:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
-    yield from _terminal_fault_faults(test.at("fault"), duration)
+    if "fault" in test:
+        from exfit.case.checks.terminal_fault import terminal_fault_faults
+
+        yield from terminal_fault_faults(test.at("fault"), duration)
     if not kind.finds_rest and test.at("frequency_offset").value is not None:
         yield test.at("frequency_offset").fault(no_event(kind))
     for switch in test.at("network").entries:
@@ -33,24 +36,6 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
     if not kind.plays_back and test.content and not {*EVENTS} & test.content.keys():
         yield test.fault(f"no step: give one of {', '.join(kind.events)}")
     yield from _rest_faults(test, kind)
-
-
-def _terminal_fault_faults(given: ContentNode, duration: float | None) -> Iterator[Fault]:
-    """Yield faults at the terminals that are none, or last beyond the next one or the test."""
-    before: float | None = None
-    for entry in given.entries:
-        at, cleared = entry.at("at").number, entry.at("cleared").number
-        impedance = [entry.at(key) for key in ("R", "X") if key in entry]
-        if entry.is_section and all(node.number == 0.0 for node in impedance):
-            yield entry.fault("has no impedance: give R or X above 0, such as X: 0.001")
-        if at is not None and before is not None and at < before:
-            text = f"{show(at)} s: the fault before lasts until {show(before)} s"
-            yield entry.at("at").fault(text)
-        if at is not None and cleared is not None and cleared <= at:
-            yield entry.at("cleared").fault(f"{show(cleared)} s is not after {show(at)} s")
-        elif cleared is not None:
-            yield from _place_faults(entry.at("cleared"), cleared, duration)
-        before = cleared
 
 
 def _rest_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:
@@ -149,11 +134,11 @@ def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
                 end = show(start + ramp)
                 text = f"{show(at)} s is before {end} s, where the ramp before ends"
                 yield step.at("at").fault(text)
-            yield from _place_faults(step.at("at"), at, test.at("duration").number)
+            yield from place_faults(step.at("at"), at, test.at("duration").number)
         before = step
 
 
-def _place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
+def place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
     """Yield an instant outside a test that begins at 0 and has a known end."""
     if end is not None and not 0 <= at < end:
         yield place.fault(f"{show(at)} s lies outside 0 ... {show(end)} s, the duration")
@@ -195,7 +180,7 @@ def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterato
 
 def _instant_faults(test: ContentNode, opens: ContentNode, start: float) -> Iterator[Fault]:
     """Refuse an opening outside the test, and switchings of which the machine is parted."""
-    yield from _place_faults(opens, start, test.at("duration").number)
+    yield from place_faults(opens, start, test.at("duration").number)
     events = [
         (event.at("at"), event.at("at").number)
         for name in ("E", "angle", "network")

@@ -64,7 +64,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     driven = [(recording, _driving(recording, kind)) for recording in (content, *several)]
     balanced = content.at("estimate").content.get("weights") == "balanced"
     yield from weight_faults(driven, balanced)
-    yield from name_faults(several, [each.prefix[:-1] for each in parts.further])
+    yield from name_faults(several)
     yield from _estimate_faults(content, parts)
     yield from as_found_faults(content, parts)
     node = content.at("plant", "type")
@@ -119,8 +119,6 @@ def _plant_faults(
             if key in content:
                 text = f"not allowed with plant {kind.name}: it has no exciter"
                 yield content.at(key).fault(text)
-    if "further_units" in content and not kind.beside:
-        yield content.at("further_units").fault(f"not allowed with plant {kind.name}")
     for place in plants_of_records(content.content):
         own = content.at(*place)
         network, own_kind = own.at("network"), kind_of(own.content)

@@ -29,12 +29,28 @@ def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Ite
         yield from _stabiliser_faults(stabiliser, parts.stabiliser, on_load)
     if governor.content and parts.governor is not None:
         yield from _governor_faults(governor, parts.governor, content)
-    for at, unit in enumerate(content.at("further_units").entries):
-        own = next((each for each in parts.further if each.prefix == f"{FURTHER}{at + 2}."), None)
-        if own is not None and own.stabiliser is not None:
-            yield from _stabiliser_faults(unit.at("stabiliser"), own.stabiliser.model, on_load)
+    if "further_units" in content:
+        yield from _further_unit_faults(content, parts, kind)
     if kind.has_exciter:
         yield from _limiter_faults(content, parts, off_line)
+
+
+def _further_unit_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
+    """Yield further units of a plant without them, their stabilisers' faults, and records' names.
+
+    A value of a record is named after it, so that it has another name than a unit.
+    """
+    if not kind.beside:
+        yield content.at("further_units").fault(f"not allowed with plant {kind.name}")
+    units = {each.prefix[:-1]: each for each in parts.further}
+    for at, unit in enumerate(content.at("further_units").entries):
+        own = units.get(f"{FURTHER}{at + 2}")
+        if own is not None and own.stabiliser is not None:
+            yield from _stabiliser_faults(unit.at("stabiliser"), own.stabiliser.model, True)
+    several = (*content.at("records").entries, *content.at("validate").entries)
+    for name in (recording.at("name") for recording in several):
+        if name.text is not None and name.text.casefold().partition(".")[0] in units:
+            yield name.fault(f"{name.text!r} is taken: names of a further unit begin with it")
 
 
 def _stabiliser_faults(section: ContentNode, model: Model, on_load: bool) -> Iterator[Fault]:

@@ -163,17 +163,13 @@ def _noise_faults(compared: Sequence[ContentNode]) -> Iterator[Fault]:
             yield channel.at("noise").fault("is missing: other channels have it")
 
 
-def name_faults(recordings: Sequence[ContentNode], units: Sequence[str] = ()) -> Iterator[Fault]:
-    """Yield the names of records that cannot be used: files and values are named after them.
-
-    ``units`` are the names of further units.
-    """
+def name_faults(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
+    """Yield the names of records that cannot be used: files and values are named after them."""
     names = [recording.at("name") for recording in recordings]
     for index, reason in taken_names([name.text for name in names]):
         yield names[index].fault(f"{names[index].text!r} {reason}")
     for name in names:
-        begin = "" if name.text is None else name.text.casefold().partition(".")[0]
-        if begin in (*PREFIXES_OF_PARTS, *units):
+        if name.text is not None and name.text.casefold().partition(".")[0] in PREFIXES_OF_PARTS:
             text = f"{name.text!r} is taken: names of a part of the plant begin with it"
             yield name.fault(text)
 

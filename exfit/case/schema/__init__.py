@@ -226,9 +226,8 @@ class CaseDocument(Section):
     further_units: tuple[FurtherUnitSection, ...] = Field(
         default=(),
         min_length=1,
-        description="Further units at the same point of measurement, such as that of a PMU: p, q "
-        "and it are the sums of all; grid-playback only. Their parameters begin with unit2., "
-        "unit3. and so on.",
+        description="Further units behind the same PMU, with parameters unit2.KA, unit3.KA ...: p, "
+        "q and it are the sums of all; grid-playback only.",
     )
     test: BumpTest | None = Field(
         default=None,

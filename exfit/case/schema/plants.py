@@ -254,8 +254,9 @@ SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 
 class AddedModel(Section):
-    """A model that a unit on load has beside its exciter."""
+    """A model with its data."""
 
+    model: Text = Field(description="Name of the model.")
     parameters: Frozen[Given] = Field(
         default_factory=nothing,
         description="Its data; a missing value is the typical one.",
@@ -302,7 +303,6 @@ class AloneOnLoad(WithNetwork):
 class Stabiliser(AddedModel):
     """A power system stabiliser; it acts on load only."""
 
-    model: Text = Field(description="Name of the stabiliser model.")
     inputs: tuple[Heard, ...] | None = Field(
         default=None,
         min_length=1,
@@ -314,20 +314,12 @@ class Stabiliser(AddedModel):
 class Governor(AddedModel):
     """A turbine with its governor; it acts where the speed follows from the power."""
 
-    model: Text = Field(description="Name of the governor model.")
-
-
-class UnitModel(AddedModel):
-    """The exciter or the machine of a further unit."""
-
-    model: Text = Field(description="Name of the model in the catalogue.")
-
 
 class FurtherUnitSection(Section):
     """A further unit, the powers of which are recorded together with those of the case's."""
 
-    exciter: UnitModel = Field(description="Its exciter.")
-    machine: UnitModel = Field(description="Its machine.")
+    exciter: AddedModel = Field(description="Its exciter.")
+    machine: AddedModel = Field(description="Its machine.")
     stabiliser: Stabiliser | None = Field(default=None, description="Its stabiliser.")
     governor: Governor | None = Field(default=None, description="Its governor.")
     network: Frozen[Number] = Field(
@@ -341,7 +333,6 @@ class FurtherUnitSection(Section):
 class Limiter(AddedModel):
     """A limiter of over- or underexcitation."""
 
-    model: Text = Field(description="Name of the limiter model.")
     place: Place | None = Field(
         default=None,
         description="Where it acts on the exciter: takeover, the gate of its kind; "

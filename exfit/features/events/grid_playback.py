@@ -16,10 +16,10 @@ from exfit.plants import (
     REFERENCES,
     VT0,
     Equipment,
-    FurtherUnit,
     PlantKind,
     PowerAt,
 )
+from exfit.plants.further import FurtherUnit
 from exfit.plants.limiting import signals_of
 from exfit.plants.loaded_machine import Flow, Terminals, behind, current, voltage
 from exfit.plants.parts import (
@@ -161,7 +161,7 @@ def prefixed(each: FurtherUnit, values: Signals) -> dict[str, Signal]:
 def as_unit(each: FurtherUnit, beside: UnitOnLoad) -> UnitOnLoad:
     """Return a further unit with what it shares with the case's."""
     return beside._replace(
-        exciter=each.exciter,
+        exciter=each.exciter.in_dialect(beside.dialect),
         machine=each.machine,
         stabiliser=each.stabiliser,
         governor=each.governor,

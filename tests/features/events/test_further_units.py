@@ -12,7 +12,8 @@ from exfit.features.events.grid_playback import TRANSFORMER, grid_playback
 from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import GOVERNOR, NETWORK, STABILISER, VT0, FurtherUnit, Stabilised
+from exfit.plants import GOVERNOR, NETWORK, STABILISER, VT0, Stabilised
+from exfit.plants.further import FurtherUnit
 from exfit.plants.unit import UnitOnLoad
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
