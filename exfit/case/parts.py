@@ -120,7 +120,7 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
     if not kind.has_equations:
         from exfit.plants.outside import stand_in
 
-        fixed, free = (_at(data, ("parameters", key)) for key in ("fixed", "free"))
+        fixed, free = _at(data, ("parameters", "fixed")), _at(data, ("parameters", "free"))
         exciter = stand_in(plant, {**fixed, **free})
     elif kind.has_exciter:
         exciter = _exciter(data, folder, faults, model_sha256)
@@ -166,11 +166,17 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
             faults.append(Fault(place, text))
     added_models = (models["stabiliser"], models["governor"])
     found = Parts(exciter, machine, *added_models, tuple(parts), tuple(limiters.values()))
-    if "further_units" in data and kind.beside:
-        from exfit.case.further_units import with_further_units
+    return _with_further(found, _entries(data.get("further_units")), kind, named)
 
-        return with_further_units(found, _entries(data["further_units"]), kind, named)
-    return found
+
+def _with_further(
+    found: Parts, entries: list[Any], kind: PlantKind, named: Callable[..., Any]
+) -> Parts:
+    if not entries or not kind.beside:
+        return found
+    from exfit.case.further_units import with_further_units
+
+    return with_further_units(found, entries, kind, named)
 
 
 def kind_of(plant: Data) -> PlantKind:

@@ -4,6 +4,7 @@ import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -150,8 +151,8 @@ def fit_result(
         governor_model=models.get("governor"),
         limiters={kind: own_values[kind] for kind in limiters},
         limiter_models={kind: models[kind] for kind in limiters},
-        units={kind: own for kind, own in own_values.items() if kind.startswith(FURTHER)},
-        unit_models={kind: name for kind, name in models.items() if kind.startswith(FURTHER)},
+        units=_of_units(own_values),
+        unit_models=_of_units(models),
         cost=best.cost,
         comparisons=comparisons,
         knowledge=uncertainty,
@@ -257,6 +258,11 @@ def _comparisons(
         )
         for setup in fine
     )
+
+
+def _of_units(by_kind: dict[str, Any]) -> dict[str, Any]:
+    """Return what belongs to parts of further units."""
+    return {kind: own for kind, own in by_kind.items() if kind.startswith(FURTHER)}
 
 
 def _of_parts(

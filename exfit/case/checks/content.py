@@ -166,14 +166,19 @@ def _recording_faults(
             yield record.fault(f"is missing: plant {kind.name} plays it back")
         return
     yield from record_faults(test, record)
-    places = ("parameters", "plant", "stabiliser", "governor")
-    sections = [*map(content.at, places), *content.at("limiters").entries]
-    sections += [part for unit in content.at("further_units").entries for _, part in unit.sections]
-    fits = any(section.at("free").content for section in sections)
+    fits = _fits(content)
     yield from channels_faults(record, own, kind, fits or not kind.finds_rest)
     if kind.plays_back and "vs" in record.at("channels") and content.at("stabiliser").content:
         text = "not allowed with a stabiliser, whose output it is: leave one of them out"
         yield record.at("channels", "vs").fault(text)
+
+
+def _fits(content: ContentNode) -> bool:
+    """Tell if a parameter of any part is free."""
+    places = ("parameters", "plant", "stabiliser", "governor")
+    sections = [*map(content.at, places), *content.at("limiters").entries]
+    sections += [part for unit in content.at("further_units").entries for _, part in unit.sections]
+    return any(section.at("free").content for section in sections)
 
 
 def _estimate_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
