@@ -236,8 +236,8 @@ FAULTS = {
     ),
     "a machine that exfit lacks": (
         "GENROU",
-        "GENTPJ1",
-        "unit.dyr:1: GENTPJ1: exfit has no machine of that name",
+        "GENTWO1",
+        "unit.dyr:1: GENTWO1: exfit has no machine of that name",
     ),
     "a classical machine": (
         "GENROU",
