@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind, ParameterFile
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
@@ -35,13 +34,22 @@ parameters_option = click.option(
     metavar="FILE",
     help="Values from the parameters.yaml of a fit, or from the folder that holds it.",
 )
+
+
+def _assigned(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete a parameter of the case; only a shell asks for it."""
+    from exfit.cli.completion import assigned_parameters
+
+    return assigned_parameters(ctx, parameter, incomplete)
+
+
 set_option = click.option(
     "--set",
     "changes",
     multiple=True,
     metavar="KA=400",
     help="Value of a parameter.",
-    shell_complete=completion.assigned_parameters,
+    shell_complete=_assigned,
 )
 ANY_PATH = click.Path(path_type=Path)
 ABOVE_ZERO = click.FloatRange(min=0.0, min_open=True)

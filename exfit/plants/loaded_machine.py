@@ -155,9 +155,7 @@ def connected(
         it = 0.0 if is_zero(square) else sqrt(square + NO_CURRENT)
         return saturated(modulus(gap_q, gap_d) / speed, it, p), at, i
 
-    fluxes.SAT = 0.0
-    idle = source().voltage
-    first = saturated(modulus(idle.q, idle.d) / speed, 0.0, p)
+    first = machine.idle_saturation(fluxes, p)
     second, _, _ = following(first)
     third, _, _ = following(second)
     step = second - first

@@ -24,7 +24,6 @@ from exfit.plants.limiting import (
     signals_of,
     states_of,
 )
-from exfit.plants.loaded_machine import connected
 from exfit.plants.parts import (
     Names,
     exciter_inputs,
@@ -46,8 +45,8 @@ NO_CURRENT = Axes(0.0, 0.0)
 def without_current(machine: Machine, x: Signals, p: Names) -> tuple[Names, Signal, Signal]:
     """Return the states of a machine, its voltage and its field current; its q axis rests at 0."""
     fluxes = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
-    at, _ = connected(machine, lambda: machine.source(fluxes, p), lambda at: NO_CURRENT, fluxes, p)
-    return fluxes, at.voltage.q, machine.field(fluxes, NO_CURRENT, p)
+    fluxes.SAT = machine.idle_saturation(fluxes, p)
+    return fluxes, machine.source(fluxes, p).voltage.q, machine.field(fluxes, NO_CURRENT, p)
 
 
 def at_rest(machine: Machine, vt: Signal, p: Names) -> tuple[dict[str, Signal], Signal]:

@@ -453,7 +453,7 @@ FORM = {
 }
 
 MEANING = {
-    "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "did you mean AC1A or AC1C?"]),
+    "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "did you mean AC11C or AC1A?"]),
     "missing model file": (
         "model: AC1A",
         "model: mine.py",

@@ -164,8 +164,7 @@ def test_saturation_of_the_machine_has_its_two_points(exciter):
     ("machine", "wrong", "symbol"),
     [
         ("GENROU", {"Xpd": 1.8}, "Xd"),
-        ("GENROU", {"Xppd": 0.4}, "Xpd"),
-        ("GENROU", {"Xl": 0.26}, "Xppd"),
+        ("GENROU", {"Xl": 0.4}, "Xpd"),
         ("GENSAL", {"Tppd0": 7.0}, "Tpd0"),
         ("GENROU", {"Tppd0": 7.0}, "Tpd0"),
         ("GENROU", {"S10": 0.3, "S12": 0.2}, "S12"),

@@ -88,6 +88,14 @@ class Machine(NamedTuple):
     saturated: Callable[..., Signal] | None = None
     speed: Literal["", "torque", "voltage"] = ""
 
+    def idle_saturation(self, fluxes: Signal, p: Signal) -> Signal:
+        """Saturation of X'' without a current of the stator; 0 where X'' does not saturate."""
+        if self.saturated is None:
+            return 0.0
+        fluxes.SAT = 0.0
+        voltage = self.source(fluxes, p).voltage
+        return self.saturated(modulus(voltage.q, voltage.d), 0.0, p)
+
     @property
     def states(self) -> tuple[str, ...]:
         """All states, those that move on open circuit first."""
