@@ -255,17 +255,17 @@ def _farther(name, value):
     return value * 2.0 if value else 1.0
 
 
-def _narrowed(system, inputs, values, seed):
+def _narrowed(system, inputs, wide, seed):
     """Return values whose limits lie within the moves of the response, where it stays sound."""
-    rng = np.random.default_rng(seed)
-    for limiter, value, bound, _ in _along_run(_probe(system, inputs), values)[1]:
+    rng, values = np.random.default_rng(seed), wide
+    for limiter, value, bound, _ in _along_run(_probe(system, inputs), wide)[1]:
         name, towards = limiter.limit, limiter.sign * (value - value[0])
         peak, share = int(np.argmax(towards)), rng.uniform(0.3, 0.8)
         level = value[0] + share * (value[peak] - value[0])
         if name not in values or not towards[peak] > LEAST_MOVE:
             continue
-        plain = limiter.bound.op == "symbol"
-        narrow = level if plain else values[name] * level / bound[peak]
+        plain = limiter.bound.op == "symbol" or bound[peak] == wide[name]
+        narrow = level if plain else wide[name] * level / bound[peak]
         changed = values | {name: float(narrow)}
         inward = (narrow - values[name]) * limiter.sign < 0.0
         if inward and not any(contradictions(changed)) and _sound(system, inputs, changed):
