@@ -60,6 +60,8 @@ MACHINE_NAMES = (
     "GENSAL",
     "GENSAE",
     "GENTPJ",
+    "GENQEC",
+    "GENQEJ",
     "ONE_AXIS",
 )  # known without their files
 

@@ -282,7 +282,8 @@ class DynamicsRecord:
     order; ``spelled`` are symbols with their names in the file, where these differ by more than
     capitals; ``times_speed`` says that efd is multiplied by the speed there; ``places`` are where a
     limiter acts by the value of its flag, OEL or UEL, which is one of the integers; ``signals`` are
-    those of the codes of a stabiliser's inputs, where they are others than usual.
+    those of the codes of a stabiliser's inputs, where they are others than usual; ``user`` is what
+    stands between the name of a user's model and its data.
     """
 
     name: str
@@ -298,6 +299,7 @@ class DynamicsRecord:
     unused: tuple[tuple[str, str], ...] = ()
     exchanged: tuple[str, ...] = ()
     signals: tuple[tuple[int, str], ...] = ()
+    user: tuple[str, ...] = ()
 
 
 Records = tuple[DynamicsRecord, ...]
@@ -319,6 +321,7 @@ def record(
     unused: Mapping[str, str] = NONE,
     exchanged: str = "",
     signals: Mapping[int, str] = NONE,
+    user: str = "",
 ) -> Records:
     """Return a record from its symbols in one text, ``"TR KA TA"``; several are added."""
     made = DynamicsRecord(
@@ -335,6 +338,7 @@ def record(
         tuple(unused.items()),
         tuple(exchanged.split()),
         tuple(signals.items()),
+        tuple(user.split()),
     )
     return (made,)
 

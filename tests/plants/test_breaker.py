@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from on_load import QUADRATIC, system, values_on_load
-from oracle import MACHINE_SATURATION
+from oracle import saturated
 from typed_rejection import Lag, Load, rejection, typed_machine
 
 from exfit.engine.system import trace
@@ -19,7 +19,6 @@ from exfit.simulation.simulator import Simulator
 OPENS, END, STEP = 1.0, 8.0, 1e-3
 AFTER = np.linspace(OPENS, END, 701)[1:]
 LOADS = (Load(0.0, -0.3), Load(0.0, 0.4, 1.03), Load(0.6, 0.1), Load(0.3, -0.35))
-UNSATURATED = {"S10": 0.0, "S12": 0.0}
 
 
 @pytest.fixture(params=list(MACHINES))
@@ -28,7 +27,11 @@ def machine(request):
 
 
 def data_of(machine, **changes):
-    return typical(machine.sheet) | MACHINE_SATURATION | {"H": 3.5, "D": 0.0} | changes
+    return saturated(machine) | {"H": 3.5, "D": 0.0} | changes
+
+
+def unsaturated(machine, **changes):
+    return typical(machine.sheet) | {"H": 3.5, "D": 0.0, "S10": 0.0, "S12": 0.0} | changes
 
 
 def values_of(data, load):
@@ -70,7 +73,7 @@ def test_a_reactive_current_on_the_d_axis_leaves_a_sum_of_exponentials(machine, 
     """
     if machine.name == "GENTPJ":
         pytest.skip("its damper does not see the leakage: typed again below")
-    m = data_of(machine, **UNSATURATED)
+    m = unsaturated(machine)
     i_d, t = load.Q / load.vt, AFTER - OPENS
     efd = load.vt + m["Xd"] * i_d
     if machine.name == "ONE_AXIS":
@@ -99,7 +102,7 @@ def test_with_a_fast_damper_the_terms_are_those_of_the_standard(machine):
     """
     if machine.name == "ONE_AXIS":
         pytest.skip("has no damper")
-    m = data_of(machine, Tpd0=50.0, Tppd0=1e-3, **UNSATURATED)
+    m = unsaturated(machine, Tpd0=50.0, Tppd0=1e-3)
     i_d, t = -0.3, AFTER - OPENS
     slow = (m["Xd"] - m["Xpd"]) * i_d * np.exp(-t / m["Tpd0"])
     fast = (m["Xpd"] - m["Xppd"]) * i_d * np.exp(-t / m["Tppd0"])
@@ -114,7 +117,7 @@ def test_on_the_q_axis_the_voltage_along_d_dies_with_the_times_of_the_q_axis(mac
     """
     if machine.name == "GENTPJ":
         pytest.skip("its damper does not see the leakage: typed again below")
-    m = data_of(machine, H=1e9, **UNSATURATED)  # the speed stays
+    m = unsaturated(machine, H=1e9)  # the speed stays
     i_q, xq = 0.4, m["Xq"]
     delta = np.arcsin(xq * i_q)  # vd = Xq iq at vt = 1
     load = Load(i_q * np.cos(delta), -i_q * np.sin(delta))

@@ -11,7 +11,7 @@ from oracle import vector
 from places import REFERENCE
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
-from typed_on_load import Typed, TypedTypeJOnLoad
+from typed_on_load import Typed, TypedSaturatingOnLoad
 
 from exfit.engine.kernel import LinearKernel
 from exfit.engine.system import parameters_used
@@ -171,8 +171,8 @@ def test_a_line_trip_is_that_of_equations_typed_again(machine):
     values |= {"K": GAIN, "TE": LAG, "TATB": 1.0, "EMAX": 99.0, "EMIN": -99.0, NETWORK + "Q": 0.2}
     m = {k.removeprefix(MACHINE): v for k, v in values.items() if k.startswith(MACHINE)}
     n = {k.removeprefix(NETWORK): v for k, v in values.items() if k.startswith(NETWORK)}
-    of_type_j = machine.name == "GENTPJ"
-    typed = TypedTypeJOnLoad(m, n) if of_type_j else Typed(machine.name, m, n)
+    kind = TypedSaturatingOnLoad if machine.saturated else Typed
+    typed = kind(machine.name, m, n)
     current = np.conj((n["P"] + 1j * n["Q"]) / values[VT0])
     E = abs(values[VT0] - (n["R"] + 1j * n["X"]) * current)
 

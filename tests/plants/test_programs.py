@@ -20,6 +20,8 @@ DRIFTS = {
     "powerworld_exst1": 1.2,
     "powerworld_st6b": 1.8,
     "psse_gentpj1": 4.0,
+    "psse_genqec": 2.5,
+    "psse_genqej": 2.5,
 }
 
 

@@ -38,6 +38,14 @@ SATURATED = (
     *((name, form) for name, machine, form in SURROUNDED if form != "quadratic"),
 )
 MACHINE_SATURATION = {"S10": 0.12, "S12": 0.4}
+OF_CURRENT = {"Kis": 0.1, "Kw": 0.05}  # of those machines that saturate by the current, too
+
+
+def saturated(machine):
+    """Return typical data of a machine that saturates, by the current too where it has that."""
+    values = typical(machine.sheet)
+    of_current = {symbol: value for symbol, value in OF_CURRENT.items() if symbol in values}
+    return values | MACHINE_SATURATION | of_current
 
 
 @cache
@@ -55,7 +63,7 @@ def typical_values(name: str, machine: str = "GENROU", **changes: float) -> dict
     if name in WITHOUT_PLANT:
         values[VT0] = 0.0
     else:
-        of_machine = {**typical(MACHINES[machine].sheet), **MACHINE_SATURATION}
+        of_machine = saturated(MACHINES[machine])
         values |= {MACHINE + symbol: value for symbol, value in of_machine.items()} | {VT0: 1.0}
     return values | {symbol.replace("machine_", MACHINE): v for symbol, v in changes.items()}
 

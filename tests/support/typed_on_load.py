@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 from scipy.optimize import fsolve
-from typed_rejection import TypedTypeJ
+from typed_rejection import typed_machine
 
 
 def quadratic_curve(x, s10, s12):
@@ -89,35 +89,35 @@ class Typed:
         return np.hypot(*self.stator(x, E, R, X)[:2])
 
 
-class TypedTypeJOnLoad:
-    """GENTPJ: the current into the line by a root search; Te is the power by the speed."""
+class TypedSaturatingOnLoad:
+    """GENTPJ, GENQEC, GENQEJ: current into the line by a root search; Te is power by speed."""
 
     salient = False
 
-    def __init__(self, m, n):
-        self.m, self.n, self.machine = m, n, TypedTypeJ("GENTPJ", m)
+    def __init__(self, name, m, n):
+        self.m, self.n, self.machine = m, n, typed_machine(name, m)
 
     def stator(self, x, E, R, X):
-        own = [x[0], x[1], -x[2], -x[3]]
+        own, speed = [x[0], x[1], -x[2], -x[3]], 1.0 + x[5]
 
         def off(i):
-            v_d, v_q = self.machine.voltages(own, *i)
+            v_d, v_q = self.machine.voltages(own, *i, speed)
             return [
                 v_d - E * np.sin(x[4]) - R * i[0] + X * i[1],
                 v_q - E * np.cos(x[4]) - X * i[0] - R * i[1],
             ]
 
         i = fsolve(off, [0.3, 0.8], xtol=1e-13)
-        return *self.machine.voltages(own, *i), *i
+        return *self.machine.voltages(own, *i, speed), *i
 
     def slopes(self, x, efd, Pm, E, R, X):
         v_d, v_q, i_d, i_q = self.stator(x, E, R, X)
-        own = [x[0], x[1], -x[2], -x[3]]
-        d = self.machine.slopes(own, efd, i_d, i_q)
+        own, speed = [x[0], x[1], -x[2], -x[3]], 1.0 + x[5]
+        d = self.machine.slopes(own, efd, i_d, i_q, speed)
         swing = (Pm - self.m["D"] * x[5] - v_d * i_d - v_q * i_q) / (1.0 + x[5])
         turn = 2.0 * pi * self.n["f0"] * x[5]
         moved = [d[0], d[1], -d[2], -d[3], turn, swing / (2.0 * self.m["H"])]
-        return moved, self.machine.ifd(own, i_d, i_q)
+        return moved, self.machine.ifd(own, i_d, i_q, speed)
 
     def vt(self, x, E, R, X):
         return np.hypot(*self.stator(x, E, R, X)[:2])

@@ -128,39 +128,44 @@ class TypedMachine:
 class TypedTypeJ(TypedMachine):
     """GENTPJ by its specification; ``x`` are E'q, E''q, -E'd, -E''d."""
 
+    follows_speed = False  # the voltage behind X''
+
     def __init__(self, name, data):
         super().__init__(name, data)
-        self.round = True
+        self.round, self.q_share = True, data["Xq"] / data["Xd"]
 
-    def factors(self, x, i_d, i_q):
+    def factors(self, x, i_d, i_q, speed=1.0):
         """Return 1 + Sd and 1 + Sq: S is at the air-gap voltage that it itself leaves."""
-        m = self.m
+        m, speed = self.m, speed if self.follows_speed else 1.0
+        d, q, *_ = self.behind(x)
 
         def off(s):
-            v_d = -x[3] + (m["Xppq"] - m["Xl"]) / (1.0 + s * m["Xq"] / m["Xd"]) * i_q
-            v_q = x[1] - (m["Xppd"] - m["Xl"]) / (1.0 + s) * i_d
-            at = np.hypot(v_d, v_q) + m["Kis"] * np.hypot(i_d, i_q)
+            v_d = -speed * q + (m["Xppq"] - m["Xl"]) / (1.0 + s * self.q_share) * i_q
+            v_q = speed * d - (m["Xppd"] - m["Xl"]) / (1.0 + s) * i_d
+            at = np.hypot(v_d, v_q) / speed + m.get("Kis", 0.0) * np.hypot(i_d, i_q)
             return self._curve(at) / at - s
 
         s = brentq(off, -1e-3, 20.0, xtol=1e-15)
-        return 1.0 + s, 1.0 + s * m["Xq"] / m["Xd"]
+        return 1.0 + s, 1.0 + s * self.q_share
 
     def behind(self, x):
         return x[1], x[3], None, None
 
-    def voltages(self, x, i_d, i_q):
-        m, (of_d, of_q) = self.m, self.factors(x, i_d, i_q)
+    def voltages(self, x, i_d, i_q, speed=1.0):
+        m, (of_d, of_q) = self.m, self.factors(x, i_d, i_q, speed)
         x_d, x_q = (
             (m[name] - m["Xl"]) / by + m["Xl"] for name, by in (("Xppd", of_d), ("Xppq", of_q))
         )
-        return -x[3] + x_q * i_q, x[1] - x_d * i_d
+        d, q, *_ = self.behind(x)
+        speed = speed if self.follows_speed else 1.0
+        return -speed * q + x_q * i_q, speed * d - x_d * i_d
 
-    def ifd(self, x, i_d, i_q=0.0):
+    def ifd(self, x, i_d, i_q=0.0, speed=1.0):
         m = self.m
         first = x[1] + (x[0] - x[1]) * (m["Xd"] - m["Xppd"]) / (m["Xpd"] - m["Xppd"])
         return self.factors(x, i_d, i_q)[0] * first
 
-    def slopes(self, x, efd, i_d, i_q):
+    def slopes(self, x, efd, i_d, i_q, speed=1.0):
         m, (of_d, of_q) = self.m, self.factors(x, i_d, i_q)
         first = x[3] + (x[2] - x[3]) * (m["Xq"] - m["Xppq"]) / (m["Xpq"] - m["Xppq"])
         return [
@@ -171,9 +176,49 @@ class TypedTypeJ(TypedMachine):
         ]
 
 
+class TypedTypeC(TypedTypeJ):
+    """GENQEC, GENQEJ: an unsaturated machine with X - Xl, times and efd divided by 1 + S.
+
+    ``x`` are psi'd, psi1d, psi'q, psi2q.
+    """
+
+    follows_speed = True
+
+    def __init__(self, name, data):
+        super().__init__(name, data)
+        self.q_share = 1.0
+
+    def behind(self, x):
+        m = self.m
+        d, q = ((m[f"Xpp{at}"] - m["Xl"]) / (m[f"Xp{at}"] - m["Xl"]) for at in "dq")
+        return d * x[0] + (1.0 - d) * x[1], q * x[2] + (1.0 - q) * x[3], None, None
+
+    def damper(self, at, first, second, i, by):
+        """Return the current of the first winding of an axis, and what drives the second."""
+        x, xp, xpp = ((self.m[f"X{of}{at}"] - self.m["Xl"]) / by for of in ("", "p", "pp"))
+        driving = first - second - xp * i
+        return first + (x - xp) * (i + (xp - xpp) / xp**2 * driving), driving
+
+    def ifd(self, x, i_d, i_q=0.0, speed=1.0):
+        by, _ = self.factors(x, i_d, i_q, speed)
+        return by * self.damper("d", *x[:2], i_d, by)[0] / (1.0 - self.m.get("Kw", 0.0) * i_d)
+
+    def slopes(self, x, efd, i_d, i_q, speed=1.0):
+        m, (by, _) = self.m, self.factors(x, i_d, i_q, speed)
+        _, along_d = self.damper("d", *x[:2], i_d, by)
+        current, along_q = self.damper("q", *x[2:], i_q, by)
+        return [
+            (efd - self.ifd(x, i_d, i_q, speed)) / m["Tpd0"],
+            along_d / (m["Tppd0"] / by),
+            -current / (m["Tpq0"] / by),
+            along_q / (m["Tppq0"] / by),
+        ]
+
+
 def typed_machine(name, data):
     """Return a machine by its name."""
-    return (TypedTypeJ if name == "GENTPJ" else TypedMachine)(name, data)
+    kinds = {"GENTPJ": TypedTypeJ, "GENQEC": TypedTypeC, "GENQEJ": TypedTypeC}
+    return kinds.get(name, TypedMachine)(name, data)
 
 
 def rejection(name, data, load, time, exciter=None, after=None):

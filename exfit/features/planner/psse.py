@@ -23,6 +23,7 @@ from exfit.util.text import show_value
 
 COMMENTS = ("//", "@!")
 ENDLESS = "the record that begins here has no '/'"
+USER = "USRMDL"  # the record of a model that is not one of PSS/E's own
 FIELD = re.compile(
     r"""(?P<comma>,) | (?P<end>/) | '(?P<single>[^']*)' | "(?P<double>[^"]*)"
     | (?P<open>['"]) | (?P<plain>[^\s,/'"]+)""",
@@ -116,16 +117,29 @@ def heads(text: str, buses: Buses = NO_BUSES) -> Heads:
             continue  # of a line or a device: their records begin otherwise
         place = _by_number(fields[0], buses)
         bus, name, machine_id = place.text, fields[1].text, fields[2].text
-        wrong, definition = [*wrong_place(place, machine_id)], definition_of(name)
+        wrong, definition, data = [*wrong_place(place, machine_id)], definition_of(name), fields[3:]
+        if name.upper() == USER and data:  # a user's model has its own name
+            name, definition, data = _of_user(name, data)
         if not wrong:
-            own = name.upper() == "USRMDL" and fields[3:]  # a user's model has its own name
-            label = in_comment(f"{name} {fields[3].text}" if own else name).upper()
+            label = in_comment(name).upper()
             known = buses[int(bus)].name.strip() if int(bus) in buses else ""
-            head = Head(int(bus), label, machine_id, line, fields[3:], definition)
+            head = Head(int(bus), label, machine_id, line, data, definition)
             found.append(head._replace(bus_name=known))
         elif definition is not None:
             faults += [DynamicsFault(line, f"{name.upper()}: {what}") for what in wrong]
     return Heads(found, faults)
+
+
+def _of_user(
+    name: str, data: tuple[Field, ...]
+) -> tuple[str, Definition | None, tuple[Field, ...]]:
+    """Return the name, the definition and the data of a user's model; None if it is not known."""
+    known = definition_of(data[0].text)
+    user = () if known is None else known.record.user
+    behind = 1 + len(user)
+    if user and tuple(field.text for field in data[1:behind]) == user:
+        return data[0].text, known, data[behind:]
+    return f"{name} {data[0].text}", None, data
 
 
 def _by_number(field: Field, buses: Buses) -> Field:
@@ -138,10 +152,12 @@ def record_text(
     definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
 ) -> str:
     """Return a record as a dynamics file has it."""
+    name, user = f"'{definition.record.name}'", definition.record.user
     fields = [
         str(bus),
-        f"'{definition.record.name}'",
+        f"'{USER}'" if user else name,
         machine_id if machine_id.isalnum() else f"'{machine_id}'",
+        *((name, *user) if user else ()),
         *record_fields(definition, values),
         "/",
     ]

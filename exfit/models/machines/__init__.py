@@ -18,6 +18,8 @@ class Machines(Mapping[str, Machine]):
         "GENSAL": "salient_pole",
         "GENSAE": "salient_pole",
         "GENTPJ": "gentpj",
+        "GENQEC": "genqec",
+        "GENQEJ": "genqec",
         "ONE_AXIS": "one_axis",
     }
 

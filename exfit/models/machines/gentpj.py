@@ -7,7 +7,7 @@ J. Weber's description of it (PowerWorld, 2015). The d axis has the factor 1 + S
 
 from collections.abc import Mapping
 
-from exfit.models.blocks import Signal, modulus, where
+from exfit.models.blocks import Signal, modulus
 from exfit.models.machines.machine import (
     Axes,
     Faults,
@@ -19,7 +19,7 @@ from exfit.models.machines.machine import (
     pslf_record,
     saturation_order,
 )
-from exfit.models.machines.round_rotor import LEAST_TIME
+from exfit.models.machines.round_rotor import transient_time
 from exfit.models.sheet import TIME, UP_TO_10, record, sheet
 
 SUBTRANSIENT_TIME = "s", (0.001, 1000.0)
@@ -61,11 +61,15 @@ def factors(s: Signal, p: Signal) -> Axes:
     return Axes(1.0 + s.SAT, 1.0 + s.SAT * p.Xq / p.Xd)
 
 
+def behind(voltage: Axes, by: Axes, p: Signal) -> Source:
+    """Return a voltage behind X'' of both axes, which are saturated by factors."""
+    xd, xq = (p.Xppd - p.Xl) / by.d + p.Xl, (p.Xppq - p.Xl) / by.q + p.Xl
+    return Source(voltage, xd, xq)
+
+
 def source(s: Signal, p: Signal) -> Source:
     """Both axes behind their saturated X''."""
-    by = factors(s, p)
-    xd, xq = (p.Xppd - p.Xl) / by.d + p.Xl, (p.Xppq - p.Xl) / by.q + p.Xl
-    return Source(Axes(s.ED2, s.EQ2), xd, xq)
+    return behind(Axes(s.ED2, s.EQ2), factors(s, p), p)
 
 
 def field(s: Signal, i: Axes, p: Signal) -> Signal:
@@ -82,7 +86,7 @@ def slopes(s: Signal, efd: Signal, ifd: Signal, i: Axes, p: Signal, d: Signal) -
 
 def q_slopes(s: Signal, i: Axes, p: Signal, d: Signal) -> None:
     """Write those of the q axis, on which nothing excites; T'q0 = 0 is no transient winding."""
-    by, time = factors(s, p).q, where(p.Tpq0 < LEAST_TIME, p.Tppq0, p.Tpq0)
+    by, time = factors(s, p).q, transient_time(p)
     transient = (s.EDP - s.ED2) * (p.Xq - p.Xppq) / (p.Xpq - p.Xppq)
     d.EDP = -by * (s.ED2 + transient) / time
     d.ED2 = (by * (s.EDP - s.ED2) + (p.Xpq - p.Xppq) * i.q) / p.Tppq0

@@ -185,7 +185,12 @@ PSLF_NAMES = {
 
 
 def pslf_record(
-    name: str, cons: str, behind: str = "", held: Mapping[str, float] = NONE
+    name: str,
+    cons: str,
+    behind: str = "",
+    held: Mapping[str, float] = NONE,
+    icons: Mapping[str, int] = NONE,
+    doubt: str = "",
 ) -> Records:
     """Return PSLF's record of a machine: what it has more is taken as none."""
     return record(
@@ -195,6 +200,8 @@ def pslf_record(
         ignored="RA ACCEL",
         spelled=PSLF_NAMES,
         held=held,
+        icons=icons,
+        doubt=doubt,
     )
 
 

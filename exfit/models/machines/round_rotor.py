@@ -76,12 +76,16 @@ def field(form: Callable[..., Signal], s: Signal, i: Axes, p: Signal) -> Signal:
 
 def q_slopes(form: Callable[..., Signal], s: Signal, i: Axes, p: Signal, d: Signal) -> None:
     """T'q0 dE'd/dt and T''q0 dpsiq/dt: the d axis mirrored, with nothing that excites it."""
+    current = unsaturated_q_current(s, i.q, p.Xppd, p)
+    d.EDP = -(current + along_axes(form, source(s, p).voltage, p).d) / transient_time(p)
+    _, d.PSIQ = lag(s.EDP + (p.Xpq - p.Xl) * i.q, s.PSIQ, 1.0, p.Tppq0)
+
+
+def unsaturated_q_current(s: Signal, i_q: Signal, Xppq: Signal, p: Signal) -> Signal:
+    """Return i1q, of the transient winding of a q axis without saturation."""
     inner = p.Xpq - p.Xl
-    coupling = (p.Xpq - p.Xppd) / (inner * inner)
-    damped = s.EDP + inner * i.q
-    current = (p.Xq - p.Xpq) * (coupling * (damped - s.PSIQ) - i.q)
-    d.EDP = -(s.EDP + current + along_axes(form, source(s, p).voltage, p).d) / transient_time(p)
-    _, d.PSIQ = lag(damped, s.PSIQ, 1.0, p.Tppq0)
+    coupling = (p.Xpq - Xppq) / (inner * inner)
+    return s.EDP + (p.Xq - p.Xpq) * (coupling * (s.EDP + inner * i_q - s.PSIQ) - i_q)
 
 
 def transient_time(p: Signal) -> Signal:

@@ -88,6 +88,8 @@ STAB2A K2 T2 K3 T3 K4 K5 T5 HLIM
 # 36.7 ran BBSEX1, EXELI, IEEET4, ST1C, ST10C, PSS2C, PSS3C, PSS6C, PSS7C so, and AC8C's constants
 # as its AC8CU1
 INTERPSS = """
+GENQECU SATFUNC Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xppq Xl S10 S12 Kw
+GENQEJU SATFUNC Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xppq Xl S10 S12 Kis
 BBSEX1 TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN SWITCH
 ESAC4A TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC
 DC3A TR KV VRMAX VRMIN TRH TE KE VEMIN E1 SE1 E2 SE2
@@ -210,7 +212,7 @@ ORDERS = {
 OF_ONE_SOURCE = {"ESURRY", "PSS5C", "OEL2C", "OEL3C", "UEL2C", "ST2C", "ST3C"}
 # of PSLF: files that are not at hand, a list of parameters, or taken to be as in PSS/E
 OF_ONE_SOURCE |= {
-    *("gensal", "exac4", "exst4b", "ieeest", "tgov1", "ieeeg1"),
+    *("gensal", "genqec", "genqej", "exac4", "exst4b", "ieeest", "tgov1", "ieeeg1"),
     *("esac1a", "esac2a", "esac3a", "esac4a", "esac5a", "esac6a", "esac8b", "esdc1a", "esdc2a"),
     *("exac1", "exac2", "exdc2", "expic1", "exdc1", "sexs", "esst2a", "esst3a", "esst7b", "hygov"),
 }

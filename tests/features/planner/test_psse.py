@@ -18,7 +18,7 @@ from exfit.errors import DynamicsError
 from exfit.features.planner.buses import Bus
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.import_case import import_unit, imported_case
-from exfit.features.planner.psse import record_text, sound_records
+from exfit.features.planner.psse import heads, record_text
 from exfit.features.planner.records import (
     SIGNALS,
     Definition,
@@ -57,9 +57,9 @@ def definition(request):
 
 
 def read_back(definition, text):
-    ((line, fields),), faults = sound_records(text)
+    (head,), faults = heads(text)
     assert faults == []
-    return read_values(definition, line, fields[3:])
+    return read_values(definition, head.line, head.fields)
 
 
 @settings(max_examples=settings.default.max_examples // 3, derandomize=True)

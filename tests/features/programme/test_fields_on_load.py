@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+from oracle import saturated
 from places import REFERENCE
 from scipy.optimize import brentq
 
@@ -80,12 +81,14 @@ def balanced_field(name, data, p, q, vt):
     excess = power_excess if name in ("GENROE", "GENSAE") else quadratic_excess
     of_flux = name in ("GENROU", "GENROE", "GENSAE")
 
-    if name == "GENTPJ":
-        share = excess(abs(vt + 1j * xl * current) + data["Kis"] * abs(current))
-        x_q = (data["Xq"] - xl) / (1.0 + share * data["Xq"] / data["Xd"]) + xl
+    if name in ("GENTPJ", "GENQEC", "GENQEJ"):
+        share = excess(abs(vt + 1j * xl * current) + data.get("Kis", 0.0) * abs(current))
+        q_share = share * data["Xq"] / data["Xd"] if name == "GENTPJ" else share
+        x_q = (data["Xq"] - xl) / (1.0 + q_share) + xl
         turned = current * np.exp(-1j * np.angle(vt + 1j * x_q * current))
         behind = abs(vt + 1j * x_q * current) - turned.imag * ((data["Xd"] - xl) / (1.0 + share))
-        return (1.0 + share) * (behind - turned.imag * (xl - x_q))
+        field = (1.0 + share) * (behind - turned.imag * (xl - x_q))
+        return field / (1.0 + data.get("Kw", 0.0) * turned.imag)
 
     def along(angle):
         at = np.exp(-1j * angle)
@@ -111,6 +114,6 @@ def balanced_field(name, data, p, q, vt):
 
 
 def test_saturated_it_is_the_same_equations_typed_a_second_time(machine):
-    data = typical(machine.sheet) | SATURATED
+    data = saturated(machine) | SATURATED
     expected = [balanced_field(machine.name, data, *point) for point in zip(P, Q, VT, strict=True)]
     assert field_on_load(machine, data, P, Q, VT) == pytest.approx(expected, abs=1e-10)
