@@ -26,13 +26,13 @@ def following(last: SolverIteration, line: SolverIteration) -> SolverIteration:
     )
 
 
-def descent_near(residuals: Residuals, theta: Array) -> Result:
+def descent_near(residuals: Residuals, theta: Array, tolerance: float = Descent.xtol) -> Result:
     """Run one descent from scaled parameters theta (N,), without announcements.
 
-    Raises KeyboardInterrupt at an interruption.
+    It ends where the step falls below a ``tolerance``. Raises KeyboardInterrupt at an interruption.
     """
-    functions = OneByOne(residuals, residuals.exact)
-    descent = Descent(functions=functions, bounds=residuals.bounds, x_scale=residuals.units)
+    functions, units = OneByOne(residuals, residuals.exact), residuals.units
+    descent = Descent(functions=functions, bounds=residuals.bounds, x_scale=units, xtol=tolerance)
     end = descent.run(theta)
     if end.stop is Stop.INTERRUPTED:
         raise KeyboardInterrupt

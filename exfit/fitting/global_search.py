@@ -171,8 +171,11 @@ def continued(
     if found.minima is None:
         return found._replace(best=last, history=path)
     alike, others = list[LocalMinimum](), list[LocalMinimum]()
-    for local in found.minima.minima:
-        same_minimum = is_same(last, local.result) or is_same(local.result, last)
+    # its cost may be that of another form of the problem
+    begun = found.place if np.array_equal(point, found.best.x) else None
+    for place, local in enumerate(found.minima.minima):
+        same_minimum = place == begun or is_same(last, local.result)
+        same_minimum = same_minimum or is_same(local.result, last)
         (alike if same_minimum else others).append(local)
     lowest = LocalMinimum(last.x, last.cost, sum(local.starts for local in alike), last)
     minima = found.minima._replace(minima=(lowest, *others), best=last)

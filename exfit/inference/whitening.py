@@ -38,7 +38,7 @@ class PropagatedNoise(NamedTuple):
     @property
     def variance(self) -> Array:
         """The variance of each error (M,)."""
-        return np.asarray(self.own + np.sum(self.carried**2, axis=1))
+        return np.asarray(self.own + np.einsum("ij,ij->i", self.carried, self.carried))
 
 
 class WhitenedRows(NamedTuple):
@@ -77,25 +77,32 @@ class Whitening(NamedTuple):
         return white
 
 
-def whitening(noise: PropagatedNoise, order: Rows, scale: float) -> Whitening:
-    """Make a whitening of errors that follow one another in time by ``order`` (M,)."""
+def whitening(
+    noise: PropagatedNoise, order: Rows, scale: float, before: int = ROWS_BEFORE
+) -> Whitening:
+    """Make a whitening of errors that follow one another in time by ``order`` (M,).
+
+    Each becomes what so many rows ``before`` it do not predict.
+    """
     return Whitening(
-        tuple(_parts(noise, order, scale)),
+        tuple(_parts(noise, order, scale, before)),
         scale,
         np.sqrt(noise.variance),
         np.zeros(len(order)),
     )
 
 
-def _parts(noise: PropagatedNoise, order: Rows, scale: float) -> Iterator[WhitenedRows]:
+def _parts(
+    noise: PropagatedNoise, order: Rows, scale: float, rows_before: int
+) -> Iterator[WhitenedRows]:
     from scipy.linalg.blas import dtrsm
     from scipy.linalg.lapack import dpotrf, dtrtri
 
     own, (carried, begun) = noise.own[order], _in_time(noise.carried, order)
     covariance, first, done = np.empty((0, 0), order="F"), 0, 0
     while done < len(order):
-        before, first = first, max(done - ROWS_BEFORE, 0)
-        kept, end = done - first, min(first + ROWS_BEFORE + ROWS_TOGETHER, len(order))
+        before, first = first, max(done - rows_before, 0)
+        kept, end = done - first, min(first + rows_before + ROWS_TOGETHER, len(order))
         known = covariance[first - before :, first - before :]
         covariance = np.zeros((end - first, end - first), order="F")  # its lower triangle
         covariance[:kept, :kept] = known

@@ -20,6 +20,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
@@ -32,7 +33,7 @@ from exfit.fitting.global_search import SearchResult
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
-from exfit.inference.whitening import PropagatedNoise, whitening
+from exfit.inference.whitening import ROWS_BEFORE, PropagatedNoise, whitening
 from exfit.plants.parts import initial
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
@@ -42,7 +43,8 @@ from exfit.util.text import digits, listed
 ORDER = 4  # of the differences that show the noise of a signal which swings
 PULSE = 1e-5  # pu or rad: the response to it is linear, and far above rounding
 LONGEST_BETWEEN_PULSES = 1.0  # s: the response changes little while the unit swings
-FEWEST_PULSES, MOST_PULSES = 9, 33
+FEWEST_PULSES, MOST_PULSES, ROUGH_PULSES = 9, 33, 3
+ROUGH_ROWS = 200  # of errors before that tell what noise comes next
 SAMPLES_AT_ENDS = 4  # of a record, where a spline through them is another: each has a pulse
 Rows = NDArray[np.intp]
 Values = Mapping[str, float]
@@ -51,6 +53,7 @@ PAIRS = 6  # of realisations of noise, with either sign: what is of first order 
 MOST_ERRORS = 5000  # of a record: the covariance of more takes too much memory and time
 MOST_PASSES = 5
 FAR = 0.1  # of a scaled parameter: the response to noise is not the same
+NEAR = 1e-3  # of one: rough weights have their minimum no nearer
 SMALL_BIAS = 0.1  # standard errors: a smaller change of it matters to no interval
 UNSEEN = 1e-9  # of the largest singular value: rounding
 REFUTED = 4.0  # times the least cost: such a minimum stays rejected with any weights
@@ -86,19 +89,23 @@ def noise_of_channel(channel: Channel) -> float:
     return max(noise(channel.measured[channel.kept], ORDER), LEAST_NOISE)
 
 
-def propagated_noise(setup: ExperimentSetup, values: Values) -> PropagatedNoise:
+def propagated_noise(
+    setup: ExperimentSetup, values: Values, rough: bool = False
+) -> PropagatedNoise:
     """Return the noise of the errors of a test: that of its channels and what inputs carry.
 
-    The response to noise is that of the simulation, linear in it, about the values.
+    The response to noise is that of the simulation, linear in it, about the values. A ``rough`` one
+    is much the same all along the record.
     """
-    experiment = setup.experiment
-    by_rest = rest_noise(setup, values)
-    columns = []
+    experiment = coarse(setup.experiment)
+    by_rest = rest_noise(setup, experiment, values)
+    columns = list[Array]()
     for signal, deviation in noise_of_inputs(experiment.with_inputs(values)).items():
-        responses = responses_to_samples(experiment, values, signal)
+        responses = responses_to_samples(experiment, values, signal, rough)
         if signal in by_rest:
             responses[:, by_rest[signal].rest] += by_rest[signal].moved
-        columns.append(deviation * responses)
+        responses *= deviation
+        columns.append(responses)
     own, first = [], 0
     for channel in experiment.channels:
         deviation = noise_of_channel(channel)
@@ -115,24 +122,30 @@ def propagated_noise(setup: ExperimentSetup, values: Values) -> PropagatedNoise:
     return PropagatedNoise(np.concatenate(own), np.hstack(columns))
 
 
-def responses_to_samples(experiment: Experiment, values: Values, signal: str) -> Array:
+def coarse(experiment: Experiment) -> Experiment:
+    """Return an experiment with longer steps: of what is small their error is as small a share."""
+    own = experiment.simulator
+    if not own.located or own.step >= LOCATED_STEP:
+        return experiment
+    return replace(experiment, simulator=own.remade(step=LOCATED_STEP, least=1, rough=True))
+
+
+def responses_to_samples(
+    experiment: Experiment, values: Values, signal: str, rough: bool = False
+) -> Array:
     """Response of each error to each sample (D,) of a recorded input: (M, D).
 
     Pulses at some samples show it, and between two of them the response is that of both, each as
     much later or earlier.
     """
     simulator = experiment.with_inputs(values)
-    if simulator.located:  # of what is small, the step's error is as small a share
-        step = max(simulator.step, LOCATED_STEP)
-        simulator = simulator.remade(step=step, least=1, rough=True)
-    places = pulse_places(simulator.inputs.recorded[signal].time)
+    places = pulse_places(simulator.inputs.recorded[signal].time, rough)
     pulses = PULSE * np.eye(len(simulator.inputs.recorded[signal].time))[places]
     tests = [*(with_added(simulator, {signal: pulse}) for pulse in pulses), simulator]
     sets = [experiment.parameters(values)] * len(tests)
     samples, _ = simulator.samples_of_many(sets, experiment.signals, tests)
     responses = (samples[:-1] - samples[-1]) / PULSE
-    every = [between_pulses(responses[:, :, k], places) for k in range(responses.shape[2])]
-    return errors_of(experiment, np.stack(every, axis=2))
+    return errors_of(experiment, [between_pulses(own.T, places) for own in responses.T])
 
 
 def with_added(simulator: Simulator, added: Mapping[str, Array]) -> Simulator:
@@ -144,12 +157,14 @@ def with_added(simulator: Simulator, added: Mapping[str, Array]) -> Simulator:
     return simulator.remade(inputs=replace(simulator.inputs, recorded=recorded))
 
 
-def pulse_places(time: Array) -> Rows:
+def pulse_places(time: Array, rough: bool = False) -> Rows:
     """Return the samples (M,) at which pulses show the response."""
     wanted = int(np.ptp(time) / LONGEST_BETWEEN_PULSES) + 1
     count, last = min(max(wanted, FEWEST_PULSES), MOST_PULSES), len(time) - 1
-    inside = np.linspace(SAMPLES_AT_ENDS, last - SAMPLES_AT_ENDS, count)
     ends = np.arange(SAMPLES_AT_ENDS)
+    if rough:
+        count, ends = ROUGH_PULSES, ends[:0]
+    inside = np.linspace(SAMPLES_AT_ENDS, last - SAMPLES_AT_ENDS, count)
     places = np.concatenate([ends, np.round(inside), last - ends])
     return np.unique(places.clip(0, last).astype(np.intp))
 
@@ -157,32 +172,23 @@ def pulse_places(time: Array) -> Rows:
 def between_pulses(pulses: Array, places: Rows) -> Array:
     """Return the responses (M, M) to a pulse at each sample, of those (P, M) at some places."""
     count = pulses.shape[1]
+    still = np.zeros_like(pulses)
+    delayed = sliding_window_view(np.hstack([still, pulses, still]), count, axis=1)[:, ::-1]
     every = np.arange(count)
     before = np.clip(np.searchsorted(places, every, "right") - 1, 0, len(places) - 2)
-    responses = np.empty((count, count))
-    for sample, first in zip(every.tolist(), before.tolist(), strict=True):
-        low, high = int(places[first]), int(places[first + 1])
-        share = (sample - low) / (high - low)
-        earlier = _delayed(pulses[first], sample - low)
-        later = _delayed(pulses[first + 1], sample - high)
-        seen = every < count - (high - sample)  # beyond, the record ends before the later one's
-        responses[sample] = np.where(seen, (1.0 - share) * earlier + share * later, earlier)
+    since, until = every - places[before], places[before + 1] - every
+    share = (since / (since + until))[:, None]
+    earlier, later = delayed[before, count + since], delayed[before + 1, count - until]
+    seen = every < (count - until)[:, None]  # beyond, the record ends before the later one's
+    responses: Array = np.where(seen, (1.0 - share) * earlier + share * later, earlier)
     return responses
 
 
-def _delayed(response: Array, by: int) -> Array:
-    """Return a response (M,) that comes so many samples later."""
-    delayed = np.zeros_like(response)
-    if by >= 0:
-        delayed[by:] = response[: len(response) - by]
-    else:
-        delayed[:by] = response[-by:]
-    return delayed
-
-
-def rest_noise(setup: ExperimentSetup, values: Values) -> dict[str, RestNoise]:
+def rest_noise(
+    setup: ExperimentSetup, experiment: Experiment, values: Values
+) -> dict[str, RestNoise]:
     """Effect of noise at rest by the levels of the signals, beside what it does itself."""
-    experiment, steady = setup.experiment, setup.test.steady
+    steady = setup.test.steady
     if steady is None:
         return {}
     simulator, own = experiment.with_inputs(values), experiment.own
@@ -194,7 +200,8 @@ def rest_noise(setup: ExperimentSetup, values: Values) -> dict[str, RestNoise]:
         at = {**own, level: own[level] + PULSE} if first and level in own else own
         taken = {signal: -PULSE * course} if signal in driving else {}
         moved = replace(experiment, own=at, simulator=with_added(simulator, taken))
-        return errors_of(experiment, ((moved.samples(values)[0] - usual) / PULSE)[None])[:, 0]
+        change = (moved.samples(values)[0] - usual) / PULSE
+        return errors_of(experiment, [own[None] for own in change.T])[:, 0]
 
     noises, time = {}, setup.record.time
     for signal in dict.fromkeys([*driving, *experiment.signals]):
@@ -212,14 +219,11 @@ def rest_noise(setup: ExperimentSetup, values: Values) -> dict[str, RestNoise]:
     return noises
 
 
-def errors_of(experiment: Experiment, changes: Array) -> Array:
-    """Return changes of signals (K, M, channels) as those of the weighted errors (errors, K)."""
-    return np.concatenate(
-        [
-            channel.weight * channel.compared(changes[:, :, k]).T
-            for k, channel in enumerate(experiment.channels)
-        ]
-    )
+def errors_of(experiment: Experiment, changes: Sequence[Array]) -> Array:
+    """Return changes of signals, (K, M) of each channel, as those of the errors (errors, K)."""
+    pairs = zip(experiment.channels, changes, strict=True)
+    each = [channel.weight * channel.compared(change).T for channel, change in pairs]
+    return np.concatenate(each)
 
 
 def weighted_search(
@@ -232,8 +236,8 @@ def weighted_search(
     """Weight a problem by the noise of the driving signals, and continue the search with it.
 
     ``found`` is the search of the problem without it, ``setups`` its tests as fitted; ``proceed``
-    searches on, by the weighted problem, from a point (N,). The noise moves the minimum no longer:
-    where it moved it by much, weights and bias are computed again from the better point. Minima
+    searches on, by the weighted problem, from a point (N,). Rough weights lead near the minimum;
+    where it still moves by much, weights and bias are computed again from the better point. Minima
     far above the best one stay as they are. Where errors cannot be weighted, or at an
     interruption, problem and search remain, with a note. Raises SimulationError where there is no
     response.
@@ -244,24 +248,27 @@ def weighted_search(
         return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHTED} {reason}"))
     try:
         bias, cost = np.zeros_like(theta), float(own.costs([theta])[0])
-        for further in range(MOST_PASSES):
+        watch(Progress("weighing", 0, MOST_PASSES, cost))
+        at = theta = descent_near(whitened(own, setups, theta, rough=True), theta, NEAR).x
+        white = whitened(own, setups, at)
+        for further in range(1, MOST_PASSES):
             watch(Progress("weighing", further, MOST_PASSES, cost))
-            at, before = theta, bias
-            white = whitened(own, setups, at)
-            if not further:
-                theta = descent_near(white, at).x
+            if _far(theta, at):
+                at, white = theta, whitened(own, setups, theta)
+            before = bias
             unbiased, bias = without_bias(white, theta)
-            theta = descent_near(unbiased, theta).x
-            if np.max(np.abs(theta - at)) < FAR and np.max(np.abs(bias - before)) < SMALL_BIAS:
+            end = descent_near(unbiased, theta)
+            theta = end.x
+            if not _far(theta, at) and np.max(np.abs(bias - before)) < SMALL_BIAS:
                 break
         watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))
         notes = [*noise_notes(unbiased, theta, bias)]
         if found.minima is not None:
             minima = []
-            for minimum in found.minima.minima:
+            for place, minimum in enumerate(found.minima.minima):
                 if minimum.cost <= REFUTED * found.best.cost:
-                    end = descent_near(unbiased, minimum.x)
-                    minimum = LocalMinimum(end.x, end.cost, minimum.starts, end)
+                    near = end if place == found.place else descent_near(unbiased, minimum.x)
+                    minimum = LocalMinimum(near.x, near.cost, minimum.starts, near)
                 minima.append(minimum)
             found = found._replace(minima=found.minima._replace(minima=tuple(minima)))
     except KeyboardInterrupt:
@@ -269,6 +276,11 @@ def weighted_search(
     weighted = FitProblem(unbiased, unbiased)
     found = proceed(weighted, found, theta)
     return weighted, found._replace(notes=(*found.notes, *notes))
+
+
+def _far(there: Array, here: Array) -> bool:
+    """Test whether the response to noise differs between two points (N,)."""
+    return bool(np.max(np.abs(there - here)) >= FAR)
 
 
 def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
@@ -288,20 +300,24 @@ def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) ->
     return None
 
 
-def whitened(residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Array) -> Residuals:
+def whitened(
+    residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Array, rough: bool = False
+) -> Residuals:
     """Return residuals that are white near theta (N,), but for what no noise explains.
 
-    They are as large as before, so that costs are of the same size.
+    They are as large as before, so that costs are of the same size. ``rough`` ones, which cost
+    little, have their minimum within some standard errors.
     """
     values = residuals.values(theta)
-    carried = [propagated_noise(setup, values) for setup in setups]
+    carried = [propagated_noise(setup, values, rough) for setup in setups]
     scale = float(np.sqrt(np.mean(np.concatenate([each.variance for each in carried]))))
     experiments = []
     for setup, each in zip(setups, carried, strict=True):
         times = [np.flatnonzero(channel.kept) for channel in setup.experiment.channels]
         in_time = np.argsort(np.concatenate(times), kind="stable")
-        white = whitening(each, in_time, scale)
-        experiments.append(replace(setup.experiment, whitening=white))
+        white = whitening(each, in_time, scale, ROUGH_ROWS if rough else ROWS_BEFORE)
+        own = coarse(setup.experiment) if rough else setup.experiment
+        experiments.append(replace(own, whitening=white))
     return replace(residuals, experiments=experiments)
 
 
@@ -314,7 +330,7 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     generator = np.random.default_rng(SEED)
     values, moves = residuals.values(theta), residuals.moves(theta)
     gradient, jacobians = np.zeros(len(theta)), []
-    for experiment in residuals.experiments:
+    for experiment in map(coarse, residuals.experiments):
         simulator = experiment.with_inputs(values)
         errors, own = experiment.tangents(values, moves)
         jacobians.append(own)
