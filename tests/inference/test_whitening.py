@@ -44,8 +44,7 @@ def test_errors_long_before_tell_next_to_nothing(noise, monkeypatch):
     """The response to a sample has decayed to 0.7^20 = 8e-4 of itself after 40 errors."""
     exact = whitening(noise, ORDER, 1.0).slopes(np.eye(2 * COUNT))
     monkeypatch.setattr(module, "ROWS_TOGETHER", 20)
-    monkeypatch.setattr(module, "ROWS_BEFORE", 40)
-    near = whitening(noise, ORDER, 1.0)
+    near = whitening(noise, ORDER, 1.0, before=40)
     assert len(near.parts) > 1
     assert near.slopes(np.eye(2 * COUNT)) == pytest.approx(exact, abs=1e-3)
 
