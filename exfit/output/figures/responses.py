@@ -114,7 +114,7 @@ def _signal(axes: Axes, below: Axes, comparison: Comparison, signal: str, label:
     axes.legend(loc="best", frameon=False)
     match = comparison.channels[signal]
     text = f"rmse {match.rmse:.3g} pu, fit {percentage(match.fit_percent)} %"
-    axes.set_title(text, fontsize=9, loc="right")
+    axes.set_title(text, fontsize=9, loc="right", y=1.0)
     tidy(axes, label_of(signal))
     zero_line(below)
     below.plot(*envelope(time, MILLI * samples.error), color=SIMULATED, linewidth=0.7)

@@ -1,20 +1,24 @@
 """How all figures look, and how one becomes a file."""
 
+import struct
 import warnings
+import zlib
 from collections import defaultdict
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.image import imsave
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
 from matplotlib.ticker import LogFormatter
-from matplotlib.transforms import ScaledTranslation
+from matplotlib.transforms import Bbox, ScaledTranslation
 from numpy.typing import NDArray
+
+from exfit.util.arrays import Array
 
 MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
 GREEN = "#2f855a"
@@ -30,9 +34,38 @@ COLORS = ("#1f4e9c", "#c1272d", GREEN, "#b7791f", "#6b46c1", "#0e7490", "#4a5568
 STYLES = ("-", "--", ":")
 
 
+class Panel(Axes):
+    """Axes that are measured once for the same ticks, however often they are moved."""
+
+    measured: tuple[object, Array] | None = None  # the ticks, the room (pixels) around the axes
+
+    def ticks(self) -> object:
+        """Return the places of the ticks."""
+        return self.xaxis.get_majorticklocs().tolist(), self.yaxis.get_majorticklocs().tolist()
+
+    def get_tightbbox(self, renderer: RendererBase | None = None, **options: Any) -> Bbox | None:
+        """Find the box around the axes with their labels; see Axes.get_tightbbox."""
+        ticks, extent = self.ticks(), np.array(self.get_window_extent().extents)
+        if self.measured is None or self.measured[0] != ticks:
+            box = super().get_tightbbox(renderer, **options)
+            if box is None:
+                return None
+            self.measured = ticks, np.array(box.extents) - extent
+        return Bbox((extent + self.measured[1]).reshape(2, 2))
+
+
+class Page(Figure):
+    """A figure whose axes are panels."""
+
+    def add_subplot(self, *arguments: Any, **options: Any) -> Axes:
+        """Add axes; see Figure.add_subplot."""
+        panel: Axes = super().add_subplot(*arguments, axes_class=Panel, **options)
+        return panel
+
+
 def new_figure(height: float, title: str = "", width: float = WIDTH) -> Figure:
     """Make an empty figure of a size in inches, which gives its axes the room that labels leave."""
-    figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD))
+    figure = Page(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD))
     if title:
         figure.suptitle(title, fontsize=11)
     return figure
@@ -76,29 +109,42 @@ def drawn(figure: Figure) -> NDArray[np.uint8]:
         ticks = _with_aligned_labels(figure, canvas)
         layout = figure.get_layout_engine()
         if layout is not None:
+            for axes in figure.axes:
+                for artist in axes.get_children():
+                    artist.set_in_layout(isinstance(artist, Axis | Text) and artist.get_in_layout())
             layout.execute(figure)
-            other_ticks = _with_aligned_labels(figure, canvas) != ticks  # as axes have their size
+            other_ticks = _vertical_ticks(figure) != ticks  # as axes have their size
             if _fitted(figure) or other_ticks:
-                layout.execute(figure)
                 _with_aligned_labels(figure, canvas)
+                layout.execute(figure)
             figure.set_layout_engine("none")  # all has its place
         canvas.draw()
     figure.dpi = former
     return np.asarray(canvas.buffer_rgba())
 
 
-def _with_aligned_labels(figure: Figure, canvas: FigureCanvasAgg) -> list[int]:
+def _vertical_ticks(figure: Figure) -> list[list[float]]:
+    return [axes.yaxis.get_majorticklocs().tolist() for axes in figure.axes]
+
+
+def _with_aligned_labels(figure: Figure, canvas: FigureCanvasAgg) -> list[list[float]]:
     """Place the labels of the vertical axes of a column in one line, left of all their ticks.
 
-    Return the room (pixels) of the ticks of each. Matplotlib's own alignment measures the ticks of
-    a column anew for each of its labels.
+    Return these ticks. Matplotlib's own alignment measures the ticks of a column anew for each of
+    its labels.
     """
     columns, renderer = defaultdict[int, dict[Axes, float]](dict), canvas.get_renderer()
     for axes in figure.axes:
         place, label = axes.get_subplotspec(), axes.yaxis.label
+        if isinstance(axes, Panel):
+            axes.measured = None
+        for axis in (axes.xaxis, axes.yaxis):
+            if not axis.label.get_text():
+                axis.set_label_coords(0.0, 0.0)  # else its ticks are measured to place nothing
         if place is None or not label.get_text() or str(axes.yaxis.label_position) != "left":
             continue
         label.set_visible(False)
+        axes.yaxis.set_label_coords(0.0, 0.5)
         ticks, left = axes.yaxis.get_tightbbox(renderer), axes.get_window_extent().x0
         label.set_visible(True)
         room = 0.0 if ticks is None else max(left - ticks.x0, 0.0)
@@ -108,7 +154,7 @@ def _with_aligned_labels(figure: Figure, canvas: FigureCanvasAgg) -> list[int]:
             left = -max(column.values()) / figure.dpi - axes.yaxis.labelpad / POINTS
             away = ScaledTranslation(left, 0.0, figure.dpi_scale_trans)
             axes.yaxis.set_label_coords(0.0, 0.5, axes.transAxes + away)
-    return [round(max(column.values())) for column in columns.values()]
+    return _vertical_ticks(figure)
 
 
 def _fitted(figure: Figure) -> bool:
@@ -131,10 +177,26 @@ def _fitted(figure: Figure) -> bool:
 
 
 def encoded(picture: NDArray[np.uint8]) -> bytes:
-    """Write pixels as the bytes of a PNG file; most of it without the interpreter's lock."""
-    file = BytesIO()
-    imsave(file, picture, format="png", dpi=DPI, pil_kwargs={"compress_level": 1})
-    return file.getvalue()
+    """Write pixels as the bytes of a PNG file; most of it without the interpreter's lock.
+
+    Each row is compressed as it is: Pillow tries all filters on it, which takes longer and makes
+    larger files of lines on white.
+    """
+    height, width, _ = picture.shape
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)  # each begins with its filter: 0, none
+    rows[:, 1:] = picture[:, :, :3].reshape(height, 3 * width)
+    per_metre = round(DPI / 0.0254)
+    chunks = {
+        b"IHDR": struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0),  # 8 bits of each colour
+        b"pHYs": struct.pack(">2IB", per_metre, per_metre, 1),
+        b"IDAT": zlib.compress(rows.tobytes(), 1),
+        b"IEND": b"",
+    }
+    whole = b"\x89PNG\r\n\x1a\n"
+    for name, data in chunks.items():
+        length, check = struct.pack(">I", len(data)), struct.pack(">I", zlib.crc32(name + data))
+        whole += length + name + data + check
+    return whole
 
 
 class PowersOfTen(LogFormatter):
