@@ -124,8 +124,9 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     """Return every limit of a system that is not infinite, in the order of the signal.
 
     They are its states' non-windup limits, its clamps, gates to a fixed parameter, and contacts
-    that force a value to one; neither the arcs of a rectifier nor what only cannot be negative. A
-    limiter of excitation is one limit by the name of its output, oel.OEL2C, whatever it has inside.
+    that force a value to one; neither the arcs of a rectifier nor what only cannot be negative, nor
+    the lower of two ceilings, which is a bound itself. A limiter of excitation is one limit by the
+    name of its output, oel.OEL2C, whatever it has inside.
     """
     of, found = traced(system), list[EquationLimit]()
     states = set(of.x)
@@ -133,10 +134,12 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     for held, state in clamps.items():
         _, low, high = held.operands
         found += [*_limit(state, low, -1.0, state), *_limit(state, high, 1.0, state)]
-    for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
+    nodes = [*in_order([*of.slopes, *of.outputs, *of.clamped])]
+    bounds = {bound for node in nodes if node.op == "clip" for bound in node.operands[1:]}
+    for node in nodes:
         if node.op == "clip" and node not in clamps:
             found += _clamp(node, states)
-        elif node.op == "select" and node.operands[0].varies:
+        elif node.op == "select" and node.operands[0].varies and node not in bounds:
             found += _choice(node, states)
     limits = [
         limit
@@ -229,9 +232,13 @@ def _gated(node: Node, output: Node) -> Node | None:
 
 
 def _limit_name(node: Node) -> str:
-    """Name the parameter that gives a limit: of all from which it is computed, the one named so."""
+    """Name the parameter that gives a limit: of all from which it is computed, the one named so.
+
+    Of the lower of two ceilings it is the one that is a parameter itself.
+    """
     symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
-    limits = [n for n in symbols if _is_limit(n)]
+    gated = [n for n in node.operands if _is_limit(n)] if node.op == "select" else []
+    limits = gated or [n for n in symbols if _is_limit(n)]
     return ", ".join(dict.fromkeys(map(_given, limits or symbols)))
 
 
