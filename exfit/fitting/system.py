@@ -45,7 +45,7 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
     stabiliser = None
     if parts.stabiliser is not None and case.stabiliser is not None:
         listens_to = case.stabiliser.inputs or parts.stabiliser.inputs
-        stabiliser = Stabilised(parts.stabiliser, listens_to)
+        stabiliser = Stabilised(parts.stabiliser, listens_to).in_dialect(dialect)
     records = [{*file.channels} for file in _record_files(case).values()]
     equipment = Equipment(
         exciter=None if parts.exciter is None else parts.exciter.in_dialect(dialect),

@@ -378,7 +378,7 @@ class Model:
     its PSS/E records, its own one first, ``pslf_records`` those of PSLF; ``inputs`` the signals
     that a stabiliser or a limiter listens to, ``places`` where a limiter may act on an exciter, the
     usual one first; ``doubt`` what is not settled about its diagram, to be read behind its name;
-    ``dialects`` the equations of programs that have others.
+    ``dialects`` the equations of programs that have others, with the fields that these replace.
 
     A governor's output is the turbine's power Pm, its reference ``pref``; it sees ``dw``, the speed
     less 1, and ``p``, the electrical power, all per unit on the machine's base.
@@ -398,11 +398,11 @@ class Model:
     pslf_records: Records = ()
     places: tuple[str, ...] = ()
     doubt: str = ""
-    dialects: tuple[tuple[str, Callable[..., Any]], ...] = ()
+    dialects: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = ()
 
     def in_dialect(self, dialect: str) -> "Model":
         """Return the model with the equations that another program has for it, where it has."""
-        return replace(self, equations=dict(self.dialects).get(dialect, self.equations))
+        return replace(self, **dict(dict(self.dialects).get(dialect, ())))
 
 
 def documented(
@@ -419,7 +419,7 @@ def documented(
     inputs: str = "",
     places: str = "",
     doubt: str = "",
-    dialects: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+    dialects: Mapping[str, Mapping[str, Any]] = NONE,
 ) -> Model:
     """Return the model that the docstring of its equations names and draws, or a ``text``.
 
@@ -442,7 +442,7 @@ def documented(
         pslf_records=pslf_records,
         places=tuple(places.split()),
         doubt=doubt,
-        dialects=tuple(dialects.items()),
+        dialects=tuple((program, tuple(own.items())) for program, own in dialects.items()),
     )
 
 

@@ -43,7 +43,8 @@ GATES = {"takeover": "", "takeover-output": "_out"}  # how the inputs of an exci
 SUMMING = "summing"
 PLACES = (*GATES, SUMMING)
 Requirement = Literal["exciter", "machine", "network"]
-Dialect = Literal["standard", "powerworld", "andes"]  # whose equations of a unit are solved
+# whose equations of a unit are solved
+Dialect = Literal["standard", "psse", "powerworld", "andes"]
 PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
 
 
@@ -52,6 +53,10 @@ class Stabilised(NamedTuple):
 
     model: Model
     inputs: tuple[str, ...]
+
+    def in_dialect(self, dialect: str) -> "Stabilised":
+        """Return it with the equations that another program has for it."""
+        return self._replace(model=self.model.in_dialect(dialect))
 
 
 class Attached(NamedTuple):

@@ -36,8 +36,10 @@ from exfit.util.files import on_disk
 from exfit.util.text import rounded_value, show
 
 RESTING = ("vt", *COMPARED_IN_EVENT)  # in the order in which a rest is described
+OF_PSSE = "equations of PSS/E: Pm is a power, its torque (Pm - D dw) / (1 + dw)"
 DIALECTS = {
-    "standard": "equations of PSS/E: Pm is a power, its torque (Pm - D dw) / (1 + dw)",
+    "standard": OF_PSSE,
+    "psse": f"{OF_PSSE}; PSS4B is PSS/E's",
     "powerworld": "equations of PowerWorld: the stator's voltage follows the speed",
     "andes": "equations of ANDES: Pm is a torque, less D dw",
 }

@@ -274,12 +274,10 @@ FUNCTIONS = {
 }
 
 
-def assert_is_its_function(model, values):
-    response = frequency_response(model, values)
+def assert_is_its_function(model, values, function=None):
+    response, function = frequency_response(model, values), function or FUNCTIONS[model.name]
     # rounding of the solution: its matrix holds rates from 1e-3 to 1e4 per second
-    transfer_functions.assert_is_its_function(
-        FUNCTIONS[model.name], response, values, FREQUENCIES, 1e-11
-    )
+    transfer_functions.assert_is_its_function(function, response, values, FREQUENCIES, 1e-11)
 
 
 def test_every_stabiliser_has_a_transfer_function_here():
@@ -289,6 +287,18 @@ def test_every_stabiliser_has_a_transfer_function_here():
 def test_the_response_is_the_product_of_the_blocks(stabiliser):
     assert_is_its_function(stabiliser, typical(stabiliser.sheet))
     assert_is_its_function(stabiliser, lively(stabiliser))
+
+
+def test_in_psse_pss4b_turns_no_sign_and_has_a_lag_for_the_integrator():
+    """Its states that InterPSS keeps (psse_pss4b) show both."""
+
+    def in_psse(s, p):
+        low, high = pss4b(s, p)
+        return [low, -high * p["M"] * s / (1.0 + p["M"] * s)]
+
+    model = STABILISERS["PSS4B"].in_dialect("psse")
+    for values in (typical(model.sheet), lively(model)):
+        assert_is_its_function(model, values, in_psse)
 
 
 def test_the_response_is_the_product_of_the_blocks_for_drawn_values(stabiliser):

@@ -56,15 +56,16 @@ class TwoBuses:
         records = told["records"] if "machine" in told else [MACHINE_RECORD, *told["records"]]
         parts = read_unit("\n".join(records), "case.dyr")
         values = {**parts.exciter.values, **prefixed(MACHINE, parts.machine.values)}
+        dialect = {"PowerWorld": "powerworld", "PSS/E": "psse"}[told["program"]]
         stabiliser, governor = None, None
         if (part := parts.stabiliser) is not None:
             model = part.definition.model
-            stabiliser = Stabilised(model, part.inputs or model.inputs)
+            heard = Stabilised(model, part.inputs or model.inputs)
+            stabiliser = heard.in_dialect(dialect)
             values |= prefixed(STABILISER, part.values)
         if added := told.get("governor"):
             governor = GOVERNORS[added["model"]]
             values |= prefixed(GOVERNOR, added["parameters"])
-        dialect = "powerworld" if told["program"] == "PowerWorld" else "standard"
         exciter = parts.exciter.definition.model.in_dialect(dialect)
         self.unit = UnitOnLoad(
             times_speed(exciter) if "efd_times_speed" in told else exciter,

@@ -32,7 +32,7 @@ else:
     Place = Literal[PLACES]
 
 DIALECT = (
-    "Whose equations are solved: standard, which are those of PSS/E, powerworld or andes; see "
+    "Whose equations are solved: standard, psse, which differs for PSS4B, powerworld, andes; see "
     "[On load](../plants.md#on-load)."
 )
 LOAD = Field(description="P and Q until the breaker opens, pu on the base of the machine.")

@@ -163,7 +163,7 @@ def as_unit(each: FurtherUnit, beside: UnitOnLoad) -> UnitOnLoad:
     return beside._replace(
         exciter=each.exciter.in_dialect(beside.dialect),
         machine=each.machine,
-        stabiliser=each.stabiliser,
+        stabiliser=each.stabiliser and each.stabiliser.in_dialect(beside.dialect),
         governor=each.governor,
         limiters=(),
     )

@@ -31,6 +31,7 @@ from exfit.features.planner.records import (
     unused_of,
 )
 from exfit.features.planner.units import FORMATS
+from exfit.features.start.starting_case import differs_in_psse
 from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
@@ -114,6 +115,7 @@ def export(
     written = [*_parts(result, content, files.program, exciter, warnings)]
     if not written:
         raise ExfitError(f"{result.model} has no {files.program} record")
+    of_fit += _other_forms(content, written)
     comments += [f"{text}." for text in of_fit]
     lines = list[str]()
     for own in written:
@@ -140,6 +142,16 @@ def _comments(entry: Written) -> Iterator[str]:
         if source != TYPICAL:
             yield f"{entry.definition.record.name}: {source}: {' '.join(symbols)}."
     yield from (f"{warning}." for warning in _warnings(entry))
+
+
+def _other_forms(content: Content, written: Sequence[Written]) -> Iterator[str]:
+    """Yield models that were fitted on load with other equations than those of PSS/E."""
+    plant = content.get("plant")
+    if isinstance(plant, Mapping) and "network" in plant and plant.get("dialect") != "psse":
+        for own in written:
+            if differs_in_psse(own.definition.model):
+                name = own.definition.record.name
+                yield f"fitted without dialect: psse; {name} has other equations in PSS/E"
 
 
 def _loses_speed(content: Content, record: DynamicsRecord) -> bool:

@@ -1,5 +1,6 @@
 """The case file of a unit of a planner's dynamics file."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from exfit.case.case_draft import (
@@ -15,7 +16,12 @@ from exfit.features.planner.buses import NO_BUSES, Buses
 from exfit.features.planner.fields import text_of
 from exfit.features.planner.records import PSSE, SPEED_FLAG, Reading
 from exfit.features.planner.units import DynamicsUnits, Unit, read_unit, read_units
-from exfit.features.start.starting_case import PartData, UnitData, inputs_section
+from exfit.features.start.starting_case import (
+    PartData,
+    UnitData,
+    differs_in_psse,
+    inputs_section,
+)
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.util.files import read_limited
 from exfit.util.vocabulary import TYPICAL
@@ -66,7 +72,10 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
     sections["plant"] = plant
     for part in unit.added:
         inputs = inputs_section(part.definition.model, part.inputs)
-        section = {"model": _named(part), **inputs, **_parameters(part)}
+        model = _named(part)
+        if differs_in_psse(part.definition.model):
+            model = replace(model, behind=f"{model.behind}; on load with plant.dialect: psse")
+        section = {"model": model, **inputs, **_parameters(part)}
         sections[part.definition.kind] = section
     if unit.limiters:
         sections["limiters"] = [

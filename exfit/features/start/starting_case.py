@@ -265,8 +265,11 @@ def _bump_tests(
 
 
 def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
+    of_psse = [part.model.name for part in unit.added.values() if differs_in_psse(part.model)]
+    dialect = {"dialect": Noted("psse", f"{' '.join(of_psse)} as in PSS/E")} if of_psse else {}
     if event:
-        return {**event["plant"], **_machine(unit.machine, {"R": TYPICAL, "X": TYPICAL})}
+        of_machine = _machine(unit.machine, {"R": TYPICAL, "X": TYPICAL})
+        return {**event["plant"], **dialect, **of_machine}
     if unit.exciter.model.name == ALONE:
         return {"type": "none"}
     power = inspection.channel_of("p")
@@ -289,8 +292,14 @@ def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
     return {
         "type": Noted(INFINITE_BUS.name, f"{power.name} shows power"),
         "network": network,
+        **dialect,
         **_machine(unit.machine, {"R": TYPICAL, **measured}),
     }
+
+
+def differs_in_psse(model: Model | Machine) -> bool:
+    """Tell whether PSS/E has other equations for a model."""
+    return isinstance(model, Model) and "psse" in dict(model.dialects)
 
 
 def _machine(machine: PartData, sources: Mapping[str, str]) -> Section:

@@ -93,7 +93,7 @@ DC4B = documented(
         places={2: "takeover"},
     ),
     setpoints="KE0 VRMAX0 VRMIN0",
-    dialects={"powerworld": partial(dc4b_limiting, pi_and_derivative)},
+    dialects={"powerworld": {"equations": partial(dc4b_limiting, pi_and_derivative)}},
 )
 
 

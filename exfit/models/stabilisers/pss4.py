@@ -1,5 +1,8 @@
 """Multi-band stabilisers: PSS4B and PSS4C."""
 
+from collections.abc import Callable
+from functools import partial
+
 from exfit.models.blocks import (
     SHORTEST,
     Signal,
@@ -8,6 +11,7 @@ from exfit.models.blocks import (
     rate,
     second_order,
     second_order_lead,
+    washout,
     where,
 )
 from exfit.models.sheet import (
@@ -52,15 +56,27 @@ def band_rows(letter: str, name: str, gain: float, most: float, upper: Pair, low
     return (*rows, *limits(f"V{letter}MAX", most, -most, f"the {name} band"))
 
 
-def transduced(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
+def of_swing(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Compute the speed by the standard's transducer of the power: -s^2 / (sM) behind its lags."""
+    power, d.PH = lag(u.vsi2, s.PH, -1.0, p.TH)
+    _, d.XH, d.YH = second_order(power, s.XH, s.YH, p.BH, p.AH)
+    return d.XH / p.M
+
+
+def as_in_psse(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Compute what PSS/E has in its place: s^2 / (1 + sM) behind the same lags."""
+    power, d.PH = lag(u.vsi2, s.PH, 1.0, p.TH)
+    _, d.XH, d.YH = second_order(power, s.XH, s.YH, p.BH, p.AH)
+    steep, d.MH = washout(d.XH, s.MH, 1.0, p.M)
+    return steep
+
+
+def transduced(high: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
     """Compute the inputs of the bands: of low and intermediate frequency, and of high frequency."""
     low, d.XLI, d.YLI = second_order_lead(u.vsi1, s.XLI, s.YLI, p.DLI, p.CLI, p.BLI, p.ALI)
     low, d.XLI1, d.YLI1 = notch(low, s.XLI1, s.YLI1, p.BWLI1, p.WLI1)
     low, d.XLI2, d.YLI2 = notch(low, s.XLI2, s.YLI2, p.BWLI2, p.WLI2)
-    power, d.PH = lag(u.vsi2, s.PH, -1.0, p.TH)
-    _, steep, d.YH = second_order(power, s.XH, s.YH, p.BH, p.AH)
-    d.XH = steep
-    high, d.XH1, d.YH1 = notch(steep / p.M, s.XH1, s.YH1, p.BWH1, p.WH1)
+    high, d.XH1, d.YH1 = notch(high, s.XH1, s.YH1, p.BWH1, p.WH1)
     high, d.XH2, d.YH2 = notch(high, s.XH2, s.YH2, p.BWH2, p.WH2)
     return low, high
 
@@ -136,13 +152,20 @@ def pss4b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     The first input is the speed, the second the electrical power. The standard of
     2005 prints PE; IEC 61970-302 says that it should read -PE, the sign of the
     swing equation, which is taken here. PSS/E 36.7 takes PE, and 1/(1 + sM) for
-    1/(sM), as its states show that InterPSS keeps (ipss-plugin, f727fb59). With
+    1/(sM): so it is with dialect: psse (vt within 1.6e-6 pu of its curve). With
     typical data the power's transducer is -80 s² / ((s³ + 82 s² + 161 s + 80) 2 H
     s): the standard's but for the sign. M is 2 H; programs that read M = 0 as the
     2 H of the machine need its value here. Typical data are the standard's, as CIM
     has them, but for M.
     """
-    low, high = transduced(s, u, p, d)
+    return three_bands(of_swing, s, u, p, d)
+
+
+def three_bands(
+    transducer: Callable[..., Signal], s: Signal, u: Signal, p: Signal, d: Signal
+) -> Signal:
+    """PSS4B with a transducer of the power."""
+    low, high = transduced(transducer(s, u, p, d), s, u, p, d)
     bands = band("L", low, s, p, d) + band("I", low, s, p, d) + band("H", high, s, p, d)
     return clip(bands, p.VSTMIN, p.VSTMAX)
 
@@ -156,6 +179,16 @@ def pss4b_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
         band_rest(letter, low, p, x)
 
 
+def pss4b_rest_in_psse(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states that PSS/E's transducer of the power has at still inputs."""
+    pss4b_rest(vs, u, p, x)
+    x.PH, x.XH, x.MH = u.vsi2, u.vsi2, 0.0
+
+
+STATES = (
+    "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
+    "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6"
+)
 PSS4B = documented(
     pss4b,
     pss4b_rest,
@@ -181,8 +214,7 @@ PSS4B = documented(
         *band_rows("H", "high", 120.0, 0.6, (0.01513, 0.01816), (0.01816, 0.02179)),
         *of_stabiliser(VSTMAX=0.15, VSTMIN=-0.15),
     ),
-    "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
-    "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6",
+    STATES,
     inputs="speed p",
     records=record(
         "PSS4B",
@@ -190,9 +222,14 @@ PSS4B = documented(
         "TL4 TL5 TL6 KL2 KL17 TL7 TL8 TL9 TL10 TL11 TL12 KL VLMAX VLMIN KI1 KI11 TI1 TI2 TI3 TI4 "
         "TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN KH1 KH11 TH1 TH2 TH3 TH4 TH5 "
         "TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN VSTMAX VSTMIN",
-        doubt="PSS/E 36.7 does not turn the sign of the power, so that KH of its records has the "
-        "other sign here, and it has 1/(1 + sM) for 1/(sM)",
     ),
+    dialects={
+        "psse": {
+            "equations": partial(three_bands, as_in_psse),
+            "rest": pss4b_rest_in_psse,
+            "states": (*STATES.split(), "MH"),
+        }
+    },
 )
 
 
@@ -236,7 +273,7 @@ def pss4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     the 2 H of the machine need its value here. Typical data of the bands are the
     standard's, as GridKit has them, of the transducers PSS4B's.
     """
-    low, high = transduced(s, u, p, d)
+    low, high = transduced(of_swing(s, u, p, d), s, u, p, d)
     bands = band("VL", low, s, p, d) + band("L", low, s, p, d)
     bands = bands + band("I", low, s, p, d) + band("H", high, s, p, d)
     return clip(bands, p.VSTMIN, p.VSTMAX)
@@ -260,8 +297,7 @@ PSS4C = documented(
         ),
         *VERY_LOW,
     ),
-    "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
-    "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6 VL1 VL2 VL3 VL4 VL5 VL6",
+    f"{STATES} VL1 VL2 VL3 VL4 VL5 VL6",
     doubt="rests on one public diagram, that of InterPSS",
     inputs="speed p",
     records=record(
