@@ -152,7 +152,7 @@ def infinite_bus(
             return drives(at) if breaker is None else breaker.current(drives(at))
 
         at, i = unit.connected(fluxes, dw, of_machine, n.Ra, flowing)
-        closed = drives(at)
+        closed = i if breaker is None else drives(at)
         terminals = Terminals(fluxes, voltage(at, i, factor), i, dw)
         it = modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]
