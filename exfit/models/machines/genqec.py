@@ -18,6 +18,7 @@ from exfit.models.machines.machine import (
     Source,
     descending,
     factor,
+    of_machine,
     pslf_record,
     subtransient_flux,
     unsaturated_field,
@@ -43,6 +44,7 @@ MOST = 0.25  # of Kw id, up and down
 DOUBT = "limits Kw id to 0.25 as PowerWorld's equations do; InterPSS has 0.4"
 KW = Parameter("Kw", 0.0, "1", 0.0, 0.99, "compensation of the field current, on load")
 *COMMON, KIS = gentpj.SHEET
+LEAKAGE = of_machine(Xl=0.154)  # of which the damper's flux has a share on open circuit, too
 CONS = gentpj.CONS.removesuffix(" Kis")
 
 
@@ -118,7 +120,7 @@ def machine(name: str, own: Parameter, saturated: Callable[..., Signal], title: 
         name=name,
         title=f"all inductances saturate alike by the air-gap flux{title}",
         drawing=DRAWING,
-        sheet=(*COMMON, own),
+        sheet=(*(LEAKAGE[0] if row.symbol == "Xl" else row for row in COMMON), own),
         d_axis=D_AXIS,
         q_axis=("EDP", "PSIQ"),
         source=source,
