@@ -128,27 +128,30 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     the lower of two ceilings, which is a bound itself. A limiter of excitation is one limit by the
     name of its output, oel.OEL2C, whatever it has inside.
     """
-    of, found = traced(system), list[EquationLimit]()
-    states = set(of.x)
-    clamps = {held: x for x, held in zip(of.x, of.clamped, strict=True) if x is not held}
-    for held, state in clamps.items():
-        _, low, high = held.operands
-        found += [*_limit(state, low, -1.0, state), *_limit(state, high, 1.0, state)]
-    nodes = [*in_order([*of.slopes, *of.outputs, *of.clamped])]
-    bounds = {bound for node in nodes if node.op == "clip" for bound in node.operands[1:]}
-    for node in nodes:
-        if node.op == "clip" and node not in clamps:
-            found += _clamp(node, states)
-        elif node.op == "select" and node.operands[0].varies and node not in bounds:
-            found += _choice(node, states)
     limits = [
         limit
-        for limit in found
+        for limit in _of_nodes(traced(system))
         if not limit.limit.startswith(LIMITER_PREFIXES)
         if not limit.signal.startswith(LIMITER_PREFIXES)
     ]
     limits += [limit for limit, _ in _limiter_gates(system)]
     return tuple(sorted(dict.fromkeys(limits), key=lambda limit: limit.value.index))
+
+
+def _of_nodes(of: Trace) -> Iterator[EquationLimit]:
+    states = set(of.x)
+    clamps = {held: x for x, held in zip(of.x, of.clamped, strict=True) if x is not held}
+    for held, state in clamps.items():
+        _, low, high = held.operands
+        yield from _limit(state, low, -1.0, state)
+        yield from _limit(state, high, 1.0, state)
+    nodes = [*in_order([*of.slopes, *of.outputs, *of.clamped])]
+    bounds = {bound for node in nodes if node.op == "clip" for bound in node.operands[1:]}
+    for node in nodes:
+        if node.op == "clip" and node not in clamps:
+            yield from _clamp(node, states)
+        elif node.op == "select" and node.operands[0].varies and node not in bounds:
+            yield from _choice(node, states)
 
 
 def _clamp(node: Node, states: Container[Node]) -> Iterator[EquationLimit]:
