@@ -54,16 +54,8 @@ GOVERNORS = Catalogue(governors)
 LIMITERS = Catalogue(limiters)
 
 
-MACHINE_NAMES = (
-    "GENROU",
-    "GENROE",
-    "GENSAL",
-    "GENSAE",
-    "GENTPJ",
-    "GENQEC",
-    "GENQEJ",
-    "ONE_AXIS",
-)  # known without their files
+# known without their files
+MACHINE_NAMES = tuple(["GENROU", "GENROE", "GENSAL", "GENSAE", "GENTPJ", "GENQEC", "GENQEJ", "ONE_AXIS"])
 
 
 def find(name: str, folder: Path, sha256: str = "") -> Model:
