@@ -55,7 +55,7 @@ LIMITERS = Catalogue(limiters)
 
 
 # known without their files
-MACHINE_NAMES = tuple(["GENROU", "GENROE", "GENSAL", "GENSAE", "GENTPJ", "GENQEC", "GENQEJ", "ONE_AXIS"])
+MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "GENTPJ", "GENQEC", "GENQEJ", "ONE_AXIS")
 
 
 def find(name: str, folder: Path, sha256: str = "") -> Model:
