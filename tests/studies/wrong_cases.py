@@ -8,8 +8,7 @@ FOLDER/cases.jsonl; what stands there is not done again, so that a study that wa
 on. Counted are "good" fits with an interval that misses the truth by more than its own width, the
 printed 95 % intervals that hold it, the faults whose cause stands in the first two lines, and the
 widths of intervals, where nothing is wrong, against those with exact given values. A fault counts
-as seen where the best values of the free parameters leave more than 20 of its chi-square, by linear
-theory about the truth; another model, where its fit leaves so much.
+as seen where the best values of the free parameters leave more than 20 of its chi-square.
 """
 
 import argparse

@@ -7,6 +7,7 @@ family; or nothing is wrong. What one of the first causes should name stands bes
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from itertools import cycle
@@ -33,6 +34,7 @@ from scipy.signal import butter, lfilter, lfilter_zi
 
 from exfit.case.case import Case
 from exfit.case.schema import CaseDocument
+from exfit.errors import ExfitError
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.records.record import Record
@@ -40,12 +42,14 @@ from exfit.results.verdict import Cause
 from exfit.util.vocabulary import SOURCES
 
 CERTIFIED = 1e-3  # standard error of a value with a certificate, of the value
+CERTIFICATE = "certificate" if "certificate" in SOURCES else "measured"
 OFF = ((0.02, 0.05), (0.05, 0.10), (0.10, 0.15))  # by strength: how far a given value is off
 COUNTS = (1, 2, 4)  # of given values that are off
 SETTLED = 4  # turns of the iteration by which vt follows the speed
 NODES = 40  # of a table behind the step, denser where the voltage moves
 VT_ALONE = 0.5  # of the records of a unit that has another channel, too
 QUOTIENT = 1e-3  # of the logarithm of a parameter
+STEPS, LONGEST = 5, 0.3  # of Gauss-Newton, in these logarithms
 MACHINE: Mapping[str, tuple[str, ...]] = {"Tpd0": ("Tpd0",), "saturation": ("S10", "S12")}
 Noise = Mapping[str, float]
 VT: Noise = {"vt": 1.0}
@@ -304,8 +308,8 @@ class WrongCase:
 
     ``exact`` is the same case with all it gives as exact, of a right case; ``truth`` by parameter;
     ``noise`` by signal (pu), ``chance`` its chi-square in this record. ``seen`` is the chi-square
-    that the fault leaves in the record beside the best values of the free parameters, by linear
-    theory about the truth; None where that says nothing.
+    that the fault leaves in the record beside the best values of the free parameters; None where
+    the truth is not among them.
     """
 
     words: str
@@ -329,6 +333,7 @@ def drawn(task: Task) -> WrongCase:
     case = content_of(unit, weights, step)
     own = deepcopy(case)
     own["test"]["vt0"] = float(rng.uniform(0.98, 1.02))
+    case["test"]["vt0"] = {"start": "auto"}  # as exfit new writes it
     case["parameters"] = {"fixed": dict(unit.fixed), "free": free_near(unit.free, rng)}
     draft = Draft(rng, unit, noise, sampling, own, case)
     names: tuple[str, ...] = ()
@@ -393,18 +398,18 @@ def values_off(draft: Draft, level: int) -> tuple[str, ...]:
 
 
 def certify(draft: Draft) -> None:
-    """State the error of each given value, and let it have one."""
-    for section, names in given_of(draft):
-        of = draft.case["parameters"] if section is draft.case["parameters"]["fixed"] else (
-            draft.case["plant"])  # fmt: skip
+    """State the source of all that is given, and the errors of some, which they have then."""
+    sections = (
+        (draft.case["parameters"], draft.case["parameters"]["fixed"]),
+        (draft.case["plant"], draft.case["plant"]["parameters"]),
+    )
+    for part, values in sections:
+        part["sources"], part["std_errors"] = dict.fromkeys(values, CERTIFICATE), {}
+    for of, names in given_of(draft):
+        part = next(part for part, values in sections if values is of)
         for name in names:
-            error = CERTIFIED * abs(section[name])
-            section[name] += error * draft.rng.standard_normal()
-            of.setdefault("std_errors", {})[name] = error
-    if "certificate" in SOURCES:
-        for of, values in ((draft.case["parameters"], draft.case["parameters"]["fixed"]),
-                           (draft.case["plant"], draft.case["plant"]["parameters"])):  # fmt: skip
-            of["sources"] = dict.fromkeys(values, "certificate")
+            part["std_errors"][name] = CERTIFIED * abs(of[name])
+            of[name] += part["std_errors"][name] * draft.rng.standard_normal()
     draft.words = "nothing"
 
 
@@ -418,28 +423,34 @@ def without_errors(case: Content) -> Content:
 
 
 def seen(draft: Draft, time: np.ndarray, exact: Signals) -> float:
-    """Return the chi-square of what the fault leaves in the record, by linear theory."""
+    """Return the chi-square of what the fault leaves in the record beside the best values.
+
+    These are found by a few steps of Gauss-Newton from the truth, over the logarithms of the free
+    parameters and the level of vt.
+    """
     unit, content = draft.of, deepcopy(draft.case)
-    content["test"]["vt0"] = float(exact["vt"][0])
 
     def weighted(signals: Signals) -> np.ndarray:
         return np.concatenate(
             [signals[name] / (draft.noise * times) for name, times in unit.noise.items()]
         )
 
-    def response(free: Mapping[str, float]) -> np.ndarray:
-        values = {**draft.case["parameters"]["fixed"], **free}
+    def response(moves: np.ndarray) -> np.ndarray:
+        free = np.array([*unit.free.values()]) * np.exp(moves[:-1])
+        values = {**draft.case["parameters"]["fixed"], **dict(zip(unit.free, free, strict=True))}
+        content["test"]["vt0"] = float(exact["vt"][0] * np.exp(moves[-1]))
         return weighted(recorded({**content, "parameters": {"fixed": values}}, time))
 
-    at_truth = response(unit.free)
-    slopes = [
-        response({**unit.free, name: value * np.exp(QUOTIENT)}) - at_truth
-        for name, value in unit.free.items()
-    ]
-    left = weighted(exact) - at_truth
-    matrix = np.column_stack(slopes)
-    left = left - matrix @ np.linalg.lstsq(matrix, left, rcond=None)[0]
-    return float(left @ left)
+    moves, least = np.zeros(len(unit.free) + 1), np.inf
+    with suppress(ExfitError):  # a step led to where nothing responds
+        for _ in range(STEPS):
+            at = response(moves)
+            left = weighted(exact) - at
+            least = min(least, float(left @ left))
+            slopes = [response(moves + QUOTIENT * one) - at for one in np.eye(len(moves))]
+            best = np.linalg.lstsq(np.column_stack(slopes) / QUOTIENT, left, rcond=None)[0]
+            moves = moves + np.clip(best, -LONGEST, LONGEST)
+    return least
 
 
 def cause_line(names: Sequence[str], causes: Sequence[Cause]) -> int:
