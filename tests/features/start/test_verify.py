@@ -8,6 +8,7 @@ import pytest
 import yaml
 from places import SAMPLES
 from tiers import few_of
+from two_buses import MACHINE_RECORD, reference
 
 import exfit
 from exfit import workflows
@@ -97,6 +98,15 @@ def test_a_grid_event_is_verified_with_a_planners_file(empty_folder, run, monkey
     assert "as far as this test goes" in ran.err
     (case,) = fitted
     assert case.plant.type == "grid-playback"
+
+
+def test_a_stabiliser_that_psse_has_otherwise_is_as_in_psse(empty_folder, run):
+    """PSS4B in a grid event; a case on open circuit says what it needs on load."""
+    records = [MACHINE_RECORD, *reference("psse_pss4b")[0]["records"]]
+    (empty_folder / "unit.dyr").write_text("\n".join(records))
+    event = ("--record", SAMPLES / "grid_event.csv", "--dyr", "unit.dyr", "--kv", 18, "--mva", 100)
+    assert "\n  dialect: psse " in run("new", *event).out
+    assert "on load with plant.dialect: psse" in run("import", "unit.dyr").out
 
 
 def test_each_answer_that_is_missing_has_its_meaning(run):
