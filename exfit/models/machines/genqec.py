@@ -2,7 +2,8 @@
 
 Of Q. Wang's specification of GENQEC (BC Hydro, 2019) and J. Weber's equations (PowerWorld, 2022).
 GENQEC compensates the field current by Kw id; in GENQEJ, with Kis instead, the saturation is at
-the flux plus Kis it. By the sources' names a current over 1 + S sees the unsaturated reactances.
+the flux plus Kis it. A reactance over 1 + S times a current is the unsaturated one times the
+current over 1 + S, so that the equations are those of a machine without saturation.
 """
 
 from collections.abc import Callable, Mapping
