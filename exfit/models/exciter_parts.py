@@ -21,16 +21,12 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import shared, sheet
+from exfit.models.sheet import shared
 
 # the source of a regulator's power stage: terminal voltage alone, and a ceiling 1.5 times that
 SOURCE = shared(SW1=1.0, KP=1.0, KI=0.0, XL=0.0, THETAP=0.0)
 STATIC_SUPPLY = (*SOURCE, *shared(KC=0.05, VBMAX=1.5))
-ALTERNATOR_SUPPLY = sheet(
-    *SOURCE,
-    ("KC1", 0.05, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
-    *shared(VBMAX=1.5),
-)
+ALTERNATOR_SUPPLY = (*SOURCE, *shared(KC1=0.05, VBMAX=1.5))
 # a PI with a small derivative, in front of the gain of the edition of 2005, which then stays fixed
 PID = shared(KPR=1.0, KIR=0.5, KDR=0.02, TDR=0.1, VPIDMAX=1.0, VPIDMIN=-1.0)
 

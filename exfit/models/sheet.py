@@ -196,6 +196,8 @@ SHARED = (
         ("XL", *UP_TO_10, "reactance of the potential source, on load"),
         ("THETAP", "deg", (-360.0, 360.0), "angle of the potential source, on load"),
         ("VBMAX", "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        ("VBMAX1", "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        ("KC1", *UP_TO_100, "loading factor of the supply's rectifier"),
         ("VFEMAX", *LIMIT, "ceiling of the exciter's field current"),
         ("VAMAX", *LIMIT, "regulator ceiling"),
         ("VAMIN", *LIMIT, "regulator floor"),
