@@ -196,6 +196,7 @@ class KeyTables:
             for key, value in sorted(
                 section["properties"].items(), key=lambda pair: pair[0] not in required
             )
+            if not value.get("deprecated")
         ]
         return _table(("key", "value", "default", "meaning"), rows)
 

@@ -347,11 +347,18 @@ class Case:
         return sources
 
     def std_errors(self) -> dict[str, float]:
-        """Return the standard errors of given values, as the system names them.
+        """Return the standard errors of given values that are not exact, as the system names them.
 
         What is free or follows others has none, nor what was given in place of a value of the case
         without an error of its own.
         """
+        return {name: std for name, std in self._stated_errors().items() if std > 0.0}
+
+    def exact(self) -> tuple[str, ...]:
+        """Return the given values that are said to be exact, as the system names them."""
+        return tuple(name for name, std in self._stated_errors().items() if std == 0.0)
+
+    def _stated_errors(self) -> dict[str, float]:
         std_errors: dict[str, float] = {}
         for part in self.parts.all:
             stated: Mapping[str, float] = self._section(part, "std_errors")

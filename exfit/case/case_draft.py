@@ -6,17 +6,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import yaml
 
+from exfit.case.stated_values import FREE, GIVEN
 from exfit.case.yaml import QUESTION, read_yaml
 from exfit.models.sheet import Parameter
 from exfit.util.text import Place, yaml_number
 from exfit.util.vocabulary import SOURCES
 
-COMMENTS_AT = 24  # the column of comments behind short lines
+COMMENTS_AT = (24, 48)  # the columns of comments: the first that a line does not reach
 WIDTH = 80  # columns of a case
+LONGEST = 100  # with a comment behind a value
 NO_BREAK = "\N{NO-BREAK SPACE}"  # within a pair of a name and a word
 
 Section = dict[str, Any]  # values, sections and lists of these, each as it is or `Noted`
@@ -88,12 +91,34 @@ def parameter(row: Parameter, value: float, remark: str = "") -> Noted:
     return Noted(value, f"{row.unit}, {row.meaning}{remark}")
 
 
-def with_sources(section: Section, sources: Mapping[str, str]) -> Section:
-    """Add to a section where its values come from, as far as that is stated."""
-    stated = {name: word for name, word in sources.items() if word in SOURCES}
-    if not stated:
-        return section
-    return {**section, "sources": Noted(stated, above=f"each is from: {', '.join(SOURCES)}")}
+def with_sources(
+    section: Section,
+    sources: Mapping[str, str],
+    std_errors: Mapping[str, float] = MappingProxyType({}),
+) -> Section:
+    """Write beside the values of a section what is stated of them: sources, standard errors.
+
+    A value that is to be filled in or follows others has neither.
+    """
+
+    def stating(given: Any, name: str) -> Any:
+        if isinstance(given, Noted):
+            return replace(given, value=stating(given.value, name))
+        word = sources.get(name)
+        stated: Section = {"source": word} if word in SOURCES else {}
+        stated |= {"std_error": std_errors[name]} if name in std_errors else {}
+        if not stated or isinstance(given, str):
+            return given
+        return {**(given if isinstance(given, Mapping) else {"value": given}), **stated}
+
+    def of_values(given: Any) -> Any:
+        if isinstance(given, Noted):
+            return replace(given, value=of_values(given.value))
+        return {name: stating(value, name) for name, value in given.items()}
+
+    return {
+        key: of_values(given) if key in (*GIVEN, FREE) else given for key, given in section.items()
+    }
 
 
 def plain_text(name: str) -> str:
@@ -160,7 +185,11 @@ class _Writer:
         text = in_braces(value)
         short = len(head) + 1 + len(text) <= WIDTH
         if not entries or (short and indent and not _has_comments(value)):
-            yield _commented(f"{head} {text}", noted.behind)
+            line = _commented(f"{head} {text}", noted.behind)
+            if len(line) > LONGEST and not noted.above:
+                yield from _comment(noted.behind, indent)
+                line = f"{head} {text}"
+            yield line
         else:
             yield _commented(head, noted.behind)
             yield from self._below(value, indent)
@@ -234,11 +263,11 @@ def _comment(text: str, indent: str, hang: str = "  ") -> Iterator[str]:
 
 
 def _commented(text: str, comment: str) -> str:
-    """Write a comment behind a line, at one place where the line is short."""
+    """Write a comment behind a line, at a column that many have where the line is short."""
     if not comment:
         return text
-    short = f"{text:{COMMENTS_AT}}" if len(text) < COMMENTS_AT else f"{text}  "
-    return f"{short}# {in_comment(comment)}"
+    width = next((at for at in COMMENTS_AT if len(text) < at), len(text) + 2)
+    return f"{text:{width}}# {in_comment(comment)}"
 
 
 def in_comment(text: str) -> str:

@@ -15,6 +15,7 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.parts import parts_of, ties_of
 from exfit.case.schema import SINGLE, CaseDocument, RecordFile
 from exfit.case.schema.values import Section
+from exfit.case.stated_values import Apart, taken_apart
 from exfit.case.yaml import (
     TO_BE_FILLED_IN,
     Fault,
@@ -86,11 +87,13 @@ def checked_case(
             faults.append(Fault((key,), section.load().not_of_a_case))
             return None
     still_open = [Fault(place, TO_BE_FILLED_IN) for place in open_places(content)]
-    models = parts_of(content, path.parent, faults, model_sha256)
-    ties = ties_of(content, models, faults)
+    apart = taken_apart(content)
+    models = parts_of(apart.content, path.parent, faults, model_sha256)
+    ties = ties_of(apart.content, models, faults)
     faults[:] = [*still_open, *_elsewhere(faults, still_open)]
-    document = validated(content, faults, CaseDocument)
-    faults += _elsewhere(contradictions(content, models, ties), faults)
+    document = validated_apart(content, apart, faults, CaseDocument)
+    found = contradictions(apart.content, models, ties)
+    faults += _elsewhere(apart.in_file(found), faults)
     if faults or document is None:
         return None
     return Case.of(document, models, ties, path, from_file)
@@ -125,6 +128,20 @@ def validated(
         ]
         faults += _elsewhere(form_faults(details, (schema or json_schema)()), faults)
         return None
+
+
+def validated_apart(
+    content: Content, apart: Apart, faults: list[Fault], form: type[Form]
+) -> Form | None:
+    """Read sections with sources and errors taken out of the values; add all faults of form."""
+    document = validated(content, faults, form)
+    faults += _elsewhere(apart.faults, faults)
+    if document is None or not apart.places:
+        return document
+    again = list[Fault]()
+    document = validated(apart.content, again, form)
+    faults += _elsewhere(apart.in_file(again), faults)
+    return document
 
 
 def case_of_dict(content: Mapping[str, Any], records: Mapping[str, Record], path: Path) -> Case:

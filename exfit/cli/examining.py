@@ -19,6 +19,7 @@ from exfit.cli.options import (
     parameters_option,
     progress_option,
 )
+from exfit.cli.streams import echo
 from exfit.errors import CaseError, ExfitError
 from exfit.registry import parts
 
@@ -30,7 +31,12 @@ OTHER_VALUES = "--parameters FILE, or --as-found for the model before any fit"
 
 @click.command(short_help="Check a case before its fit.")
 @case_argument
-def check(case: Path) -> None:
+@click.option(
+    "--write",
+    is_flag=True,
+    help="First write sources and std_errors of CASE beside their values; comments stay.",
+)
+def check(case: Path, write: bool) -> None:
     """Check CASE before a fit: its record, derivatives, bypassed blocks, a run without a step.
 
     Warns of an inverted channel, another base, a step above 0.2 pu, ripple, a start that is not at
@@ -42,6 +48,14 @@ def check(case: Path) -> None:
     from exfit.case.peek import keys_of
     from exfit.output import models, terminal
 
+    if write:
+        from exfit.case.rewriting import rewrite
+
+        moved = rewrite(case)
+        echo(
+            f"{case}: "
+            + (f"written beside the values: {'; '.join(moved)}" if moved else "as it was")
+        )
     keys = keys_of(case)
     for key, checked in parts("CHECKS").items():
         if key in keys:

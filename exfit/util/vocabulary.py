@@ -5,10 +5,15 @@ from typing import NamedTuple
 
 TYPICAL = "typical"
 FITTED = "fitted"
+PLANNER = "planner"  # of the values of a planner's file, which does not say where it has them from
 NOT_STATED = "not stated"  # of a given value without a source
-SOURCES = ("nameplate", "maker", "test report", "measured", TYPICAL, FITTED)  # that a case may give
 # of several values the first of these is the source of what follows from them all
-LEAST_CERTAIN_FIRST = (TYPICAL, NOT_STATED, FITTED, "measured", "test report", "maker", "nameplate")
+LEAST_CERTAIN_FIRST = (
+    *(TYPICAL, NOT_STATED, PLANNER, FITTED, "measured", "test report", "maker", "certificate"),
+    "nameplate",
+)
+# that a case may give
+SOURCES = tuple(word for word in reversed(LEAST_CERTAIN_FIRST) if word != NOT_STATED)
 
 # the functions of the strategies stand in `exfit.estimate.solver`
 PHASES: Mapping[str, str] = {

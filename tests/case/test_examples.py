@@ -22,7 +22,8 @@ def keys(part, schema, known):
     if "$ref" in part and part["$ref"] not in known:
         known.add(part["$ref"])
         yield from keys(schema["$defs"][part["$ref"].rpartition("/")[2]], schema, known)
-    yield from part.get("properties", ())
+    properties = part.get("properties", {})
+    yield from (key for key, value in properties.items() if not value.get("deprecated"))
     inner = [*part.get("oneOf", ()), *part.get("anyOf", ()), *part.get("properties", {}).values()]
     inner += [
         part[key] for key in ("items", "additionalProperties") if isinstance(part.get(key), dict)

@@ -138,13 +138,13 @@ def test_standard_errors_are_those_of_given_values():
 
 
 def test_all_faults_of_standard_errors_are_reported_together():
-    plant = {"Tpd0": 0.0, "Xl": 0.01, "Xq": 0.1, "Xpp": 0.1, "H": 0.2, "Xd": "5 %"}
+    plant = {"Tpd0": -0.1, "Xl": 0.01, "Xq": 0.1, "Xpp": 0.1, "H": 0.2, "Xd": "5 %"}
     exciter = {"VRMIN": 0.1, "KC": 0.1, "KFF": 0.1, "KA": 5.0}
     with pytest.raises(CaseError) as caught:
         Case.from_dict(changed(plant={"std_errors": plant}, parameters={"std_errors": exciter}))
     faults = dict(line.split(": ", 2)[1:] for line in str(caught.value).splitlines())
     assert faults == {
-        "plant.std_errors.Tpd0": "0 is not above 0",
+        "plant.std_errors.Tpd0": "-0.1 is below 0",
         "plant.std_errors.Xl": "standard error of a value that the case does not give",
         "plant.std_errors.Xq": "follows others by =0.95*machine.Xd: give no error",
         "plant.std_errors.Xpp": "not given; did you mean Xppd?",
@@ -172,6 +172,7 @@ def test_the_schema_offers_the_words():
     for section in ("Parameters", "OpenCircuit", "InfiniteBus", "MachinePlayback", "Stabiliser"):
         stated = sections[section]["properties"]["sources"]
         assert stated["additionalProperties"]["enum"] == list(SOURCES)
+    assert sections["StatedNumber"]["properties"]["source"]["enum"] == list(SOURCES)
 
 
 def test_the_sources_of_a_case_file_are_read(tmp_path):
@@ -183,3 +184,105 @@ def test_the_sources_of_a_case_file_are_read(tmp_path):
     content.pop("validate", None)
     (tmp_path / "case.yaml").write_text(yaml.safe_dump(content))
     assert load_case(tmp_path / "case.yaml").sources()["machine.Tpd0"] == "test report"
+
+
+BESIDE = {
+    "plant": {
+        **CONTENT["plant"],
+        "parameters": {
+            "Tpd0": {"value": 6.0, "source": "nameplate", "std_error": "2 %"},
+            "Xd": {"value": 1.8, "std_error": 0},
+            "S10": {"value": 0.1, "source": "measured"}, "S12": 0.4, "Xq": "=0.95*machine.Xd",
+        },
+        "free": {"H": {"start": 3.0, "min": 1.0, "max": 9.0, "source": "typical"}},
+        "network": {**NETWORK, "X": {"value": 0.3, "source": "test report"}},
+    },
+    "stabiliser": {
+        "model": "STAB1", "parameters": {"K_T": {"value": 10.0, "source": "maker"}, "T3": 0.1}
+    },
+}  # fmt: skip
+
+
+def beside(**sections):
+    """Return the content with what is stated of the plant and the stabiliser at their values."""
+    own = {
+        key: {name: value for name, value in section.items() if name != "sources"}
+        for key, section in BESIDE.items()
+    }
+    return {**CONTENT, **own, **sections}
+
+
+def faults_of(content):
+    with pytest.raises(CaseError) as caught:
+        Case.from_dict(content)
+    return dict(line.split(": ", 2)[1:] for line in str(caught.value).splitlines())
+
+
+def test_a_case_is_the_same_whether_sources_stand_beside_values_or_by_name():
+    by_name = Case.from_dict(changed(plant={"std_errors": {"Tpd0": 0.12, "Xd": 0}}))
+    assert Case.from_dict(beside()) == by_name
+    assert by_name.std_errors() == {"machine.Tpd0": 0.12}
+    assert by_name.exact() == ("machine.Xd",)
+    assert by_name.with_values({"machine.Xd": 1.9}, "file").exact() == ()
+
+
+def test_all_faults_of_values_with_sources_are_reported_where_they_stand():
+    fixed = {
+        "KE": {"value": 1.0, "source": "guessed"},
+        "VRMAX": {"value": 14.0, "std_error": -1.0},
+        "VRMIN": {"value": "=-VRMAX", "source": "maker"},
+        "TA": {"source": "maker"},
+        "TB": {"value": 1.0, "soruce": "maker"},
+        "TC": {"value": 0.0, "std_error": "5 %"},
+        "KC": {"value": 1e9, "source": "maker"},
+        "KF": {"value": 0.03, "std_error": "much"},
+        "KFF": {"value": 1.0, "source": "maker"},
+        "TF": {"start": 1.0},
+    }
+    assert faults_of(beside(parameters={"fixed": fixed})) == {
+        "parameters.fixed.KE.source": "'guessed' is not possible; known: " + ", ".join(SOURCES),
+        "parameters.fixed.VRMAX.std_error": "-1 is below 0",
+        "parameters.fixed.VRMIN.value": "follows others by =-VRMAX: give neither source nor error",
+        "parameters.fixed.VRMIN.source": "follows others by =-VRMAX: give no source",
+        "parameters.fixed.TA.value": "is missing",
+        "parameters.fixed.TB.soruce": "unknown key; did you mean source?",
+        "parameters.fixed.TC.std_error": "a share of value = 0 is 0: give a number",
+        "parameters.fixed.KC": "1000000000 lies outside 0 ... 100 pu, its data sheet's range",
+        "parameters.fixed.KF.std_error": "'much' is neither a number nor a percentage such as 20 %",
+        "parameters.fixed.KFF": "not a parameter of AC1A; did you mean KF?",
+        "parameters.fixed.TF.value": "is missing",
+        "parameters.fixed.TF.start": "unknown key; known: value, source, std_error",
+    }
+
+
+def test_what_is_stated_twice_of_a_value_is_refused_with_both_places():
+    content = beside()
+    content["plant"] = {**content["plant"], "sources": {"Tpd0": "maker", "X": "measured"}}
+    assert faults_of(content) == {
+        "plant.sources.Tpd0": "plant.parameters.Tpd0 states it as well: leave this one out",
+        "plant.sources.X": "plant.network.X states it as well: leave this one out",
+    }
+
+
+def test_the_network_of_a_record_has_sources_and_no_standard_errors():
+    network = {**NETWORK, "X": {"value": 0.3, "source": "measured", "std_error": 0.1}}
+    content = {key: value for key, value in beside().items() if key != "test"}
+    record = {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}}
+    test = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}]}
+    own = {"type": "infinite-bus", "network": network}
+    content["records"] = [{"name": "one", "test": test, "record": record, "plant": own}]
+    faults = faults_of(content)
+    assert [*faults] == ["records[0].plant.network.X.std_error"]
+    del network["X"]["std_error"]
+    case = Case.from_dict(content)
+    assert case.seen_from(case.records[0]).sources()["network.X"] == "measured"
+
+
+def test_a_fault_has_the_line_of_its_value(tmp_path):
+    from exfit.case.load import parse_case
+
+    text = (ROOT / "configs" / "models" / "sexs.yaml").read_text()
+    text += "stabiliser:\n  model: STAB1\n  parameters:\n    K_T: {value: 5.0, std_error: x}\n"
+    line = len(text.splitlines())
+    with pytest.raises(CaseError, match=rf":{line}: stabiliser.parameters.K_T.std_error: 'x'"):
+        parse_case(text, tmp_path / "case.yaml")

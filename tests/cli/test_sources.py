@@ -41,7 +41,11 @@ def new_case(run, empty_folder):
 @pytest.mark.long
 def test_what_a_new_case_fills_in_stays_typical_up_to_the_planners_file(run, new_case):
     text = new_case.read_text()
-    new_case.write_text(text.replace("VRMAX: typical", "VRMAX: nameplate"))
+    new_case.write_text(
+        text.replace(
+            "VRMAX: {value: 6.03, source: typical}", "VRMAX: {value: 6.03, source: nameplate}"
+        )
+    )
     code, out, _ = run("fit", str(new_case), "--verbose", *FIT)
     assert code in (0, 3)  # with typical data it may not match
     printed = words(out)
@@ -72,7 +76,8 @@ def test_the_values_of_a_planners_file_are_its_own_and_what_is_filled_in_is_typi
     Path("unit.dyr").write_text(SOUND)
     assert run("import", "unit.dyr", "-o", "unit.yaml")[0] == 0
     content = yaml.safe_load(Path("unit.yaml").read_text())
-    assert "sources" not in content["plant"]  # the record holds all that the machine has
+    of_machine = {value["source"] for value in content["plant"]["parameters"].values()}
+    assert of_machine == {"planner"}  # the record holds all that the machine has
     content["parameters"]["fixed"].pop("KA")
     content["parameters"]["free"] = FREE
     content["record"] = RECORD
@@ -84,7 +89,7 @@ def test_the_values_of_a_planners_file_are_its_own_and_what_is_filled_in_is_typi
     assert (code, "typical" in err) == (0, False)
     comments = words(out.replace("//", " "))
     assert "typical" not in comments
-    assert "GENROU: not stated: Tpd0 Tppd0 Tpq0 Tppq0 H D Xd" in comments
+    assert "GENROU: planner: Tpd0 Tppd0 Tpq0 Tppq0 H D Xd" in comments
     assert "ESAC1A: fitted: KA." in comments
 
 
@@ -113,7 +118,9 @@ def test_what_a_fit_found_is_fitted_where_it_comes_back(run, new_case):
 
 @pytest.mark.long
 def test_a_translated_case_keeps_the_sources_of_the_fit(run, new_case):
-    text = new_case.read_text().replace("Tpd0: typical", "Tpd0: test report")
+    text = new_case.read_text().replace(
+        "Tpd0: {value: 6.35, source: typical}", "Tpd0: {value: 6.35, source: test report}"
+    )
     new_case.write_text(text)
     run("fit", str(new_case), *FIT)
     assert run("translate", "runs/unit-fit", "--model", "EXAC1", "--no-plots")[0] in (0, 3)

@@ -165,12 +165,7 @@ def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]
     Its bounds and its start may leave the range of the data sheet where the equations allow it.
     """
     yield from bound_faults(section)
-    std = section.at("prior", "std")
-    if std.text is not None and re.search(PERCENT, std.text):
-        if section.at("prior", "mean").number == 0.0:
-            yield std.fault("a share of mean = 0 is 0: give a number")
-        if not 0.0 < float(std.text.rstrip("% ")) < inf:
-            yield std.fault(f"{show_value(std.text)} is not above 0, or not finite")
+    yield from percentage_faults(section.at("prior", "std"), section.at("prior", "mean"))
     if row is not None:
         for key in ("start", "min", "max"):
             value = section.at(key).number
@@ -181,6 +176,15 @@ def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]
     yield from _scale_faults(section, row)
     if row is not None and row.is_time:
         yield from _bypass_faults(section)
+
+
+def percentage_faults(std: ContentNode, of: ContentNode) -> Iterator[Fault]:
+    """Yield the faults of a standard deviation that is a percentage of a value."""
+    if std.text is not None and re.search(PERCENT, std.text):
+        if of.number == 0.0:
+            yield std.fault(f"a share of {of.place[-1]} = 0 is 0: give a number")
+        if not 0.0 < float(std.text.rstrip("% ")) < inf:
+            yield std.fault(f"{show_value(std.text)} is not above 0, or not finite")
 
 
 def _bypass_faults(section: ContentNode) -> Iterator[Fault]:

@@ -13,9 +13,11 @@ from exfit.case.schema.values import (
     FreeSection,
     Frozen,
     Given,
+    Known,
     Number,
     Positive,
     Section,
+    Sourced,
     Sources,
     StdErrors,
     Text,
@@ -72,7 +74,7 @@ class WithMachine(WithData):
 class WithNetwork(PlantSection):
     """A plant with a network."""
 
-    network: Frozen[Number]
+    network: Frozen[Known]
 
     @property
     def given(self) -> Mapping[str, float]:
@@ -91,7 +93,7 @@ class InfiniteBus(WithMachine, WithNetwork):
     """A machine behind R + jX to a source of constant voltage and frequency."""
 
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
-    network: Frozen[Number] = Field(
+    network: Frozen[Known] = Field(
         description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
         "at the start; Ra of the stator; Rc and Xc of the load compensation. PL, QL, IP, IQ, YP "
         "and YQ: a load at the far bus, where R and X end, of constant power, current "
@@ -108,7 +110,7 @@ class GridPlayback(WithMachine, WithNetwork):
     """
 
     type: Literal["grid-playback"] = Field(description="Kind of plant.")
-    network: Frozen[Number] = Field(
+    network: Frozen[Known] = Field(
         description="f0 (Hz); R and X of the step-up transformer, where vt and its angle are "
         "recorded on its other side; P and Q at the start where p or q is not recorded; Ra of "
         "the stator; Rc and Xc of the load compensation; pu on the base of the machine."
@@ -128,7 +130,7 @@ class MachineOnLoad(WithMachine, WithNetwork):
     """
 
     type: Literal["machine-on-load"] = Field(description="Kind of plant; the case has no model.")
-    network: Frozen[Number] = LOAD
+    network: Frozen[Known] = LOAD
 
 
 class Playback(PlantSection):
@@ -177,7 +179,7 @@ class PlantElsewhere(WithData):
         description="Names of its parameters, where they differ, such as KA: K_A.",
     )
     machine: Text | None = Field(default=None, description="Machine model of the twin.")
-    network: Frozen[Number] = Field(
+    network: Frozen[Known] = Field(
         default_factory=nothing, description="Network of the twin infinite-bus."
     )
     dialect: Dialect = Field(default="standard", description=DIALECT)
@@ -283,7 +285,7 @@ class OnLine(WithNetwork):
 
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     whole: ClassVar[WholePlant] = InfiniteBus
-    network: Frozen[Number] = Field(
+    network: Frozen[Sourced] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Ra, Rc, Xc, a "
         "load at the far bus."
     )
@@ -296,7 +298,7 @@ class AloneOnLoad(WithNetwork):
 
     type: Literal["machine-on-load"] = Field(description="Kind of plant.")
     whole: ClassVar[WholePlant] = MachineOnLoad
-    network: Frozen[Number] = LOAD
+    network: Frozen[Sourced] = LOAD
     sources: Sources = STATED
 
 
@@ -322,7 +324,7 @@ class FurtherUnitSection(Section):
     machine: AddedModel = Field(description="Its machine.")
     stabiliser: Stabiliser | None = Field(default=None, description="Its stabiliser.")
     governor: Governor | None = Field(default=None, description="Its governor.")
-    network: Frozen[Number] = Field(
+    network: Frozen[Known] = Field(
         description="base: its MVA over those of the case's unit; share_P and share_Q: what it has "
         "of p and q at the start; R, X, Ra, Rc and Xc as of the case's unit. pu on its base."
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -99,23 +100,25 @@ Bus = Annotated[int, Strict(), Field(ge=1, le=999_999)]  # as PSS/E numbers them
 Interval = Annotated[tuple[Number, Number], AfterValidator(_rising)]
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
 
+OLDER_FORM: Any = {"deprecated": True}  # for editors
 Sources = Frozen[Source]
 STATED = Field(
     default_factory=nothing,
-    description=f"Where the value of each parameter comes from; {NOT_STATED} by default.",
+    description="Sources by name; better beside each value: {value: 6.0, source: maker}.",
+    json_schema_extra=OLDER_FORM,
 )
 
-StdErrors = Frozen[Positive]
+StdErrors = Frozen[NotNegative]
 STD_ERRORS = Field(
     default_factory=nothing,
-    description="Standard error of each given value that is not exact, in its own unit, as from a "
-    "test report; the intervals of a fit include it.",
+    description="Standard errors by name; better beside each value: {value: 6.0, std_error: 2 %}.",
+    json_schema_extra=OLDER_FORM,
 )
 
 
 # marks in brackets stand in no file: the messages take them out of the place of a fault
-def _tie_or_number(value: Any) -> str:
-    return "[tie]" if is_tie(value) else "[number]"
+def _form_of_given(value: Any) -> str:
+    return "[tie]" if is_tie(value) else section_or_number(value)
 
 
 def _number_or_text(value: Any) -> str:
@@ -132,10 +135,6 @@ def section_or_number(value: Any) -> str:
     return "[section]" if isinstance(value, dict | BaseModel) else "[number]"
 
 
-Given = Annotated[
-    Annotated[Number, Tag("[number]")] | Annotated[str, Field(pattern="^="), Tag("[tie]")],
-    Discriminator(_tie_or_number),
-]
 Fact = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[Text, Tag("[text]")],
     Discriminator(_number_or_text),
@@ -153,6 +152,15 @@ Spread = Annotated[
     Annotated[Positive, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[text]")],
     Discriminator(_text_or_number),
 ]
+StdError = Annotated[
+    Annotated[NotNegative, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[text]")],
+    Discriminator(_text_or_number),
+]
+
+
+def spread_of(std: float | str, value: float) -> float:
+    """Return a standard deviation, which may be a percentage of a value, in the unit of this."""
+    return abs(value) * float(std.rstrip("% ")) / 100.0 if isinstance(std, str) else std
 
 
 class Section(BaseModel):
@@ -166,6 +174,53 @@ class Section(BaseModel):
     )
 
 
+def _no_tie(value: Any) -> Any:
+    if is_tie(value):
+        raise refusal(f"follows others by {value}: give neither source nor error")
+    return value
+
+
+class SourcedNumber(Section):
+    """A value with its source."""
+
+    value: Annotated[Number, BeforeValidator(_no_tie)] = Field(description="The value.")
+    source: Source | None = Field(
+        default=None, description=f"Where it is from; default: {NOT_STATED}."
+    )
+
+
+class StatedNumber(SourcedNumber):
+    """A value with its source and its standard error, in place of the value alone."""
+
+    std_error: StdError | None = Field(
+        default=None,
+        description="Its standard error: a number in its unit or a percentage such as 2 %, as "
+        "from a certificate, which the intervals of a fit allow for; 0: exact.",
+    )
+
+
+# the checks take sources and standard errors out of the values: `stated_values`
+if TYPE_CHECKING:
+    Given = float | str
+    Known = float
+    Sourced = float
+else:
+    Given = Annotated[
+        Annotated[Number, Tag("[number]")]
+        | Annotated[str, Field(pattern="^="), Tag("[tie]")]
+        | Annotated[StatedNumber, Tag("[section]")],
+        Discriminator(_form_of_given),
+    ]
+    Known = Annotated[
+        Annotated[Number, Tag("[number]")] | Annotated[StatedNumber, Tag("[section]")],
+        Discriminator(section_or_number),
+    ]
+    Sourced = Annotated[
+        Annotated[Number, Tag("[number]")] | Annotated[SourcedNumber, Tag("[section]")],
+        Discriminator(section_or_number),
+    ]
+
+
 class PriorSection(Section):
     """Prior knowledge of a parameter: a value and its standard deviation."""
 
@@ -175,9 +230,7 @@ class PriorSection(Section):
     @property
     def sigma(self) -> float:
         """The standard deviation in the parameter's own unit."""
-        if isinstance(self.std, str):
-            return abs(self.mean) * float(self.std.rstrip("% ")) / 100.0
-        return self.std
+        return spread_of(self.std, self.mean)
 
 
 class FreeSection(Section):
@@ -202,6 +255,9 @@ class FreeSection(Section):
     )
     prior: PriorSection | None = Field(
         default=None, description="Prior knowledge, which adds one residual."
+    )
+    source: Source | None = Field(
+        default=None, description="Where its start is from; not under tests."
     )
 
 

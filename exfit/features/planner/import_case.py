@@ -24,7 +24,7 @@ from exfit.features.start.starting_case import (
 )
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.util.files import read_limited
-from exfit.util.vocabulary import TYPICAL
+from exfit.util.vocabulary import PLANNER, TYPICAL
 
 LARGEST_FILE = 32_000_000  # bytes; that of a whole interconnection has fewer
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}
@@ -101,33 +101,36 @@ def _named(part: Reading) -> Noted:
 
 
 def _parameters(part: Reading) -> Section:
-    """Make the values of a part, with which of them are not of the file.
-
-    The file does not say where its own come from.
-    """
+    """Make the values of a part, with which of them are not of the file."""
     absent = part.definition.absent
     values = {
         row.symbol: parameter(
             row,
             part.values[row.symbol],
-            "; typical, not in the file" if row.symbol in absent else "",
+            "; not in the file" if row.symbol in absent else "",
         )
         for row in part.definition.model.sheet
     }
-    return with_sources({"parameters": values}, dict.fromkeys(absent, TYPICAL))
+    return with_sources({"parameters": values}, _sources(part))
+
+
+def _sources(part: Reading) -> dict[str, str]:
+    """Name the sources of the values of a part: the planner's file, or else units of its kind."""
+    absent = part.definition.absent
+    return {
+        row.symbol: TYPICAL if row.symbol in absent else PLANNER
+        for row in part.definition.model.sheet
+    }
 
 
 def unit_data(unit: Unit, file: str) -> UnitData:
-    """Take the models of a unit of a file, whose path the case names, with their values.
-
-    The file does not say where its values come from; what it does not hold is typical.
-    """
+    """Take the models of a unit of a file, whose path the case names, with their values."""
 
     def data(part: Reading) -> PartData:
-        absent = dict.fromkeys(part.definition.absent, TYPICAL)
         origin = f"those of {Path(file).name}"
         model, times_speed = part.definition.model, part.times_speed
-        return PartData(model, part.values, absent, origin, part.inputs, times_speed, part.place)
+        own = _sources(part)
+        return PartData(model, part.values, own, origin, part.inputs, times_speed, part.place)
 
     added = {part.definition.kind: data(part) for part in unit.added}
     exciter, machine = data(unit.exciter), data(unit.machine)

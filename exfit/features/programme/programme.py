@@ -12,10 +12,11 @@ from exfit.case.case import Case
 from exfit.case.checks.content import contradictions
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import name_faults
-from exfit.case.load import faults_with_lines, parse_case, validated
+from exfit.case.load import faults_with_lines, parse_case, validated, validated_apart
 from exfit.case.parts import kind_of, parts_of, ties_of
 from exfit.case.peek import files_in
 from exfit.case.schema import Recording
+from exfit.case.stated_values import taken_apart
 from exfit.case.yaml import Fault, read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.features.programme.programme_checks import saturation_test_faults, steady_test_faults
@@ -284,16 +285,17 @@ def load_programme(path: Path) -> Programme:
     if TESTS not in top.value:
         case = parse_case(text, path)
         return Programme(path=path, text=text, content=top.value, about=case.about, single=case)
-    document = validated(top.value, faults, ProgrammeDocument)
+    apart = taken_apart(top.value)
+    document = validated_apart(top.value, apart, faults, ProgrammeDocument)
     places = {fault.place for fault in faults}
-    for fault in programme_faults(top.value, path.parent):
+    for fault in apart.in_file(programme_faults(apart.content, path.parent)):
         if fault.place not in places:
             faults.append(fault)
             places.add(fault.place)
     if faults or document is None:
         raise faults_with_lines(faults, top, path)
     return Programme(
-        path=path, text=text, content=top.value, about=document.about, tests=document.programme
+        path=path, text=text, content=apart.content, about=document.about, tests=document.programme
     )
 
 
@@ -305,6 +307,9 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
             yield top.at(key).fault("not allowed with tests: each of them has its own")
     tests = top.at(TESTS).entries
     yield from name_faults(tests)
+    for _, free in (entry for test in tests for entry in test.at("free").sections):
+        if "source" in free:
+            yield free.at("source").fault("not allowed here: the test finds the value")
     bumps = [test for test in tests if test.content.get("kind", BUMP) == BUMP]
     if bumps and all(test.at("use").text == "validate" for test in bumps):
         yield bumps[0].at("use").fault("no bump test is fitted: nothing to validate")

@@ -48,7 +48,7 @@ CONSTANT_POWER = "none in the model: the mechanical power is constant"
 SILENT = "The case does not say which unit this is: state it under `about`."
 WHERE_STATED = (
     "A case states facts of the unit, the test and the report under `about`, by the names of their "
-    "rows, and the sources of values under `sources`."
+    "rows, and beside a value its source."
 )
 
 

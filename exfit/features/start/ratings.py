@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 from math import sqrt
 from typing import NamedTuple
 
-from exfit.case.case_draft import CaseDraft, Noted, OpenValue, with_sources
+from exfit.case.case_draft import CaseDraft, Noted, OpenValue
 from exfit.case.suggestion import Base, rated_bases
 from exfit.plants import KINDS
 from exfit.records.inspection import Inspection
@@ -127,10 +127,7 @@ def _with_network(draft: CaseDraft, ratings: Ratings) -> CaseDraft:
         known["X"] = Noted(x, "pu, the step-up transformer's: recorded behind it")
     if ratings.ra:
         known["Ra"] = Noted(ratings.ra, "pu, the stator's")
-    stated = plant["sources"].value if "sources" in plant else {}
-    sources = {name: word for name, word in stated.items() if name not in known}
-    plant = {name: section for name, section in plant.items() if name != "sources"}
-    plant = with_sources({**plant, "network": {**plant["network"], **known}}, sources)
+    plant = {**plant, "network": {**plant["network"], **known}}
     return replace(draft, sections={**draft.sections, "plant": plant})
 
 

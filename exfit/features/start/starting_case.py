@@ -198,7 +198,7 @@ def _heading(unit: UnitData, tests: Sequence[StartingTest]) -> tuple[str, ...]:
     advice = f"Values are {' and '.join(given)}. " if given else ""
     if any(TYPICAL in part.sources.values() for part in parts):
         those = "Replace those that are typical" if given else "Values are typical: replace them"
-        advice += f"{those} by those of the unit, and the words under `sources`. "
+        advice += f"{those} by those of the unit, each with its source. "
     return (
         f"{unit.exciter.model.name} on {records} {files}: a case to start from.",
         f"{advice}`exfit check` tries the case, `exfit identify` shows what its test resolves, "
@@ -268,14 +268,15 @@ def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
     of_psse = [part.model.name for part in unit.added.values() if differs_in_psse(part.model)]
     dialect = {"dialect": Noted("psse", f"{' '.join(of_psse)} as in PSS/E")} if of_psse else {}
     if event:
-        of_machine = _machine(unit.machine, {"R": TYPICAL, "X": TYPICAL})
-        return {**event["plant"], **dialect, **of_machine}
+        plant = {**event["plant"], **dialect, **_machine(unit.machine)}
+        return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, "X": TYPICAL})
     if unit.exciter.model.name == ALONE:
         return {"type": "none"}
     power = inspection.channel_of("p")
     if power is None or not shows_power(power):
         kind = Noted(OPEN_CIRCUIT.name, "the breaker is open, at rated speed")
-        return {"type": kind, **_machine(unit.machine, {})}
+        plant = {"type": kind, **_machine(unit.machine)}
+        return with_sources(plant, unit.machine.sources)
     levels: dict[str, float | str] = {"P": QUESTION, "Q": QUESTION}
     for signal in ("p", "q"):
         channel = inspection.channel_of(signal)
@@ -289,12 +290,13 @@ def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
         "Q": Noted(levels["Q"], "pu, before the step"),
     }
     measured = {name: "measured" for name, level in levels.items() if level != QUESTION}
-    return {
+    plant = {
         "type": Noted(INFINITE_BUS.name, f"{power.name} shows power"),
         "network": network,
         **dialect,
-        **_machine(unit.machine, {"R": TYPICAL, **measured}),
+        **_machine(unit.machine),
     }
+    return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, **measured})
 
 
 def differs_in_psse(model: Model | Machine) -> bool:
@@ -302,12 +304,10 @@ def differs_in_psse(model: Model | Machine) -> bool:
     return isinstance(model, Model) and "psse" in dict(model.dialects)
 
 
-def _machine(machine: PartData, sources: Mapping[str, str]) -> Section:
-    """Make the machine of a plant, and where its values and those of the network come from."""
+def _machine(machine: PartData) -> Section:
     model = machine.model
     values = {row.symbol: parameter(row, machine.values[row.symbol]) for row in model.sheet}
-    section = {"machine": Noted(model.name, machine.origin or model.title), "parameters": values}
-    return with_sources(section, {**sources, **machine.sources})
+    return {"machine": Noted(model.name, machine.origin or model.title), "parameters": values}
 
 
 def _parameters(exciter: PartData) -> Section:

@@ -157,7 +157,7 @@ def ask_data(talk: Conversation) -> None:
             f"One of: {', '.join(OF_DATA_SHEET)}; the report names it.",
             "maker",
             "maker: the data sheet. If values have several sources, enter that of most, and "
-            "change the others in the case, under sources.",
+            "change the others in the case.",
         )
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from exfit.case.case_draft import CaseDraft, Noted, Section, with_sources
 from exfit.case.other_model import BOUNDS, bounds_of, free_of
+from exfit.case.stated_values import SOURCES as SOURCES_BY_NAME
+from exfit.case.stated_values import STD_ERRORS, taken_apart
 from exfit.case.suggestion import relative
 from exfit.case.yaml import read_yaml
 from exfit.errors import ExfitError
@@ -163,17 +165,20 @@ def _moved(content: Any, before: Path, now: Path) -> Any:
 
 def _with_values(plant: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Any]:
     """Return a plant section with fitted values, and numbers for what followed the exciter."""
+    apart = taken_apart({"plant": dict(plant)}).content["plant"]
     given = {
         symbol: values.get(symbol, value) if isinstance(value, str) else value
-        for symbol, value in plant.get("parameters", {}).items()
+        for symbol, value in apart.get("parameters", {}).items()
     }
     free = {
         symbol: {**section, "start": values.get(symbol, section.get("start"))}
-        for symbol, section in plant.get("free", {}).items()
+        for symbol, section in apart.get("free", {}).items()
     }
-    sources = {**plant.get("sources", {}), **dict.fromkeys(free, FITTED)}
-    changed = {"parameters": given, "free": free, "sources": sources}
-    return {**plant, **{key: section for key, section in changed.items() if section}}
+    sources = {**apart.pop(SOURCES_BY_NAME, {}), **dict.fromkeys(free, FITTED)}
+    std_errors = apart.pop(STD_ERRORS, {})
+    changed = {"parameters": given, "free": free}
+    section = {**apart, **{key: section for key, section in changed.items() if section}}
+    return with_sources(section, sources, std_errors)
 
 
 def _start(row: Parameter, value: float) -> Section:

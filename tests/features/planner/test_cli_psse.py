@@ -19,7 +19,9 @@ from places import ROOT
 from tiers import few_of
 
 from exfit import cli
+from exfit.case.case_draft import LONGEST
 from exfit.case.load import load_case
+from exfit.case.stated_values import taken_apart
 from exfit.features.planner.records import definition_of, definitions
 from exfit.features.planner.units import read_unit
 from exfit.models import LIMITERS, MODELS, STABILISERS
@@ -51,7 +53,7 @@ def test_the_sample_becomes_a_case_that_runs_as_it_stands(run):
     assert (code, out) == (0, "written to case.yaml; next: exfit simulate case.yaml\n")
     assert err == ""
     text = Path("case.yaml").read_text()
-    assert max(map(len, text.splitlines())) <= WIDTH
+    assert max(map(len, text.splitlines())) <= LONGEST
     for words in ("unit.dyr", "bus 101", "line 3", "line 6", "IEEEG1 on line 9"):
         assert words in text
     assert run("simulate", "case.yaml", "--no-plots", "-q") == (0, "", "")
@@ -78,7 +80,8 @@ def test_the_sample_holds_the_start_of_the_case_it_is_made_from():
 def test_without_a_file_the_case_goes_to_the_terminal(run):
     code, out, err = run("import", "unit.dyr")
     assert (code, err) == (0, "")
-    assert yaml.safe_load(out)["parameters"]["fixed"]["KA"] == 766.0
+    fixed = yaml.safe_load(out)["parameters"]["fixed"]
+    assert fixed["KA"] == {"value": 766.0, "source": "planner"}
     run("import", "unit.dyr", "-o", "case.yaml")
     assert Path("case.yaml").read_text() == out
 
@@ -94,7 +97,7 @@ def test_a_unit_among_several_is_chosen(run, workplace):
     assert listing(workplace) == before
     code, out, err = run("import", "unit.dyr", "--bus", "9")
     assert (code, err) == (0, "")
-    assert yaml.safe_load(out)["plant"]["parameters"]["Tpd0"] == 7.0
+    assert yaml.safe_load(out)["plant"]["parameters"]["Tpd0"]["value"] == 7.0
     assert run("import", "unit.dyr", "--bus", "1", "--id", "2")[0] == 0
     assert "no record of bus 2" in run("import", "unit.dyr", "--bus", "2")[2]
 
@@ -208,8 +211,9 @@ def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx
     Path("unit.dyr").write_text(SOUND + "1 PSSX 1 0 1e-5 20 /\n")
     code, out, err = run("import", "unit.dyr")
     assert (code, err) == (0, "Warning: unit.dyr:5: PSSX: MODE: 0 is not modelled; 1 is taken\n")
-    found = yaml.safe_load(out)
-    assert found["stabiliser"] == {"model": "PSSX", "parameters": {"k": 20.0, "a": 1e-5}}
+    found = taken_apart(yaml.safe_load(out)).content["stabiliser"]
+    assert found.pop("sources") == {"k": "planner", "a": "planner"}
+    assert found == {"model": "PSSX", "parameters": {"k": 20.0, "a": 1e-5}}
 
 
 def test_a_fitted_stabiliser_is_written_behind_its_exciter(run, fitted, pssx):

@@ -109,6 +109,13 @@ def test_a_case_is_the_programme_of_one_test(loaded):
         (("tests", 3, "free"), None, "tests[3].free: is missing"),
         (("tests", 3, "free", "Tpd0", "start"), 50.0, "tests[3].free.Tpd0.start: 50 lies outside"),
         (("tests", 3, "free", "Tpdo"), TPD0, "tests[3].free.Tpdo: not a parameter of GENROU"),
+        (("tests", 3, "free", "Tpd0", "source"), "maker", "tests[3].free.Tpd0.source: not allowed"),
+        (
+            ("plant", "parameters", "Xd"),
+            {"value": 1.8, "std_error": "x"},
+            "plant.parameters.Xd.std_",
+        ),
+        (("tests", 2, "plant", "network", "X"), {"valu": 1.0}, "tests[2].plant.network.X.valu"),
         (("tests", 1, "free"), {"Tpd0": TPD0}, "tests[1].free: not allowed with this type"),
         (("tests", 2, "plant", "network", "X"), None, "tests[2].plant.network.X: is missing"),
         (("tests", 0, "test", "vref", 0, "at"), "x", "tests[0].test.vref[0].at: 'x' is not a num"),

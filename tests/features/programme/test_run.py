@@ -106,7 +106,10 @@ def test_the_errors_of_what_a_test_measured_enter_the_later_fits(whole):
 
 def test_a_standard_error_of_the_file_is_not_that_of_what_a_test_fits(folder):
     content = programme_content()
-    content["plant"]["std_errors"] = {"Tpd0": 0.2, "Xq": 0.1}
+    content["plant"]["parameters"] |= {
+        "Tpd0": {"value": 5.2, "std_error": 0.2},
+        "Xq": {"value": 1.72, "source": "maker", "std_error": 0.1},
+    }
     programme = load_programme(written(content, folder, "errors.yaml"))
     assert programme.case_of(OF_MACHINE).std_errors() == {"machine.Xq": 0.1}
     assert programme.case_of("fit").std_errors() == {"machine.Tpd0": 0.2, "machine.Xq": 0.1}
@@ -180,7 +183,7 @@ def test_a_record_that_changes_is_a_reason(again, tmp_path):
 @pytest.mark.long
 def test_a_value_of_a_better_source_stays_and_what_excludes_it_is_reported(again):
     content = programme_content()
-    content["plant"]["sources"]["Xd"] = "maker"
+    content["plant"]["parameters"]["Xd"] = {"value": 1.9, "source": "maker"}
     result, ran = again(content)
     assert ran == ORDER  # the sources belong to every test
     (xd,) = (value for value in result.values if value.name == "machine.Xd")

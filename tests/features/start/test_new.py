@@ -10,8 +10,10 @@ from places import SAMPLES
 from step_records import step_record
 from tiers import few_of
 
+from exfit.case.case_draft import LONGEST
 from exfit.case.load import load_case
 from exfit.case.other_model import bounds_of, free_of
+from exfit.case.stated_values import taken_apart
 from exfit.errors import CaseError
 from exfit.features.start.starting_case import PartData, UnitData, starting_case
 from exfit.features.start.starting_tests import starting_tests
@@ -26,7 +28,6 @@ from exfit.workflows import fit, simulate
 NOISE = 1e-4  # pu
 STEP = 0.05  # pu
 AT = 1.0  # s
-WIDTH = 80
 PLANTS = {"FIRST_ORDER": {"type": "none"}}
 FIELD_RECORD = SAMPLES / "field_record.csv"
 OPEN = {"type": "open-circuit", "machine": "GENROU"}
@@ -74,7 +75,7 @@ def started(name, table, folder, machine="GENROU", step=STEP):
 
 def test_every_model_becomes_a_case_that_loads_as_it_stands(model, record, tmp_path):
     path = started(model, record(model), tmp_path)
-    assert [line for line in path.read_text().splitlines() if len(line) > WIDTH] == []
+    assert [line for line in path.read_text().splitlines() if len(line) > LONGEST] == []
     case = load_case(path)
     assert case.parts.exciter.name == model
     values = case.values()
@@ -142,7 +143,7 @@ def test_the_data_of_any_machine_stand_with_unit_and_meaning(machine, record, tm
     text = path.read_text()
     assert load_case(path).parts.machine.name == machine
     for row in MACHINES[machine].sheet:
-        assert f"    {row.symbol}: {float(row.typical)!r}" in text
+        assert f"    {row.symbol}: {{value: {float(row.typical)!r}, source: typical}}" in text
         assert row.meaning in text
 
 
@@ -184,7 +185,7 @@ def test_on_load_the_record_gives_power_and_the_network_is_required(tmp_path):
     levels = {"vt": 1.0, "p": 0.8, "q": 0.1}
     columns = {name: level + rng.normal(0.0, NOISE, time.size) for name, level in levels.items()}
     path = started("ST1A", Columns({"t": time, **columns}, path=tmp_path / "r.csv"), tmp_path)
-    plant = yaml.safe_load(path.read_text())["plant"]
+    plant = taken_apart(yaml.safe_load(path.read_text())).content["plant"]
     network = plant["network"]
     assert {symbol: plant["sources"].get(symbol) for symbol in network} == {
         "f0": None, "R": "typical", "X": None, "P": "measured", "Q": "measured"

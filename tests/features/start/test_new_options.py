@@ -11,6 +11,7 @@ from stepped_record import stepped_record
 from tiers import few_of
 
 from exfit.case.load import load_case
+from exfit.case.stated_values import taken_apart
 from exfit.models import MODELS
 
 
@@ -169,8 +170,7 @@ def test_the_data_of_a_planners_file_are_starts_and_fixed_values(record, new):
     _, content = new("--record", record, "--dyr", SAMPLES / "unit.dyr", "--bus", "101", model="")
     assert content["model"] == "AC1A"
     assert content["parameters"]["free"]["KA"]["start"] == 766.0
-    assert content["plant"]["parameters"]["Xd"] == 1.8
-    assert "sources" not in content["plant"]
+    assert content["plant"]["parameters"]["Xd"] == {"value": 1.8, "source": "planner"}
     assert content["as_found"]["source"] == "unit.dyr, bus 101, machine 1"
     assert content["as_found"]["parameters"]["KA"] == 766.0
     assert (content["as_found"]["bus"], content["as_found"]["id"]) == (101, "1")
@@ -178,7 +178,7 @@ def test_the_data_of_a_planners_file_are_starts_and_fixed_values(record, new):
     _, other = new("--record", record, "--dyr", SAMPLES / "unit.dyr", model="SEXS")
     assert other["model"] == "SEXS"
     assert other["as_found"]["model"] == "AC1A"
-    assert other["plant"]["parameters"]["Xd"] == 1.8
+    assert other["plant"]["parameters"]["Xd"] == {"value": 1.8, "source": "planner"}
     assert other["parameters"]["free"]["K"]["start"] == 200.0
 
 
@@ -186,9 +186,10 @@ def test_the_machine_of_another_case_comes_with_its_sources(record, new):
     _, content = new("--record", record, "--machine-from", CONFIGS / "ac8b_unit1.yaml")
     expected = load_case(CONFIGS / "ac8b_unit1.yaml")
     values, sources = expected.values(), expected.sources()
-    for symbol, value in content["plant"]["parameters"].items():
+    plant = taken_apart(content).content["plant"]
+    for symbol, value in plant["parameters"].items():
         assert value == values[f"machine.{symbol}"]
-        assert content["plant"]["sources"].get(symbol, "not stated") == sources[f"machine.{symbol}"]
+        assert plant["sources"].get(symbol, "not stated") == sources[f"machine.{symbol}"]
 
 
 def test_facts_come_into_the_case(record, new):

@@ -167,7 +167,7 @@ def test_a_case_that_somebody_edited_is_not_written_over(empty_folder, run, loca
     assert run(*arguments).code in (0, 3)
     assert run(*arguments, "--step", "0.051").code in (0, 3)  # nobody edited it
     case = empty_folder / "field_record.yaml"
-    edited = case.read_text(encoding="utf-8").replace("Tpd0: 6.0", "Tpd0: 6.1")
+    edited = case.read_text(encoding="utf-8").replace("Tpd0: {value: 6.0", "Tpd0: {value: 6.1")
     case.write_text(edited, encoding="utf-8")
     ran = run(*arguments)
     assert ran.code == 1
