@@ -10,12 +10,11 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from exfit.case.case import Case
-from exfit.case.checks.content import contradictions
+from exfit.case.checks.content import contradictions, states_more
 from exfit.case.checks.node import ContentNode
 from exfit.case.parts import parts_of, ties_of
 from exfit.case.schema import SINGLE, CaseDocument, RecordFile
 from exfit.case.schema.values import Section
-from exfit.case.stated_values import Apart, taken_apart
 from exfit.case.yaml import (
     TO_BE_FILLED_IN,
     Fault,
@@ -87,19 +86,25 @@ def checked_case(
             faults.append(Fault((key,), section.load().not_of_a_case))
             return None
     still_open = [Fault(place, TO_BE_FILLED_IN) for place in open_places(content)]
-    apart = taken_apart(content)
-    models = parts_of(apart.content, path.parent, faults, model_sha256)
-    ties = ties_of(apart.content, models, faults)
-    faults[:] = [*still_open, *_elsewhere(faults, still_open)]
-    document = validated_apart(content, apart, faults, CaseDocument)
-    found = contradictions(apart.content, models, ties)
-    faults += _elsewhere(apart.in_file(found), faults)
+    apart = None
+    if states_more(content):
+        from exfit.case.stated_values import taken_apart
+
+        apart = taken_apart(content)
+    plain = content if apart is None else apart.content
+    models = parts_of(plain, path.parent, faults, model_sha256)
+    ties = ties_of(plain, models, faults)
+    faults[:] = [*still_open, *elsewhere(faults, still_open)]
+    validate = validated if apart is None else apart.validated
+    document = validate(content, faults, CaseDocument)
+    found = contradictions(plain, models, ties)
+    faults += elsewhere(found if apart is None else apart.in_file(found), faults)
     if faults or document is None:
         return None
     return Case.of(document, models, ties, path, from_file)
 
 
-def _elsewhere(faults: Iterable[Fault], others: Iterable[Fault]) -> list[Fault]:
+def elsewhere(faults: Iterable[Fault], others: Iterable[Fault]) -> list[Fault]:
     """Return the faults of those places that have no other."""
     places = {fault.place for fault in others}
     return [fault for fault in faults if fault.place not in places]
@@ -126,22 +131,8 @@ def validated(
             {**detail, "loc": (*place, *detail["loc"])}
             for detail in error.errors(include_url=False)
         ]
-        faults += _elsewhere(form_faults(details, (schema or json_schema)()), faults)
+        faults += elsewhere(form_faults(details, (schema or json_schema)()), faults)
         return None
-
-
-def validated_apart(
-    content: Content, apart: Apart, faults: list[Fault], form: type[Form]
-) -> Form | None:
-    """Read sections with sources and errors taken out of the values; add all faults of form."""
-    document = validated(content, faults, form)
-    faults += _elsewhere(apart.faults, faults)
-    if document is None or not apart.places:
-        return document
-    again = list[Fault]()
-    document = validated(apart.content, again, form)
-    faults += _elsewhere(apart.in_file(again), faults)
-    return document
 
 
 def case_of_dict(content: Mapping[str, Any], records: Mapping[str, Record], path: Path) -> Case:
@@ -222,7 +213,7 @@ def record_section(content: Mapping[str, Any]) -> RecordFile:
         for signal, channel in node.at("channels").sections:
             yield from channel_faults(signal, channel, per_unit=True)
 
-    faults += _elsewhere(contradicting(ContentNode(place, plain)), faults)
+    faults += elsewhere(contradicting(ContentNode(place, plain)), faults)
     if section is None or faults:
         file = content.get("file", "record")
         raise CaseError(f"{file}: {dotted(fault.place[1:])}: {fault.text}" for fault in faults)

@@ -21,7 +21,7 @@ OF_MAP = "# each is from: "  # how a comment begins that cases had above their s
 FAR = 40  # columns: text in braces that begins further right goes on below its key
 
 
-class Edit(NamedTuple):
+class Replacement(NamedTuple):
     """A part of a text, from its first character to behind its last, and what replaces it."""
 
     start: int
@@ -68,7 +68,7 @@ class _Rewriting:
         self.before = text
         self.top: Any = yaml.compose(text, Loader=yaml.BaseLoader)
         self.newline = "\r\n" if "\r\n" in text else "\n"
-        self.edits = dict[int, Edit]()  # by their start: what an alias repeats changes once
+        self.edits = dict[int, Replacement]()  # by their start: what an alias repeats changes once
         self.moved = list[str]()
 
     def text(self) -> str:
@@ -102,7 +102,7 @@ class _Rewriting:
         return self.before[node.start_mark.index : node.end_mark.index]
 
     def _edit(self, start: int, end: int, text: str) -> None:
-        self.edits[start] = Edit(start, end, text)
+        self.edits[start] = Replacement(start, end, text)
 
     def _values(self, values: Any, stated: dict[str, list[str]]) -> None:
         texts = {

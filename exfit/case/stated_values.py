@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from exfit.case.checks.model import percentage_faults
 from exfit.case.checks.node import ContentNode
+from exfit.case.load import Form, elsewhere, validated
 from exfit.case.schema.values import PERCENT, spread_of
 from exfit.case.yaml import Fault
 from exfit.util.text import Place, dotted
@@ -37,6 +38,17 @@ class Apart(NamedTuple):
     def in_file(self, faults: Iterable[Fault]) -> list[Fault]:
         """Return faults of the content with their places in the file."""
         return [fault._replace(place=self.places.get(fault.place, fault.place)) for fault in faults]
+
+    def validated(self, content: Content, faults: list[Fault], form: type[Form]) -> Form | None:
+        """Read the sections of the file's content, with all apart; add all faults of form."""
+        document = validated(content, faults, form)
+        faults += elsewhere(self.faults, faults)
+        if document is None or not self.places:
+            return document
+        again = list[Fault]()
+        document = validated(self.content, again, form)
+        faults += elsewhere(self.in_file(again), faults)
+        return document
 
 
 def taken_apart(content: Content) -> Apart:

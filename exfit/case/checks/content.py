@@ -1,5 +1,6 @@
 """What contradicts itself in a case though every single value has the right form."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,12 +13,7 @@ from exfit.case.checks.bump_test import (
     missing_without_record,
     reference_faults,
 )
-from exfit.case.checks.model import (
-    as_found_faults,
-    parameter_faults,
-    part_faults,
-    source_faults,
-)
+from exfit.case.checks.model import parameter_faults, part_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import (
     channel_faults,
@@ -45,6 +41,11 @@ NEEDS = {
 USUAL = {"jacobian": "exact", "update": "radius", "search": DEFAULT_SEARCH, "loss": "least-squares"}
 
 
+def states_more(content: dict[str, Any]) -> bool:
+    """Tell whether content may have sources, standard errors or a model as found."""
+    return re.search(r"'(value|sources?|std_errors?|as_found)':", str(content)) is not None
+
+
 def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[Fault]:
     """Yield the faults of a case file's content beyond its form.
 
@@ -59,14 +60,16 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
         from exfit.case.checks.equipment import equipment_faults
 
         yield from equipment_faults(content, parts, kind)
-    yield from source_faults(content, parts, kind)
     yield from _tests_faults(content, several, kind)
     driven = [(recording, _driving(recording, kind)) for recording in (content, *several)]
     balanced = content.at("estimate").content.get("weights") == "balanced"
     yield from weight_faults(driven, balanced)
     yield from name_faults(several)
     yield from _estimate_faults(content, parts)
-    yield from as_found_faults(content, parts)
+    if states_more(plain):
+        from exfit.case.checks.stated import stated_faults
+
+        yield from stated_faults(content, parts, kind)
     node = content.at("plant", "type")
     if not KINDS.get(str(node.value), ANY_PLANT).has_equations:
         faults = registry.parts("FAULTS").get(str(node.value))

@@ -12,7 +12,7 @@ from exfit.case.case import Case
 from exfit.case.checks.content import contradictions
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import name_faults
-from exfit.case.load import faults_with_lines, parse_case, validated, validated_apart
+from exfit.case.load import faults_with_lines, parse_case, validated
 from exfit.case.parts import kind_of, parts_of, ties_of
 from exfit.case.peek import files_in
 from exfit.case.schema import Recording
@@ -286,7 +286,7 @@ def load_programme(path: Path) -> Programme:
         case = parse_case(text, path)
         return Programme(path=path, text=text, content=top.value, about=case.about, single=case)
     apart = taken_apart(top.value)
-    document = validated_apart(top.value, apart, faults, ProgrammeDocument)
+    document = apart.validated(top.value, faults, ProgrammeDocument)
     places = {fault.place for fault in faults}
     for fault in apart.in_file(programme_faults(apart.content, path.parent)):
         if fault.place not in places:
