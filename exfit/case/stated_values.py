@@ -84,25 +84,42 @@ def _section_apart(node: ContentNode, places: dict[Place, Place], faults: list[F
         for symbol, entry in node.at(key).sections:
             if not entry.is_section or (key == FREE and "source" not in entry):
                 continue
-            for in_map, beside in STATED.items():
-                own = (*node.place, in_map, symbol)
-                if symbol in node.at(in_map):
-                    text = f"{dotted(entry.place)} states it as well: leave this one out"
-                    faults.append(Fault(own, text))
-                elif beside in entry:
-                    stated[in_map][symbol] = entry.content[beside]
-                    places[own] = (*entry.place, beside)
+            _move(node, symbol, entry, stated, places, faults)
             std, value = entry.at("std_error"), entry.at("value")
             if key == FREE:
                 values[symbol] = {k: v for k, v in entry.content.items() if k != "source"}
                 continue
             values[symbol] = value.value
             faults += percentage_faults(std, value)
-            if std.text and re.search(PERCENT, std.text) and value.number is not None:
-                stated[STD_ERRORS][symbol] = spread_of(std.text, value.number)
+            if std.text is not None:
+                stated[STD_ERRORS][symbol] = _in_unit(std.text, value.number)
         if values:
             section[key] = values
     return {**section, **{key: own for key, own in stated.items() if own}}
+
+
+def _in_unit(std: str, value: float | None) -> float | str:
+    percentage = value is not None and re.search(PERCENT, std)
+    return spread_of(std, value) if percentage and value is not None else std
+
+
+def _move(
+    node: ContentNode,
+    symbol: str,
+    entry: ContentNode,
+    stated: dict[str, Content],
+    places: dict[Place, Place],
+    faults: list[Fault],
+) -> None:
+    """Move what stands beside a value of a section to the section's own, by name."""
+    for in_map, beside in STATED.items():
+        own = (*node.place, in_map, symbol)
+        if symbol in node.at(in_map):
+            text = f"{dotted(entry.place)} states it as well: leave this one out"
+            faults.append(Fault(own, text))
+        elif beside in entry:
+            stated[in_map][symbol] = entry.content[beside]
+            places[own] = (*entry.place, beside)
 
 
 def _with(content: Any, place: Place, value: Any) -> Any:

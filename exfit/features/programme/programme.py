@@ -307,9 +307,7 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
             yield top.at(key).fault("not allowed with tests: each of them has its own")
     tests = top.at(TESTS).entries
     yield from name_faults(tests)
-    for _, free in (entry for test in tests for entry in test.at("free").sections):
-        if "source" in free:
-            yield free.at("source").fault("not allowed here: the test finds the value")
+    yield from _source_faults(tests)
     bumps = [test for test in tests if test.content.get("kind", BUMP) == BUMP]
     if bumps and all(test.at("use").text == "validate" for test in bumps):
         yield bumps[0].at("use").fault("no bump test is fitted: nothing to validate")
@@ -329,6 +327,12 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
             placed = inner.in_file(fault)
             if placed is not None:
                 yield placed
+
+
+def _source_faults(tests: list[ContentNode]) -> Iterator[Fault]:
+    for _, free in (entry for test in tests for entry in test.at("free").sections):
+        if "source" in free:
+            yield free.at("source").fault("not allowed here: the test finds the value")
 
 
 def _machine_faults(top: ContentNode) -> Iterator[Fault]:
