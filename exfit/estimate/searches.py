@@ -108,6 +108,7 @@ def shorten(
 WORST_CONDITION = 1e8  # beyond it a full Gauss-Newton step is a guess
 LEAST_REACH = 0.3
 LENGTH_PROVED = 0.25  # gain ratio from which the model was right about the length
+FAST, SLOW = 0.02, 0.95  # of the length of the full step before: between, extrapolation pays
 
 
 class FullStep(NamedTuple):
@@ -131,33 +132,67 @@ class FullStep(NamedTuple):
         return Move(None, 1.0, rejections + 1, stop=Stop.FULL_STEP), once
 
 
+def extrapolated(before: DampedStep, linear: LinearModel, reach: float) -> DampedStep | None:
+    """Return the step to where full steps that shrink slowly would end, within reach.
+
+    Source: Walker & Ni 2011, Anderson acceleration for fixed-point iterations, with one step
+    ``before``, in the norm of the linear model.
+    """
+    full, (x, unit) = linear.full, (linear.point.x, linear.box.unit)
+    if not FAST**2 * before.promise < full.promise < SLOW**2 * before.promise:
+        return None
+    step, change = full.target - x, full.target - x - (before.target - before.origin)
+    seen = linear.singular[:, None] * linear.directions * linear.scale
+    along, across = seen @ step, seen @ change
+    share = float(across @ along) / float(across @ across)
+    target = full.target - share * (x - before.origin + change)
+    slope = float(linear.gradient @ (target - x))
+    near = np.max(abs(target - x) / unit) <= reach and slope < 0.0
+    inside = np.array_equal(target, linear.box.inside(target))
+    return DampedStep(x, target, slope, full.promise) if near and inside else None
+
+
 class LineSearch(NamedTuple):
     """Damped Gauss-Newton: a step, shortened until Armijo's rule holds.
 
     Capped, the step is the best of the linear model that moves no variable farther than the reach
     (in units of each variable, a trust region), which grows after good steps. It keeps the badly
     determined directions at bay: without it one such direction makes the whole step so long that
-    lambda must be tiny for all. Not capped it is the full Gauss-Newton step: with ``to_half`` as
-    its cut that is the damped Gauss-Newton method of Kelley 1999, section 2.3.
+    lambda must be tiny for all. Where full steps shrink slowly, because residuals are far from
+    zero, each as a share of the one ``before``, it tries where they would end. Not capped it is the
+    full Gauss-Newton step: with ``to_half`` as its cut that is the damped Gauss-Newton method of
+    Kelley 1999, section 2.3.
     """
 
     capped: bool = True
     cut: Cut = to_parabola
     armijo: float = ARMIJO
     reach: float = 1.0
+    before: DampedStep | None = None
     phase: str = "dgn"
 
     def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Try lambda = 1, then less."""
         step = solve(linear, reach=self.reach) if self.capped else linear.full
         reach = self.reach if self.capped else inf
+        end = self.before and extrapolated(self.before, linear, reach)
+        if end:
+            trial = yield from problem.evaluate(end.target)
+            decrease = linear.point.cost - trial.cost
+            if decrease >= max(end.promise, -self.armijo * end.slope):
+                quality = gain_ratio(decrease, end.promise)
+                return Move(trial, 1.0, 0, quality), self._replace(before=linear.full)
         move = yield from shorten(problem, linear, step, reach, armijo=self.armijo, cut=self.cut)
+        if end:
+            move = move._replace(inner=move.inner + 1)
         if move.point is None:
             return move, self
         farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))
         useful = move.damping == 1.0 and move.quality > LENGTH_PROVED
         least = self.reach if useful else LEAST_REACH
-        return move, self._replace(reach=max(least, 2.0 * farthest))
+        whole = self.capped and move.damping == 1.0 and not (move.capped or end)
+        before = linear.full if whole else None
+        return move, self._replace(reach=max(least, 2.0 * farthest), before=before)
 
 
 BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge

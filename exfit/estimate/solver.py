@@ -320,12 +320,20 @@ def alone(search: Callable[[Searches], Search]) -> Strategy:
 
 
 def lm_then_dgn(run: SearchRun, start: LinearModel) -> Steps[Outcome]:
-    """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
+    """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on.
+
+    Where both stalled at one point it would stall there again.
+    """
     lm, dgn = run.searches.lm, run.searches.dgn
-    outcome = yield from relay(run, start, lm.handing_over(), dgn)
-    if outcome.stop is not Stop.STALLED:
-        return outcome
-    return (yield from run.descend(lm, outcome.linear))
+    first = yield from run.descend(lm.handing_over(), start)
+    if first.converged or first.stop is Stop.JACOBIAN:
+        return first
+    second = yield from run.descend(dgn, first.linear)
+    costs = first.linear.point.cost, second.linear.point.cost
+    stuck = first.stop is Stop.STALLED and costs[0] - costs[1] <= CREEP * costs[0]
+    if second.stop is not Stop.STALLED or stuck:
+        return second
+    return (yield from run.descend(lm, second.linear))
 
 
 def robust(run: SearchRun, start: LinearModel) -> Steps[Outcome]:

@@ -31,6 +31,7 @@ NEAR = 1e-3  # of the cost: what the next leg gains in an iteration or two
 NEAR_STEP = 1e-6  # units
 MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
 TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
+LAST_STEP = 1e-8  # units: no error of a parameter is as small
 SWITCHED = {"R": "resistance", "X": "reactance"}  # a share of a switching is none
 
 
@@ -84,6 +85,7 @@ def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> D
         method=DEFAULT_STRATEGY,
         max_iterations=MOST_ITERATIONS,
         ftol=TO_DISTINGUISH,
+        xtol=LAST_STEP,
         x_scale=problem.residuals.units,
     )
 
