@@ -108,6 +108,7 @@ def shorten(
 WORST_CONDITION = 1e8  # beyond it a full Gauss-Newton step is a guess
 LEAST_REACH = 0.3
 LENGTH_PROVED = 0.25  # gain ratio from which the model was right about the length
+TOO_SHORT = 1.2  # gain ratio of a full step from which the next one is a fifth of it or more
 FAST, SLOW = 0.02, 0.95  # of the length of the full step before: between, extrapolation pays
 
 
@@ -181,7 +182,8 @@ class LineSearch(NamedTuple):
             decrease = linear.point.cost - trial.cost
             if decrease >= max(end.promise, -self.armijo * end.slope):
                 quality = gain_ratio(decrease, end.promise)
-                return Move(trial, 1.0, 0, quality), self._replace(before=linear.full)
+                before = linear.full if quality > TOO_SHORT else None
+                return Move(trial, 1.0, 0, quality), self._replace(before=before)
         move = yield from shorten(problem, linear, step, reach, armijo=self.armijo, cut=self.cut)
         if end:
             move = move._replace(inner=move.inner + 1)
@@ -191,7 +193,7 @@ class LineSearch(NamedTuple):
         useful = move.damping == 1.0 and move.quality > LENGTH_PROVED
         least = self.reach if useful else LEAST_REACH
         whole = self.capped and move.damping == 1.0 and not (move.capped or end)
-        before = linear.full if whole else None
+        before = linear.full if whole and move.quality > TOO_SHORT else None
         return move, self._replace(reach=max(least, 2.0 * farthest), before=before)
 
 

@@ -305,6 +305,19 @@ def test_coarse_residuals_do_not_burn_the_iterations(method):
     assert found.nit < 30
 
 
+def test_full_steps_that_shrink_slowly_are_extrapolated():
+    """Each is 0.6 of the one before, so that 36 of them would shrink to 1e-8."""
+    found = least_squares(
+        lambda x: np.array([x[0], 1.0 - 0.3 * x[0] ** 2]),
+        [0.5],
+        lambda x: np.array([[1.0], [-0.6 * x[0]]]),
+        method="dgn",
+    )
+    assert found.success
+    assert abs(found.x[0]) < 1e-7
+    assert found.nit < 12
+
+
 def phases(found):
     """The phases of a run, each as often as it was entered."""
     names = [line.phase for line in found.history[1:]]
