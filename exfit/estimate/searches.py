@@ -181,20 +181,21 @@ class LineSearch(NamedTuple):
             trial = yield from problem.evaluate(end.target)
             decrease = linear.point.cost - trial.cost
             if decrease >= max(end.promise, -self.armijo * end.slope):
-                quality = gain_ratio(decrease, end.promise)
-                before = linear.full if quality > TOO_SHORT else None
-                return Move(trial, 1.0, 0, quality), self._replace(before=before)
+                move = Move(trial, 1.0, 0, gain_ratio(decrease, end.promise))
+                return move, self._replace(before=self._base(linear, move))
         move = yield from shorten(problem, linear, step, reach, armijo=self.armijo, cut=self.cut)
-        if end:
-            move = move._replace(inner=move.inner + 1)
         if move.point is None:
             return move, self
         farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))
         useful = move.damping == 1.0 and move.quality > LENGTH_PROVED
         least = self.reach if useful else LEAST_REACH
-        whole = self.capped and move.damping == 1.0 and not (move.capped or end)
-        before = linear.full if whole and move.quality > TOO_SHORT else None
+        before = None if end else self._base(linear, move)
         return move, self._replace(reach=max(least, 2.0 * farthest), before=before)
+
+    def _base(self, linear: LinearModel, move: Move) -> DampedStep | None:
+        """Return the full step if it was taken and fell short: the next one may go on from it."""
+        whole = self.capped and move.damping == 1.0 and not move.capped
+        return linear.full if whole and move.quality > TOO_SHORT else None
 
 
 BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge
