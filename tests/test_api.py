@@ -28,6 +28,7 @@ NOISE = 1e-4  # pu
 TRUE_K = 200.0
 SEXS = {
     "model": "SEXS",
+    "given": "exact",
     "plant": {"type": "open-circuit", "machine": "GENROU"},
     "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.02}]},
     "parameters": {"free": {"K": {"start": 100.0, "min": 10.0, "max": 1000.0}}},

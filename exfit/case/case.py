@@ -30,6 +30,7 @@ from exfit.case.schema import (
     Stabiliser,
     Value,
 )
+from exfit.case.schema.values import GivenAs
 from exfit.case.ties import Ties
 from exfit.errors import CaseError
 from exfit.models.sheet import Parameter
@@ -79,6 +80,7 @@ class Case:
     record: RecordFile | None
     records: tuple[Recording, ...]
     parameters: Parameters
+    given: GivenAs
     estimate: Estimate
     simulation: SimulationSection
     validations: tuple[Recording, ...]
@@ -347,10 +349,10 @@ class Case:
         return sources
 
     def std_errors(self) -> dict[str, float]:
-        """Return the standard errors of given values that are not exact, as the system names them.
+        """Return the standard errors that the case gives of its values, as the system names them.
 
         What is free or follows others has none, nor what was given in place of a value of the case
-        without an error of its own.
+        without an error of its own. `given_errors.given_std_errors` has those of other values, too.
         """
         return {name: std for name, std in self._stated_errors().items() if std > 0.0}
 

@@ -25,10 +25,11 @@ from exfit.cli.options import (
 from exfit.cli.streams import output_is_lost
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.runs.runner import AS_CASES_SAY, FitSettings
-from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
+from exfit.util.vocabulary import EXPLAINED, GIVEN_AS, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.case.schema.values import GivenAs
     from exfit.output.events import Events
     from exfit.output.figure_files import FigureFiles
     from exfit.output.live import SeriesProgress
@@ -52,6 +53,12 @@ SERIES = "fits"  # the folder of a series by default
     type=click.Choice([*SEARCHES]),
     help=f"Search, instead of that of the case. {SEARCHES_EXPLAINED}.",
 )
+@click.option(
+    "--given",
+    type=click.Choice(GIVEN_AS),
+    help="How given values count, instead of as the case says: uncertain, each with its standard "
+    "error; or exact.",
+)
 @set_option
 @parameters_option
 @click.option(
@@ -66,6 +73,7 @@ def fit(
     cases: tuple[Path, ...],
     strategies: tuple[str, ...],
     search: str | None,
+    given: "GivenAs | None",
     changes: tuple[str, ...],
     parameters: Path | None,
     watch: bool,
@@ -102,7 +110,7 @@ def fit(
     """
     from exfit.output import run_folder
 
-    given = Given(parameters, changes)
+    beside = Given(parameters, changes, given)
     several = len(cases) > 1 or len(strategies) > 1
     if verbose and (several or not output.shown):
         raise click.UsageError("--verbose is for one fit, without --quiet or --json.")
@@ -111,14 +119,14 @@ def fit(
     if watch and not output.shown:
         raise click.UsageError("--watch cannot be combined with --quiet or --json.")
     if several:
-        fit_several(cases, given, strategies, search, output)
+        fit_several(cases, beside, strategies, search, output)
         return
     (case,), settings = cases, FitSettings(next(iter(strategies), None), search)
     if watch:
         folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
-        fit_again_and_again(case, given, folder, settings, output, verbose)
+        fit_again_and_again(case, beside, folder, settings, output, verbose)
         return
-    result, _ = fit_case(given.load(case), output, settings, verbose)
+    result, _ = fit_case(beside.load(case), output, settings, verbose)
     if not result.holds:
         raise SystemExit(NOT_CONVERGED)
 

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,6 +18,7 @@ from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.case.schema.values import GivenAs
     from exfit.output.blocks import Block
     from exfit.output.events import Events
     from exfit.output.figure_files import FigureFiles
@@ -275,10 +277,14 @@ def refuse_own_files(
 
 
 class Given(NamedTuple):
-    """Values given beside a case: a file of parameters, and those of --set over it."""
+    """Values given beside a case: a file of parameters, and those of --set over it.
+
+    ``counting`` says how given values count, None: as the case says.
+    """
 
     parameters: Path | None
     changes: tuple[str, ...]
+    counting: "GivenAs | None" = None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -290,6 +296,10 @@ class Given(NamedTuple):
 
         Raises CaseError with all faults of the case, or for values that it cannot start from.
         """
+        own = self._own(case)
+        return own if self.counting is None else replace(own, given=self.counting)
+
+    def _own(self, case: Path) -> "Case":
         path = self.parameters
         if path is None and not self.changes:
             return load(case)

@@ -182,6 +182,36 @@ def continued(
     return found._replace(best=last, history=path, minima=minima, place=0)
 
 
+def extended(
+    searches: "CaseSearches", found: SearchResult, more: Array, announce: Announce, phase: str
+) -> SearchResult:
+    """Return a search among more parameters, from the ends of one that held them at ``more`` (K,).
+
+    Each minimum is descended from anew.
+    """
+
+    def wider(end: Result) -> Result:
+        return end._replace(x=np.append(end.x, more))
+
+    history = [line._replace(x=np.append(line.x, more)) for line in found.history]
+    path, last = _refined(searches, history, wider(found.best), announce, phase)
+    if found.minima is None:
+        return found._replace(best=last, own=last, history=path)
+    minima = [
+        local._replace(x=end.x, cost=end.cost, result=end)
+        for k, local in enumerate(found.minima.minima)
+        for end in [last if k == found.place else searches.refined(wider(local.result), _unseen)]
+    ]
+    minima.sort(key=lambda local: local.cost)
+    place = next((k for k, local in enumerate(minima) if local.result is last), None)
+    whole = found.minima._replace(minima=tuple(minima), best=last)
+    return found._replace(best=last, own=last, history=path, minima=whole, place=place)
+
+
+def _unseen(_: SolverIteration) -> None:
+    """Ignore a line of a path that leads elsewhere."""
+
+
 def judged_again(
     searches: "CaseSearches", found: SearchResult, judge: Judge, announce: Announce
 ) -> SearchResult:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
+from math import sqrt
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from exfit.dsp.rounding import is_coarse, noise_before_rounding, rounding_waves
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel
+from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals
 from exfit.inference.confidence import (
@@ -31,6 +33,7 @@ from exfit.inference.identifiability import (
     identifiability,
 )
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
+from exfit.inference.noise import Noise, effective_samples
 from exfit.util.arrays import Array
 from exfit.util.text import listed
 from exfit.util.typed import IN_FILE, KEY
@@ -54,7 +57,7 @@ class Sensitivity(NamedTuple):
 class GivenError(NamedTuple):
     """The standard error of a value that was given, and by how much it moves each parameter.
 
-    To first order, in the unit of the parameter.
+    To first order, in the unit of the parameter, by what the records leave of that error.
     """
 
     std_error: float
@@ -277,6 +280,26 @@ def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None
     waves = rounding_waves(levels, step, noise)
     variance = (noise**2 + step**2 / 12.0) * channel.weight**2
     return Rounding(step * channel.weight, waves * channel.weight, variance)
+
+
+def spread_of(residuals: Residuals, noises: Sequence[Noise]) -> Array:
+    """Standard deviation (M,) of the weighted errors, widened where they are not white."""
+    spreads = [
+        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
+        for noise, channel in zip(noises, residuals.channels, strict=True)
+    ]
+    return np.repeat(spreads, residuals.sizes)
+
+
+def spread_of_errors(residuals: Residuals, errors: Array, white: bool = False) -> Array:
+    """Standard deviation (M,) of weighted errors (M,), widened unless they count as white."""
+    spread = np.empty(len(errors))
+    for place, channel in zip(slices(residuals.sizes), residuals.channels, strict=True):
+        own = errors[place]
+        inflation = 1.0 if white else len(own) / effective_samples(own)
+        rms = float(np.sqrt(np.mean(own**2)))
+        spread[place] = max(rms, LEAST_NOISE * channel.weight) * sqrt(inflation)
+    return spread
 
 
 def slices(sizes: Sequence[int]) -> list[slice]:

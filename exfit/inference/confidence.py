@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import exp, inf, isfinite
+from math import exp, inf, isfinite, sqrt
 from statistics import NormalDist
 from typing import Annotated, Literal, NamedTuple, TypeGuard
 
@@ -17,6 +17,7 @@ from exfit.util.typed import IN_FILE
 
 LEVEL = 0.95
 UNDETERMINED = 0.3  # relative standard error: the response is no longer linear over the interval
+KNOWN = 0.2  # of a value: a parameter with a wider interval is not known as a setting is
 CORRELATED = 0.2  # with another parameter: left free it would widen the interval by 2 %
 TIED = (
     0.99  # correlation with a parameter on a bound: what is known of one is the bound of the other
@@ -25,7 +26,7 @@ TIED = (
 NORMAL = NormalDist().inv_cdf(0.5 * (1.0 + LEVEL))
 
 Interval = tuple[float | None, float | None]  # None: the record sets no limit on that side
-IntervalMethod = Literal["linear", "profile", "hull", "windows", "averages"]
+IntervalMethod = Literal["linear", "profile", "hull", "windows", "averages", "causes"]
 
 
 class Uncertainty(NamedTuple):
@@ -38,7 +39,9 @@ class Uncertainty(NamedTuple):
     method          how the interval, or that there is none, was found: by linear theory, from the
                     profile likelihood, as the hull of the profiles about several minima, of fits
                     to windows of the records, or so that it also holds what averages of the
-                    recorder would change; None where linear theory gives none
+                    recorder, or other causes of residuals that are no noise, would change; None
+                    where linear theory gives none
+    by_noise        the interval from the noise alone, where errors of what the case gives widen it
     """
 
     std_error: float | None
@@ -46,11 +49,25 @@ class Uncertainty(NamedTuple):
     interval: Interval | None
     why: str | None
     method: IntervalMethod | None = None
+    by_noise: Interval | None = None
 
     @property
     def determined(self) -> bool:
         """Flag of a parameter that the record limits on both sides."""
         return closed(self.interval)
+
+
+def vagueness(value: float, interval: Interval | None) -> str:
+    """Word a closed interval that is wider than +-20 % of the value; "" of any other."""
+    if not closed(interval):
+        return ""
+    low, high = interval
+    if high - low <= 2.0 * KNOWN * abs(value):
+        return ""
+    if low * high > 0.0:
+        ratio = sqrt(max(abs(low), abs(high)) / min(abs(low), abs(high)))
+        return f"to a factor of {digits(ratio)}"
+    return f"to +-{digits(0.5 * (high - low))}"
 
 
 def closed(interval: Interval | None) -> TypeGuard[tuple[float, float]]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
+from exfit.inference.confidence import closed
 from exfit.inference.identifiability import ParameterEffect
 from exfit.output.blocks import (
     NO_BREAK,
@@ -20,6 +21,7 @@ from exfit.output.blocks import (
     notes,
     number,
     paragraph,
+    percent,
     remarks,
     row,
     unresolved,
@@ -172,13 +174,16 @@ def fitted_table(
     shown = {name: p for name, p in result.parameters.items() if of_records or not p.of_record}
     marks = {name: ", ".join(remarks_on(parameter)) for name, parameter in shown.items()}
     linear = any(parameter.linear_error is not None for parameter in shown.values())
+    by_noise = any(parameter.noise_interval is not None for parameter in shown.values())
     heads = (
         TableColumn("parameter"),
         TableColumn("start", number=True, expendable=1 if linear else 2),
         *([] if before is None else [TableColumn("before", number=True)]),
         TableColumn("fitted", number=True),
         TableColumn("95 % interval", number=True),
-        TableColumn("error", number=True, expendable=2 if linear else 1),
+        TableColumn(
+            "by noise" if by_noise else "error", number=True, expendable=2 if linear else 1
+        ),
         TableColumn("unit"),
         *([TableColumn("")] if any(marks.values()) else []),
     )
@@ -199,11 +204,24 @@ def _mark(result: FitResult, parameter: FittedParameter) -> Mark:
 def _found(result: FitResult, name: str) -> tuple[str, str, str, str]:
     """Write a fitted value, its interval, its error where linear theory serves, and its unit."""
     parameter, error = result.parameters[name], "-"
-    if result.knowledge is not None and parameter.linear_error is not None:
+    if parameter.noise_interval is not None:
+        error = half_width(parameter)
+    elif result.knowledge is not None and parameter.linear_error is not None:
         confidence = result.knowledge.confidence.parameters[name]
         error = error_of(confidence, parameter.of_record)
     limits = result.verdict.in_place_of_interval or interval(parameter.interval, parameter.rounded)
     return parameter.rounded(parameter.value), limits, error, parameter.unit
+
+
+def half_width(parameter: FittedParameter) -> str:
+    """Write half of the interval from the noise alone: in percent, but of a record in its unit."""
+    if not closed(parameter.noise_interval):
+        return "-"
+    low, high = parameter.noise_interval
+    half = 0.5 * (high - low)
+    if parameter.of_record or not parameter.value:
+        return f"±{half:.1e}"
+    return f"±{percent(half / abs(parameter.value))}"
 
 
 def remarks_on(parameter: FittedParameter) -> Iterator[str]:
@@ -212,6 +230,8 @@ def remarks_on(parameter: FittedParameter) -> Iterator[str]:
         yield f"on its {parameter.at_bound}"
     if not parameter.physical:
         yield "not physical"
+    if parameter.moved is not None:
+        yield f"given, {parameter.moved:+.1f} errors"
     if parameter.interval_note:
         yield parameter.interval_note
 

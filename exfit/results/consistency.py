@@ -25,11 +25,9 @@ def contradictions(result: FitResult) -> Iterator[str]:
         points += [minimum.values for minimum in result.minima.minima]
     if any(values.keys() != result.parameters.keys() for values in points):
         yield "history: its parameters are not those of the fit"
-    if any(
-        not {*typical.matters_to} <= typical.shifts.keys() <= result.parameters.keys()
-        for typical in result.typical_values.values()
-    ):
-        yield "typical_values: what they move are not the parameters of the fit"
+    given = {} if result.knowledge is None else result.knowledge.given_errors
+    if any(not error.shifts.keys() <= result.parameters.keys() for error in given.values()):
+        yield "knowledge: given_errors: what they move are not the parameters of the fit"
     if result.knowledge is not None:
         yield from (f"knowledge: {text}" for text in _of_knowledge(result.knowledge))
 

@@ -1,51 +1,49 @@
-"""What would move what a fit found: typical values, windows of a record, averages of a recorder."""
+"""What would move what a fit found: given values, windows of a record, averages of a recorder."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
-from exfit.results.verdict import REJECTED, Cause
+from exfit.inference.confidence import closed
+from exfit.results.cause import Cause
+from exfit.results.verdict import REJECTED
 from exfit.util.text import digits, listed, rounded_value
+from exfit.util.vocabulary import NOT_STATED, UNSTATED
+
+if TYPE_CHECKING:
+    from exfit.fitting.uncertainty import GivenError
+    from exfit.results.model import FittedParameter
 
 WindowKind = Literal["step", "first half", "second half"]
 
-DEVIATION = 0.2  # of a typical value: as far as units of one kind lie apart
+WIDENED = 1.4  # times: most of the variance is that of given values
+WEIGHTY = 0.1  # of the variance by given values
 MOST_NAMED = 3  # parameters, and values, of a sentence
 STRONG = 10.0  # of chi-square: two hypotheses that differ by more are told apart
 
 
-class TypicalValue(NamedTuple):
-    """A typical value that the responses depend on, and what it moves.
+def resting_on(
+    parameters: "Mapping[str, FittedParameter]",
+    given: "Mapping[str, GivenError]",
+    sources: Mapping[str, str],
+) -> dict[str, tuple[str, ...]]:
+    """Name the given values without a source in this unit that intervals rest on.
 
-    ``shifts`` is by how much each fitted parameter would move, in its own unit, if the value were
-    larger by DEVIATION: to first order. ``matters_to`` names those of the unit that would move by
-    more than half the width of their interval (twice the standard error, where there is none),
-    with that shift in shares of the half width, the largest first.
+    For each parameter whose interval they widen most of all, those that do so most first.
     """
-
-    value: float
-    shifts: Mapping[str, float]
-    matters_to: Mapping[str, float]
-
-
-def moved_parameters(typical: TypicalValue, fitted: Mapping[str, float]) -> str:
-    """Word the shifts that a typical value would cause where they matter, in percent if not of 0.
-
-    A shift of the first order that exceeds the value itself says no more than that it is large.
-    """
-    moves = []
-    for name in typical.matters_to:
-        shift, value = abs(typical.shifts[name]), abs(fitted[name])
-        share = f"{digits(100.0 * shift / value)} %" if 0.0 < value >= shift else "more than 100 %"
-        moves.append(f"{name} by {share if value else digits(shift)}")
-    return first_of(moves)
-
-
-def by_weight(values: Mapping[str, TypicalValue]) -> dict[str, TypicalValue]:
-    """Return the typical values that matter, the one that exceeds an interval the most first."""
-    mattering = {name: value for name, value in values.items() if value.matters_to}
-    order = sorted(mattering, key=lambda name: -max(mattering[name].matters_to.values()))
-    return {name: mattering[name] for name in order}
+    resting = {}
+    for name, parameter in parameters.items():
+        shares = {value: error.shifts.get(name, 0.0) ** 2 for value, error in given.items()}
+        if not (closed(parameter.interval) and closed(parameter.noise_interval)):
+            continue
+        (low, high), (inner, outer) = parameter.interval, parameter.noise_interval
+        if high - low < WIDENED * (outer - inner):
+            continue
+        weighty = [n for n in shares if shares[n] > WEIGHTY * sum(shares.values())]
+        unstated = [n for n in weighty if sources.get(n, NOT_STATED) in UNSTATED]
+        if unstated:
+            resting[name] = tuple(sorted(unstated, key=lambda value: -shares[value]))
+    return resting
 
 
 def first_of(names: Sequence[str]) -> str:

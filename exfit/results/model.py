@@ -23,7 +23,7 @@ from exfit.results.description import (
     source_in_words,
     values_of_part,
 )
-from exfit.results.influences import TypicalValue, WindowSpread
+from exfit.results.influences import WindowSpread, resting_on
 from exfit.results.verdict import NO_MATCH, Verdict
 from exfit.util.arrays import Array
 from exfit.util.text import error_of_interval, rounded_value
@@ -78,7 +78,9 @@ class FittedParameter:
     ``interval`` holds the true value with 95 % confidence; a side without a limit is None, and
     ``why`` is the reason for that, or for no interval at all. ``interval_method`` says how it was
     found: by linear theory, from the profile likelihood, as the hull over several minima, or over
-    windows of the records.
+    windows of the records. ``noise_interval`` is that from the noise alone, where the errors of
+    what the case gives widen it. ``given_error`` is the standard error of a given value, ``start``,
+    that the records refine.
     ``min`` and ``max`` are infinite where there is no bound; ``physical`` says whether the value
     lies in the range of its data sheet.
     """
@@ -96,6 +98,13 @@ class FittedParameter:
     unit: str = ""
     meaning: str = ""
     physical: bool = True
+    noise_interval: Interval | None = None
+    given_error: float | None = None
+
+    @property
+    def moved(self) -> float | None:
+        """By how many of its standard errors a given value has moved; None of any other."""
+        return None if self.given_error is None else (self.value - self.start) / self.given_error
 
     @property
     def stderr(self) -> float | None:
@@ -237,7 +246,6 @@ class FitResult:
     those of the parts of further units by their prefix (unit2, unit2.machine). Values that follow
     others by ``ties`` are among these.
     ``sources`` says where every value comes from: typical, nameplate ..., not stated;
-    ``typical_values`` the effect of each typical value that is not 0, if it were 20 % off.
 
     ``cost`` is the minimised sum, ``comparisons`` are with each record, ``knowledge`` are errors
     and intervals of the parameters, None where these are not known; ``about`` identifies unit
@@ -297,7 +305,6 @@ class FitResult:
     unit_models: Mapping[str, str] = field(default_factory=dict)
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
-    typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
     phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
     strategy_given: bool = field(default=True, metadata=IN_FILE)
@@ -315,6 +322,12 @@ class FitResult:
     def name(self) -> str:
         """The name of the case."""
         return self.case.stem
+
+    @property
+    def resting_on(self) -> dict[str, tuple[str, ...]]:
+        """The given values without data of this unit that widen the interval of each parameter."""
+        given = {} if self.knowledge is None else self.knowledge.given_errors
+        return resting_on(self.parameters, given, self.sources)
 
     @property
     def comparison(self) -> Comparison:

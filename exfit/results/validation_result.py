@@ -15,7 +15,6 @@ from exfit.results.description import (
     source_in_words,
     values_of_part,
 )
-from exfit.results.influences import TypicalValue
 from exfit.results.model import FitResult, FittedParameter
 from exfit.util.typed import IN_FILE, KEY
 from exfit.util.vocabulary import Criteria
@@ -33,7 +32,6 @@ class ValidationResult:
 
     # nothing is fitted; ``origin`` and ``options`` say whose values these are
     parameters: ClassVar[Mapping[str, FittedParameter]] = {}
-    typical_values: ClassVar[Mapping[str, TypicalValue]] = {}
     given_values: ClassVar[Mapping[str, GivenInPlace]] = {}
 
     case: Path

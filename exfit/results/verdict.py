@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import nan
 from typing import Annotated, ClassVar, Final, Literal, NamedTuple
 
+from exfit.results.cause import Cause
+
 VerdictWords = Literal[
     "good", "matches, not all determined", "misses the record", "no match", "not converged"
 ]
@@ -22,18 +24,6 @@ WITHOUT_INTERVALS: Mapping[str, tuple[str, str]] = {
 REJECTED = 0.01  # a probability below it
 NEGLIGIBLE = 1e-3  # of the variance of the scatter: what inputs carry is not tested for
 VISIBLE = 0.005  # of the range of a signal: the width of a line in its figure
-
-
-class Cause(NamedTuple):
-    """Why a fit may be as it is, and what to do about it."""
-
-    cause: str
-    remedy: str
-
-    @property
-    def sentence(self) -> str:
-        """The cause and its remedy in one sentence."""
-        return f"{self.cause}: {self.remedy}"
 
 
 @dataclass(frozen=True)
@@ -101,6 +91,11 @@ class Verdict(NamedTuple):
     def matches(self) -> bool:
         """Whether the response matches the records as far as their noise lets a reader see."""
         return self.verdict in (GOOD, MATCHES)
+
+    @property
+    def explained(self) -> bool:
+        """Whether nothing but noise is left of the residuals."""
+        return all(test.are_noise for test in self.residuals)
 
     @property
     def misfit(self) -> str:

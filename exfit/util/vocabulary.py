@@ -14,6 +14,10 @@ LEAST_CERTAIN_FIRST = (
 )
 # that a case may give
 SOURCES = tuple(word for word in reversed(LEAST_CERTAIN_FIRST) if word != NOT_STATED)
+# exact but for a standard error of the case
+EXACT_SOURCES = ("measured", "test report", "certificate", "nameplate")
+UNSTATED = (TYPICAL, NOT_STATED, PLANNER)  # no data of this unit are behind them
+GIVEN_AS = ("uncertain", "exact")  # how given values count
 
 # the functions of the strategies stand in `exfit.estimate.solver`
 PHASES: Mapping[str, str] = {
@@ -24,12 +28,14 @@ PHASES: Mapping[str, str] = {
 FROM_FURTHER_STARTS = "search"  # in the history: the point that the search from them found
 WEIGHTED_BY_NOISE = "noise"  # in the history: the point where errors are weighted by its covariance
 COMPRESSED_ANEW = "samples"  # in the history: the point at which long records are compressed anew
+REFINING_VALUES = "given"  # in the history: given values are fitted that the records refine
 ON_FINER_GRID = "step"  # in the history: the point from which on the simulation takes shorter steps
 HISTORY_PHASES: Mapping[str, str] = {
     **PHASES,
     FROM_FURTHER_STARTS: "found from further starts",
     WEIGHTED_BY_NOISE: "weighted by the noise of the driving signals",
     COMPRESSED_ANEW: "long records compressed anew at the end of the search",
+    REFINING_VALUES: "with given values that the records refine, which are fitted",
     ON_FINER_GRID: "simulated with shorter steps, which the response found needs",
 }
 STRATEGIES: Mapping[str, str] = {

@@ -22,9 +22,9 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines.machine import unusual_reactances
 from exfit.plants import MACHINE, REFERENCES
 from exfit.registry import parts
+from exfit.results.cause import Cause
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, Overlay
-from exfit.results.verdict import Cause
 from exfit.signals import POSITIVE_AT_REST
 from exfit.util.arrays import Array, Mask
 from exfit.util.text import listed, show

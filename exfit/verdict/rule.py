@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from math import erfc, sqrt
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from exfit.estimate import Stop
+from exfit.inference.confidence import closed
+from exfit.results.cause import Cause
 from exfit.results.comparisons import Overlay
-from exfit.results.influences import RecorderAverages, first_of
+from exfit.results.influences import RecorderAverages
 from exfit.results.verdict import (
     GOOD,
     MATCHES,
@@ -16,7 +19,7 @@ from exfit.results.verdict import (
     NEGLIGIBLE,
     NO_MATCH,
     NOT_CONVERGED,
-    Cause,
+    REJECTED,
     ResidualTests,
     Verdict,
     VerdictWords,
@@ -50,7 +53,7 @@ def verdict_of(evidence: Evidence) -> Verdict:
     averages = evidence.averages
     good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
     noise_is_carried = any(test.carried > NEGLIGIBLE for test in tests)
-    contradicted: list[Contradiction | RecorderAverages] = []
+    contradicted: list[Contradiction | RecorderAverages | Refuted] = [*_refuted(evidence)]
     try:
         if good_but_for_averages and not noise_is_carried:
             from exfit.verdict.score_tests import contradictions
@@ -147,16 +150,70 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
         yield f"{len(undetermined)} of {len(evidence.own)} parameters {verb} not determined"
     elif evidence.without_profile:
         yield "intervals are missing where linear theory does not apply"
+    yield from _vague(evidence)
     for match in evidence.validation:
         if not match.accepted:
             yield f"{match.name} is not accepted"
-    if evidence.typical_values:
-        yield f"typical values matter: {first_of([*evidence.typical_values])}"
     if evidence.averages is not None and evidence.averages.matters:
         yield evidence.averages.reason
     yield from _not_noise(tests, evidence)
     if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
         yield "the search ended before a minimum"
+
+
+class Refuted(NamedTuple):
+    """A given value that the record contradicts: it lies ``moved`` of its standard errors off."""
+
+    name: str
+    given: float
+    found: str
+    moved: float
+
+    @property
+    def reason(self) -> str:
+        """The value that the record contradicts."""
+        return f"the record contradicts {self.name} = {self.given:g}"
+
+    @property
+    def cause(self) -> Cause:
+        """The value that the record gives, with a remedy."""
+        words = f"{self.name} is {self.found}, not {self.given:g} ({self.moved:+.1f} of its errors)"
+        return Cause(words, "check where it comes from; the fit used the value of the record")
+
+    @property
+    def likelihood(self) -> float:
+        """Log-likelihood that this value is wrong."""
+        return 0.5 * self.moved**2
+
+
+def _refuted(evidence: Evidence) -> Iterator[Refuted]:
+    """Yield the given values that the fit moved by more than their errors allow."""
+    asked = evidence.case.free()
+    for free in evidence.residuals.free:
+        if free.prior is None or free.name in asked:
+            continue
+        value = evidence.values[free.name]
+        moved = (value - free.prior.mean) / free.prior.std
+        if erfc(abs(moved) / sqrt(2.0)) < REJECTED:
+            yield Refuted(free.name, free.prior.mean, f"{value:.4g}", moved)
+
+
+def _vague(evidence: Evidence) -> Iterator[str]:
+    """Name the least known of the parameters that are not known as a setting is."""
+    vague = evidence.vague
+    if vague:
+        known = evidence.uncertainty.confidence.parameters if evidence.uncertainty else {}
+        widths = {
+            name: (ends[1] - ends[0]) / (abs(evidence.values[name]) or 1.0)
+            for name in vague
+            if closed(ends := known[name].interval)
+        }
+        least = max(widths, key=lambda name: widths[name])
+        verb = "is" if len(vague) == 1 else "are"
+        count = (
+            f"{len(vague)} of {len(evidence.own)} parameters {verb} known no better than to 20 %"
+        )
+        yield f"{count}: {least} {vague[least]}"
 
 
 def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[str]:

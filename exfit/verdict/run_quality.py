@@ -13,8 +13,8 @@ from exfit.fitting.experiment import MASKED, Channel, ExperimentSetup
 from exfit.fitting.system import typical_values_used
 from exfit.plants import BREAKER, GOVERNOR, NETWORK, SPEED, acts_without_load
 from exfit.records.record import Record
+from exfit.results.cause import Cause
 from exfit.results.comparisons import Comparison
-from exfit.results.verdict import Cause
 from exfit.signals import unit_of_signal
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.limit_hits import limiter_actions

@@ -6,16 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
-from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
 from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals
 from exfit.fitting.system import parameters_of
-from exfit.fitting.uncertainty import slices, slopes_of
+from exfit.fitting.uncertainty import slices, slopes_of, spread_of, spread_of_errors
 from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
-from exfit.results.verdict import REJECTED, Cause
+from exfit.results.cause import Cause
+from exfit.results.verdict import REJECTED
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 from exfit.verdict.causes import Evidence
@@ -43,7 +44,8 @@ class Held(NamedTuple):
 
     ``size`` is by how much it is changed for a derivative; without ``unit`` that is its own size.
     ``rare`` is by how much (log-likelihood) it is less often wrong than other values. ``std_error``
-    is that of the value as the case gives it, of its size.
+    is that of the value, as the case gives it or by its kind, of its size. ``names`` are those of
+    given values, none for what belongs to a test or a record.
     """
 
     words: str = ""
@@ -52,6 +54,7 @@ class Held(NamedTuple):
     unit: str = ""
     rare: float = 0.0
     std_error: float = 0.0
+    names: tuple[str, ...] = ()
 
     def better(self, change: float) -> str:
         """Word the change that would match better."""
@@ -65,11 +68,30 @@ class Held(NamedTuple):
 
 
 class Contradiction(NamedTuple):
-    """A value that the record contradicts: chi-square, and which change would match better."""
+    """A value that the record contradicts, and which change would match better.
 
-    chi_square: float
+    ``change`` is that change, in the size of the value, uncertain by ``by_record``.
+    """
+
     held: Held
     change: float
+    by_record: float
+
+    @property
+    def chi_square(self) -> float:
+        """Chi-square of the change, against its error and that of the value."""
+        return (self.change / hypot(self.by_record, self.held.std_error)) ** 2
+
+    @property
+    def gain(self) -> float:
+        """By how much chi-square falls where the value is fitted with its standard error.
+
+        That of a test or a record has none that limits it; it is less often wrong than a value.
+        """
+        by_record = (self.change / self.by_record) ** 2
+        if not self.held.names:
+            return by_record - 2.0 * self.held.rare
+        return by_record * self.held.std_error**2 / (self.held.std_error**2 + self.by_record**2)
 
     @property
     def reason(self) -> str:
@@ -101,34 +123,53 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
 
     Source: Rao 1948, the score test (Proc. Camb. Phil. Soc. 44, 50-57).
     """
+    scores = _scores(evidence)
+    rejected = [each for each in scores if _is_significant(each.chi_square, len(scores))]
+    largest = max((each.chi_square for each in rejected), default=0.0)
+    rejected = [each for each in rejected if each.chi_square > LEAST_SHARE * largest]
+    return sorted(rejected, key=lambda each: -each.likelihood)
+
+
+def values_that_the_record_refines(evidence: Evidence) -> tuple[str, ...]:
+    """Name the given value whose fit with its standard error would explain most; none if nothing.
+
+    It is tested against what it would leave of the errors, which may be far from white before.
+    None, too, where what a test or a record holds would explain more.
+    """
+    try:
+        linear, directions, shift = _linearised(evidence)
+    except SimulationError:
+        return ()
+    residuals, scores = evidence.residuals, list[tuple[Contradiction, Array]]()
+    own_spread = spread_of_errors(residuals, linear.beyond(linear.errors), white=True)
+    for held, direction in directions:
+        score = _score(held, direction, linear, own_spread, shift)
+        if score is not None:
+            scores.append((score, direction))
+    if not scores:
+        return ()
+    best, direction = max(scores, key=lambda each: each[0].gain)
+    left = linear.beyond(linear.errors + best.change * direction)
+    best = _score(best.held, direction, linear, spread_of_errors(residuals, left), shift) or best
+    return best.held.names if _is_significant(best.gain, len(scores)) else ()
+
+
+def _is_significant(chi_square: float, tests: int) -> bool:
+    """Test chi-square of one degree of freedom, the largest of several tests (Bonferroni)."""
+    return erfc(sqrt(0.5 * max(chi_square, 0.0))) * tests < REJECTED
+
+
+def _scores(evidence: Evidence) -> list[Contradiction]:
+    """Test each value that the case holds fixed and that does something."""
     if evidence.uncertainty is None:
         return []
     try:
         linear, directions, shift = _linearised(evidence)
     except SimulationError:
         return []
-    spread = _spread(evidence)
-    scores = [
-        score
-        for held, direction in directions
-        if (score := _score(held, direction, linear, spread, shift)) is not None
-    ]
-    rejected = [
-        each for each in scores if erfc(sqrt(0.5 * each.chi_square)) * len(scores) < REJECTED
-    ]
-    largest = max((each.chi_square for each in rejected), default=0.0)
-    rejected = [each for each in rejected if each.chi_square > LEAST_SHARE * largest]
-    return sorted(rejected, key=lambda each: -each.likelihood)
-
-
-def _spread(evidence: Evidence) -> Array:
-    """Standard deviation (M,) of the weighted errors, widened if they are not white."""
-    noises = evidence.uncertainty.confidence.noise if evidence.uncertainty else ()
-    spreads = [
-        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
-        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
-    ]
-    return np.repeat(spreads, evidence.residuals.sizes)
+    spread = spread_of(evidence.residuals, evidence.uncertainty.confidence.noise)
+    scores = (_score(held, direction, linear, spread, shift) for held, direction in directions)
+    return [score for score in scores if score is not None]
 
 
 def _score(
@@ -141,11 +182,11 @@ def _score(
         return None
     by_bias = BIAS_KNOWN_TO * float(own @ shift)
     by_noise = float(np.linalg.norm(spread * own))
-    error = hypot(by_noise / square, by_bias / square, held.std_error)
+    by_record = hypot(by_noise, by_bias) / square
     change = -float(own @ linear.errors) / square
-    if not held.unit and max(error, abs(change)) > LARGEST_CHANGE:
+    if not held.unit and max(hypot(by_record, held.std_error), abs(change)) > LARGEST_CHANGE:
         return None
-    return Contradiction((change / error) ** 2, held, change)
+    return Contradiction(held, change, by_record)
 
 
 def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Array]], Array]:
@@ -225,15 +266,16 @@ def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
     yield from ((name,) for name in names if name not in saturation)
 
 
-def _held_value(evidence: Evidence, names: Sequence[str]) -> Held:
+def _held_value(evidence: Evidence, names: tuple[str, ...]) -> Held:
     """Return the test of fixed values; those of a curve err as the one that errs most."""
-    fixed, std_errors = evidence.residuals.fixed, evidence.case.std_errors()
+    fixed, std_errors = evidence.residuals.fixed, given_std_errors(evidence.case)
     words = listed([f"{name} = {fixed[name]:.4g}" for name in names])
     return Held(
         words,
         remedy_of(evidence.case, {name: fixed[name] for name in names}),
         rare=0.0 if of_machine(names) else RARE,
         std_error=max(std_errors.get(name, 0.0) / abs(fixed[name]) for name in names),
+        names=names,
     )
 
 

@@ -4,6 +4,7 @@ Each imports what it needs when it is called: a simulation loads nothing of a fi
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from exfit.case.load import CaseOrPath
 
 if TYPE_CHECKING:
     from exfit import estimate
+    from exfit.case.schema.values import GivenAs
     from exfit.records.inspection import Inspection
     from exfit.records.record import Record
     from exfit.results.comparisons import Comparison
@@ -38,6 +40,7 @@ def fit(
     live: "Callable[[LiveResponse], None] | None" = None,
     values: "ValuesOrResult | None" = None,
     search: str | None = None,
+    given: "GivenAs | None" = None,
 ) -> "FitResult":
     """Fit the free parameters of a case to its records, and validate the result on its others.
 
@@ -53,6 +56,7 @@ def fit(
             parameter its start. The result says which.
         search: "global", or "local" for the run from the start of the case alone, with the
             intervals of linear theory; None: as in the case.
+        given: how given values count, "uncertain" or "exact"; None: as in the case.
 
     Raises ExfitError for input that cannot be used.
 
@@ -66,6 +70,7 @@ def fit(
     from exfit.workflows.given_values import with_values
 
     case = with_values(loaded(case, values), values)
+    case = case if given is None else replace(case, given=given)
     method = checked_strategy(strategy or case.estimate.strategy)
     options = search_options(case, search)
     with program_of(case) as program:

@@ -4,14 +4,14 @@ They are read from top to bottom, in `SEARCH` and `STAGES`; why each is there st
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from exfit import estimate
 from exfit.case.case import Case
-from exfit.case.schema import Estimate
+from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
 from exfit.fitting.channel_weights import (
     MOST_SEARCHES,
@@ -21,14 +21,13 @@ from exfit.fitting.channel_weights import (
     weighted_alike,
 )
 from exfit.fitting.compression import compressed, is_as_all
-from exfit.fitting.descents import Announce
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.global_search import Judge, SearchResult, continued, judged_again
+from exfit.fitting.global_search import Judge, SearchResult
 from exfit.fitting.noise import LEAST_NOISE, noise_of
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
-from exfit.fitting.search import CaseSearches, names_of_records, search
+from exfit.fitting.search import names_of_records, search
 from exfit.fitting.uncertainty import not_served_by_linear_theory
 from exfit.inference.noise import LEAST_P, SURPRISING, whiteness
 from exfit.registry import parts
@@ -46,94 +45,16 @@ from exfit.util.arrays import Array
 from exfit.util.text import digits
 from exfit.util.vocabulary import (
     COMPRESSED_ANEW,
-    FROM_FURTHER_STARTS,
     ON_FINER_GRID,
     WEIGHTED_BY_NOISE,
 )
 from exfit.workflows.responses import aligned, validation_of
+from exfit.workflows.search_state import SearchState, Stage, ignore, in_turn
 
 Values = Mapping[str, float]
 
-UNKNOWN = Determination(None)
 MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
-
-
-def _ignore(*_: object) -> None:
-    """Ignore how far a search is."""
-
-
-@dataclass(frozen=True)
-class SearchState:
-    """How far the search of a case is.
-
-    ``setups`` are its tests, ``unseen`` those of the validations. ``problem`` has the weights that
-    were found until now; ``found`` is the search of it, ``determined`` how well the records
-    determine what it found. ``line_notes`` say which periodic disturbances are fitted.
-    ``announce(state, line)`` is called with each line of the path to the result, ``watch`` with how
-    far the rest is.
-    """
-
-    case: Case
-    setups: tuple[ExperimentSetup, ...]
-    unseen: tuple[ExperimentSetup, ...]
-    problem: FitProblem
-    method: str
-    options: Estimate
-    program: Program | None = None
-    announce: "Callable[[SearchState, estimate.SolverIteration], None]" = _ignore
-    watch: Callable[[estimate.Progress], None] = _ignore
-    counter: SimulationCounter = field(default_factory=SimulationCounter)
-    searched: SearchResult | None = None
-    determined: Determination = UNKNOWN
-    line_notes: tuple[str, ...] = ()
-
-    @property
-    def found(self) -> SearchResult:
-        """The search until now."""
-        assert self.searched is not None
-        return self.searched
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether an interruption ended the search."""
-        return self.found.interrupted or self.found.best.stop is estimate.Stop.INTERRUPTED
-
-    @property
-    def fitted(self) -> tuple[ExperimentSetup, ...]:
-        """The tests with the weights of the problem."""
-        return as_fitted(self.setups, self.problem)
-
-    @property
-    def on_line(self) -> Announce:
-        """What is called with each line of the path."""
-        return partial(self.announce, self)
-
-    def continued(
-        self,
-        problem: FitProblem,
-        found: SearchResult,
-        point: Array,
-        phase: str = FROM_FURTHER_STARTS,
-        judge: Judge | None = None,
-    ) -> SearchResult:
-        """Search on from a point (N,) with a lower cost than the best one found.
-
-        With a ``judge`` its end is the result only if validations do not hold on another alone.
-        """
-        searches = CaseSearches(problem, self.options, _ignore, self.counter)
-        found = continued(searches, found, point, self.on_line, phase)
-        return found if judge is None else judged_again(searches, found, judge, self.on_line)
-
-
-Stage = Callable[[SearchState], SearchState]
-
-
-def in_turn(stages: Sequence[Stage], state: SearchState) -> SearchState:
-    """Take a state through stages, one after the other."""
-    for stage in stages:
-        state = stage(state)
-    return state
 
 
 def lines(state: SearchState) -> SearchState:
@@ -146,7 +67,7 @@ def lines(state: SearchState) -> SearchState:
         return state
     from exfit.fitting.sines import with_found_lines
 
-    first = in_turn((*WEIGHTED, samples_at_steps), replace(state, announce=_ignore))
+    first = in_turn((*WEIGHTED, samples_at_steps), replace(state, announce=ignore))
     if first.interrupted:
         raise KeyboardInterrupt
     at = first.problem.residuals, first.found.best.x
@@ -363,7 +284,7 @@ def _profiles_by_twin(state: SearchState, program: Program) -> SearchState:
         return replace(state, determined=determined)
     of_record = names_of_records(setups)
     try:
-        quiet = replace(state, announce=_ignore, counter=SimulationCounter())
+        quiet = replace(state, announce=ignore, counter=SimulationCounter())
         of_twin = quiet.continued(problem, found, determined.lower).best
         own = uncertainty_of_solution(problem, found.best.x, of_record)
         there = uncertainty_of_solution(problem, of_twin.x, of_record)
@@ -380,6 +301,15 @@ def _profiles_by_twin(state: SearchState, program: Program) -> SearchState:
     return replace(state, determined=determined)
 
 
+def refined_values(state: SearchState) -> SearchState:
+    """Fit those given values, too, of which the records say more than that they are as given."""
+    if state.interrupted or state.program is not None or not given_std_errors(state.case):
+        return state
+    from exfit.workflows.refined_values import with_refined_values  # where values are uncertain
+
+    return with_refined_values(state)
+
+
 WEIGHTED: tuple[Stage, ...] = (weights, descents, weights_of_minimum)
 SEARCH: tuple[Stage, ...] = (lines, *WEIGHTED, samples_at_steps, driving_noise)
-STAGES: tuple[Stage, ...] = (*SEARCH, settled, profiles)
+STAGES: tuple[Stage, ...] = (*SEARCH, refined_values, settled, profiles)

@@ -23,15 +23,18 @@ from exfit.plants import FURTHER
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import Behaviour, versions
-from exfit.results.influences import RecorderAverages, TypicalValue, WindowSpread, by_weight
-from exfit.results.intervals.averages import allowing_for_averages, recorder_averages
+from exfit.results.influences import RecorderAverages, WindowSpread
+from exfit.results.intervals.averages import (
+    allowing_for_averages,
+    holding,
+    recorder_averages,
+)
 from exfit.results.intervals.minima import minima_notes, minima_of
 from exfit.results.intervals.value_errors import (
     allowing_for,
     allowing_for_bias,
     errors_of_values,
     given_error_notes,
-    influence_of_typical_values,
 )
 from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FitResult, FittedParameter, Iteration
@@ -50,7 +53,7 @@ from exfit.workflows.case_description import (
     tests_of,
     text_of,
 )
-from exfit.workflows.case_search import STAGES, SearchState, in_turn
+from exfit.workflows.case_search import STAGES
 from exfit.workflows.given_values import given_value_notes, given_values
 from exfit.workflows.responses import (
     LiveResponse,
@@ -63,9 +66,11 @@ from exfit.workflows.responses import (
     validation_of,
     with_iteration_responses,
 )
+from exfit.workflows.search_state import SearchState, in_turn
 
 Values = Mapping[str, float]
 
+MOST_CAUSES = 2  # the likeliest, whose values intervals hold, too
 LINEAR_ALONE = "no twin: intervals are those of linear theory, by finite differences at the result"
 INTERRUPTED_AFTERWARDS = (
     "interrupted after the search: intervals, or comparisons with records that were not fitted, "
@@ -119,12 +124,15 @@ def fit_result(
         records=tuple(FittedRecord(each.test, setup, match) for each, setup, match in tests),
         uncertainty=uncertainty,
         validation=analysis.validation,
-        typical_values=by_weight(analysis.typical_values),
         averages=analysis.averages,
         interrupted=interrupted,
         pace=pace,
     )
     verdict = verdict_of(evidence)
+    if uncertainty is not None and verdict.matches and not verdict.explained:
+        for cause in verdict.causes[:MOST_CAUSES]:
+            uncertainty = holding(uncertainty, residuals, values, cause.values, "causes")
+        analysis.uncertainty = uncertainty
     noted = [*minima_notes(residuals, found, minima, uncertainty)]
     if uncertainty is not None and verdict.no_interval:
         uncertainty = analysis.uncertainty = uncertainty.without_intervals(verdict.no_interval)
@@ -180,7 +188,6 @@ def fit_result(
         inputs=hashes,
         verdict=verdict,
         given_values=given_values(case),
-        typical_values=analysis.typical_values,
         windows=analysis.windows,
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
         strategy_given=method != case.estimate.strategy,
@@ -209,7 +216,6 @@ class Analysis:
     validation: list[Comparison] = field(default_factory=list)
     behaviour: Behaviour | None = None
     phase_ends: list[PhaseEnd] = field(default_factory=list)
-    typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
     as_found: AsFound | None = None
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
@@ -300,11 +306,7 @@ def _analysed(
         if uncertainty is not None:
             at = problem, best.x, names_of_records(fine)
             uncertainty = allowing_for_bias(uncertainty, *at)
-            errors = errors_of_values(case, problem, best.x)
-            wider = allowing_for(errors, uncertainty, *at)
-            analysis.typical_values = influence_of_typical_values(
-                case, problem.compressed, best.x, wider
-            )
+            errors = errors_of_values(case, problem, best.x, uncertainty.confidence.noise)
             windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
             analysis.windows = windows
             uncertainty = allowing_for(errors, with_spread(uncertainty, windows), *at)
@@ -325,7 +327,7 @@ def _parameters(
     why: str,
 ) -> dict[str, FittedParameter]:
     """Return the fitted parameters in their own units; ``why`` there is no ``uncertainty``."""
-    rows, fitted = case.rows(), dict[str, FittedParameter]()
+    rows, asked, fitted = case.rows(), case.free(), dict[str, FittedParameter]()
     of_records = residuals.of_records
     described = {name: (own.unit, own.meaning) for name, own in of_records.items()}
     described |= {name: (row.unit, row.meaning) for name, row in rows.items()}
@@ -349,6 +351,8 @@ def _parameters(
             unit=unit,
             meaning=meaning,
             physical=name not in rows or rows[name].is_physical(value),
+            noise_interval=own.by_noise,
+            given_error=None if name in asked or parameter.prior is None else parameter.prior.std,
         )
     return fitted
 

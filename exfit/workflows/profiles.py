@@ -34,7 +34,8 @@ from exfit.util.text import error_of_interval, near, rounded_value
 from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.diagnostics import search_range_notes
 from exfit.verdict.rule import verdict_alone
-from exfit.workflows.case_search import SEARCH, SearchState, in_turn
+from exfit.workflows.case_search import SEARCH
+from exfit.workflows.search_state import SearchState, in_turn
 
 LOWER = "the profiles reached a lower minimum than the fit and describe that one"
 LOWER_BY_TWIN = (

@@ -36,6 +36,7 @@ def content(form, curve):
     return {
         "model": "AC1A",
         "saturation": form,
+        "given": "exact",
         "plant": {
             "type": "open-circuit",
             "machine": "ONE_AXIS",

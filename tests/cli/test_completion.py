@@ -19,6 +19,7 @@ pytestmark = pytest.mark.long  # a shell is started for each answer
 
 SHELLS = ("bash", "zsh", "fish")
 CASE = {
+    "given": "exact",
     "plant": {"type": "open-circuit", "machine": "GENROU", "free": {"Tpd0": {}}},
     "parameters": {"free": {"KA": {}, "KF": {}, "TE": {}}, "fixed": {"KE": 1.0}},
 }

@@ -107,6 +107,7 @@ def test_a_single_channel_is_fitted_as_without_balance():
 def test_weights_are_either_given_or_balanced(key):
     content = {
         "model": "SEXS",
+        "given": "exact",
         "plant": {"type": "open-circuit", "machine": "GENROU"},
         "test": {"vref": [{"at": 1.0, "step": 0.05}]},
         "record": {"file": "a.csv", "time": "t", "channels": {"vt": {"column": "vt", key: 0.1}}},

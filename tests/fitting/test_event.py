@@ -18,6 +18,7 @@ SWING = np.where(TIME > EVENT, np.sin(4.0 * (TIME - EVENT)) * np.exp(-0.5 * (TIM
 
 UNIT = {
     "model": "SEXS",
+    "given": "exact",
     "plant": {"type": "grid-playback", "machine": "GENROU", "network": {"f0": 60.0}},
 }
 CHANNELS = dict.fromkeys(("vt", "angle", "p", "q"), "x")
@@ -208,6 +209,7 @@ def test_an_offset_of_the_frequency_turns_the_angle():
 def test_only_an_event_has_its_keys(key):
     content = {
         "model": "SEXS",
+        "given": "exact",
         "plant": {"type": "open-circuit", "machine": "GENROU"},
         "test": {"vref": [{"at": 1.0, "step": 0.02}], "frequency_offset": 0.01},
         "record": {"file": "x.csv", "time": "t", "channels": {"vt": "vt"}},

@@ -20,7 +20,8 @@ from exfit.output import fits, terminal
 from exfit.output.blocks import interval, notes
 from exfit.output.notebook import fit_html
 from exfit.output.series import side_by_side
-from exfit.results.verdict import MATCHES, MISSES, Cause, Verdict
+from exfit.results.cause import Cause
+from exfit.results.verdict import MATCHES, MISSES, Verdict
 
 SENTENCE = (
     "KD, TE and KA can move together (KD +51 %, TE +10 %, KA +9.7 %): vt changes by 3.2e-6 pu rms, "

@@ -65,6 +65,7 @@ def test_time_that_goes_back_is_refused_whatever_the_key_says(case):
 
 EVENT = {
     "model": "SEXS",
+    "given": "exact",
     "plant": {"type": "grid-playback", "machine": "GENROU", "network": {"f0": 60.0}},
     "record": {
         "file": "event.csv",

@@ -33,7 +33,8 @@ from coverage_cases import HARD_CASES, noisy, truth_of
 from dense_profiles import dense_intervals
 
 from exfit.util.files import write
-from exfit.workflows.case_search import STAGES, SearchState, in_turn
+from exfit.workflows.case_search import STAGES
+from exfit.workflows.search_state import SearchState, in_turn
 
 RECORDS, SEED = 500, 2026
 DENSE = 20

@@ -43,9 +43,9 @@ from small_svg import small_svg
 
 from exfit.errors import ExfitError
 from exfit.output.figures.style import GREEN, LIMIT, MEASURED, SIMULATED, WIDTH, PowersOfTen
+from exfit.results.cause import Cause
 from exfit.results.comparisons import Overlay
 from exfit.results.model import FitResult
-from exfit.results.verdict import Cause
 from exfit.workflows import fit
 
 SEED = 2026

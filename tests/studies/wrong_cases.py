@@ -35,8 +35,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from planted_cases import Task, WrongCase, cause_line, drawn, tasks
 
 from exfit.errors import ExfitError
+from exfit.results.cause import Cause
 from exfit.results.model import FitResult
-from exfit.results.verdict import GOOD, Cause
+from exfit.results.verdict import GOOD
 from exfit.workflows import fit
 
 OPEN_SEED = 2026

@@ -15,6 +15,7 @@ TIME = np.linspace(0.0, 3.0, 61)
 TRUTH = np.where(TIME < 0.5, 0.0, 2.0 - 2.0 * np.exp(-2.0 * (TIME - 0.5)))
 FIRST_ORDER = {
     "model": "FIRST_ORDER",
+    "given": "exact",
     "plant": {"type": "none"},
     "test": {"vt0": 0.0, "vref": [{"at": 0.5, "step": 1.0}]},
     "parameters": {

@@ -114,6 +114,7 @@ def case_of(drawn, rippled=True, sine=False, poor=False, validated=()):
     free = {"w": drawn.w} | ({} if poor else {"z": drawn.z})
     content = {
         "model": str(MODEL),
+        "given": "exact",
         "plant": {"type": "none"},
         **_recording(drawn, channel),
         "parameters": {

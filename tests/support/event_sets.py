@@ -54,6 +54,7 @@ def recorded(folder, exciter="EXST1", noise=2e-4, seed=1, lengths=LENGTHS):
         rows = [[float(t), float(a)] for t, a in zip(time, angle, strict=True)]
         content = {
             "model": exciter,
+            "given": "exact",
             "plant": {"type": "infinite-bus", "machine": "GENROU", "parameters": MACHINE,
                       "network": {**LINE, "P": p0, "Q": q0}},
             "stabiliser": {"model": "PSS2B", "parameters": STABILISER},
@@ -112,6 +113,7 @@ def set_case(folder, exciter="EXST1", count=3, **sections):
     channels = {"vt": "vt", "angle": angle, "p": "p", "q": "q"}
     content = {
         "model": exciter,
+        "given": "exact",
         "plant": {
             "type": "grid-playback", "machine": "GENROU", "network": {"f0": 60},
             **given["machine"],

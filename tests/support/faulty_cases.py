@@ -16,7 +16,7 @@ from faulty_units import OF_MODEL, PLANT, UNITS, Unit
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiments
 from exfit.records.record import Record
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 
 Content = dict[str, Any]
 Signals = dict[str, np.ndarray]
@@ -346,6 +346,7 @@ def content_of(unit: Unit, weights: Mapping[str, float], step: float) -> Content
     return {
         "model": unit.model,
         "saturation": "quadratic",
+        "given": "exact",
         "plant": deepcopy(PLANT),
         "test": {"vref": [{"at": AT, "step": step}]},
         "record": {"channels": {name: {"weight": weight} for name, weight in weights.items()}},

@@ -116,7 +116,7 @@ def playback_content(has: Content, file: str) -> Content:
     free = {k: {"start": v, "min": v / 10, "max": v * 10} for k, v in START.items()}
     channels = {signal: signal for signal in NOISE}
     return deepcopy({
-        "model": "SEXS", "plant": plant, **sections(has),
+        "model": "SEXS", "given": "exact", "plant": plant, **sections(has),
         "parameters": {"fixed": FIXED, "free": free},
         "record": {"file": file, "time": "t", "channels": channels},
     })  # fmt: skip
@@ -129,7 +129,7 @@ def recorded(path: Path, has: Content, level: Content, rng: np.random.Generator)
         "network": {**LINE, **level}, "dialect": has.get("dialect", "standard"),
     }  # fmt: skip
     content = {
-        "model": "SEXS", "plant": plant, **sections(has),
+        "model": "SEXS", "given": "exact", "plant": plant, **sections(has),
         "test": {"vt0": 1.0, "duration": 12.0, **SWING},
         "parameters": {"fixed": {**FIXED, **TRUTH}},
         "simulation": {"output_step": 1.0 / 60.0, "step": 1.0 / 960.0},

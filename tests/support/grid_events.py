@@ -26,6 +26,7 @@ def recorded(path, P=0.8, Q=0.1, vt0=1.0, noise=0.0, seed=1, vs=None, **truth):
     test = EVENT | ({} if vs is None else {"vs": {"table": vs}})
     content = {
         "model": "SEXS",
+        "given": "exact",
         "plant": {
             "type": "infinite-bus", "machine": "GENROU", "parameters": UNIT,
             "network": {**LINE, "P": P, "Q": Q},
@@ -66,6 +67,7 @@ def event_case(folder, *names, validate=(), free=True, signals=SIGNALS, **sectio
     start = {"K": 50.0, "TE": 0.1}
     content = {
         "model": "SEXS",
+        "given": "exact",
         "plant": {
             "type": "grid-playback", "machine": "GENROU", "parameters": UNIT,
             "network": {"f0": 60},

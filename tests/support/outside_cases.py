@@ -41,6 +41,7 @@ def written_case(folder, with_twin=True, arguments=(), **sections):
         fixed |= {"T": 6.0}
     content = {
         **({"model": "SEXS"} if with_twin else {}),
+        "given": "exact",
         "plant": plant,
         "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}]},
         "record": {"file": "bump.csv", "time": "t", "channels": {"vt": "vt"}},

@@ -38,7 +38,7 @@ from exfit.errors import ExfitError
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.records.record import Record
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.util.vocabulary import SOURCES
 
 CERTIFIED = 1e-3  # standard error of a value with a certificate, of the value

@@ -21,6 +21,7 @@ OPENS = 1.0003  # s; between two samples
 def content_of(load, free, signals, search="local", **breaker):
     """Return the content of a case whose free data start at a share of the truth."""
     return {
+        "given": "exact",
         "plant": {
             "type": "machine-on-load",
             "machine": "GENROU",

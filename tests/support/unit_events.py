@@ -36,6 +36,7 @@ def content(record, model="AC8B", parameters=None, machine=None, **plant):
     """Return the case of the unit with a section ``record``; what is fitted is KPR and KIR."""
     return {
         "model": model,
+        "given": "exact",
         "plant": {
             "type": "grid-playback",
             "machine": "GENROU",

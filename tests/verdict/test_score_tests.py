@@ -8,10 +8,11 @@ from records import TEST, TIME, case_of, one, synthetic
 from tiers import few_of
 
 from exfit.case.load import load_case
+from exfit.fitting.uncertainty import spread_of
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.verdict import score_tests
 from exfit.verdict.causes.trials import freed_within, linear_model, refitted, with_freed
-from exfit.verdict.score_tests import Held, _linearised, _score, _spread
+from exfit.verdict.score_tests import Held, _linearised, _score
 from exfit.workflows import fit
 
 SATURATION = ("saturation", (2026, 11, 1))  # times 0.63; chi-square 29 to 1600 samples of noise
@@ -55,7 +56,7 @@ def test_chi_square_is_by_how_much_the_value_set_free_lowers_the_cost(evidence):
     (score,) = [each for each in score_tests.contradictions(fitted) if TPD0 in each.held.words]
     value = fitted.residuals.fixed[TPD0]
     trial = refitted(fitted, with_freed(fitted.residuals, [freed_within(TPD0, value, 4.0)]))
-    variance = float(_spread(fitted)[0]) ** 2
+    variance = float(spread_of(fitted.residuals, fitted.uncertainty.confidence.noise)[0]) ** 2
     assert score.chi_square == pytest.approx(2.0 * (fitted.cost - trial.cost) / variance, rel=0.2)
     assert np.exp(score.change) == pytest.approx(trial.values[TPD0] / value, rel=0.2)
 
@@ -82,7 +83,15 @@ def test_sound_grid_events_contradict_the_inertia_as_often_as_noise_does(evidenc
         fitted = evidence(load_case(event("H", seed, tmp_path).sound))
         linear, directions, shift = _linearised(fitted)
         held, direction = next(each for each in directions if "machine.H" in each[0].words)
-        scores.append(_score(held, direction, linear, _spread(fitted), shift).chi_square)
+        scores.append(
+            _score(
+                held,
+                direction,
+                linear,
+                spread_of(fitted.residuals, fitted.uncertainty.confidence.noise),
+                shift,
+            ).chi_square
+        )
     assert np.mean(scores) < 3.5
 
 
@@ -91,7 +100,10 @@ def test_the_scores_of_noise_are_chi_square(evidence):
     """Of two signals, one much noisier; the mean of 4000 has a standard error of 0.022."""
     fitted = evidence(drawn("ripple", (16, 1, 7)).sound)
     linear, directions, shift = _linearised(fitted)
-    spread, rng = _spread(fitted), np.random.default_rng(1)
+    spread, rng = (
+        spread_of(fitted.residuals, fitted.uncertainty.confidence.noise),
+        np.random.default_rng(1),
+    )
     held, direction = next(each for each in directions if TPD0 in each[0].words)
     always = Held(held.words, unit="pu")  # tested however much it would have to change
     scores = [

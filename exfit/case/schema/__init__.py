@@ -48,6 +48,7 @@ from exfit.case.schema.values import (
     Filter,
     FreeSection,
     Frozen,
+    GivenAs,
     MachineId,
     MedianSection,
     Number,
@@ -243,6 +244,11 @@ class CaseDocument(Section):
     )
     parameters: Parameters = Field(
         default_factory=Parameters, description="Fixed and free parameters of the exciter."
+    )
+    given: GivenAs = Field(
+        default="uncertain",
+        description="How given values count: uncertain, each with its standard error, by default "
+        "that of its kind and source; or exact, but for standard errors of the case.",
     )
     estimate: Estimate = Field(
         default_factory=Estimate, description="How the free parameters are estimated."

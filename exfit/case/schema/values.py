@@ -20,12 +20,14 @@ from pydantic_core import PydanticCustomError
 from exfit.case.ties import is_tie
 from exfit.case.yaml import LONGEST_WHOLE
 from exfit.util.text import magnitude_fault, show
-from exfit.util.vocabulary import NOT_STATED, SOURCES
+from exfit.util.vocabulary import GIVEN_AS, NOT_STATED, SOURCES
 
 if TYPE_CHECKING:
     Source = str
+    GivenAs = str
 else:
     Source = Literal[SOURCES]
+    GivenAs = Literal[GIVEN_AS]
 
 Value = TypeVar("Value")
 

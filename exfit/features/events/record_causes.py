@@ -21,9 +21,9 @@ from exfit.fitting.event import with_rest
 from exfit.fitting.recordings import record_of
 from exfit.plants import NETWORK
 from exfit.records.record import Record
+from exfit.results.cause import Cause
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
-from exfit.results.verdict import Cause
 from exfit.signals import SIGNALS
 from exfit.util.arrays import Array, median_step
 from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion

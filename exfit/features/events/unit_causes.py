@@ -16,7 +16,7 @@ from exfit.fitting.system import system_of
 from exfit.models import GOVERNORS, STABILISERS
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.verdict.causes.evidence import Evidence, Suspicion, likelihood, suspected
 from exfit.verdict.causes.trials import freed_within, refitted, tried, with_freed
 from exfit.verdict.causes.unit import STRUCTURE
@@ -163,7 +163,7 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
                 "parameters: {...}}, or give its output as channel vs",
             )
             prior = of_stand_in(evidence, trial.cost)
-            yield from suspected(evidence, trial.cost, len(freed), cause, prior)
+            yield from suspected(evidence, trial, len(freed), cause, prior)
 
 
 def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
@@ -223,7 +223,7 @@ def other_transformer(evidence: Evidence) -> Iterator[Suspicion]:
             f"vt is recorded behind a transformer, p and q at the {place}: network.X "
             f"{trial.values[REACTANCE]:.3g} with power_at: {place} would match"
         )
-        yield from suspected(evidence, trial.cost, 2, Cause(text, check))
+        yield from suspected(evidence, trial, 2, Cause(text, check))
 
 
 def _other_number(evidence: Evidence, freed: FreeParameter, check: str) -> Iterator[Suspicion]:
@@ -231,4 +231,4 @@ def _other_number(evidence: Evidence, freed: FreeParameter, check: str) -> Itera
     given = evidence.residuals.fixed[freed.name]
     if trial := refitted(evidence, with_freed(evidence.residuals, [freed])):
         text = f"{freed.name} {trial.values[freed.name]:.3g} would match (given {given:g})"
-        yield from suspected(evidence, trial.cost, 1, Cause(text, check))
+        yield from suspected(evidence, trial, 1, Cause(text, check))

@@ -36,7 +36,7 @@ from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.sheet import DynamicsRecord
-from exfit.results.influences import by_weight, first_of
+from exfit.results.influences import first_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
@@ -210,9 +210,9 @@ def _of_fit(result: FitResult, program: str) -> Iterator[str]:
     """List remarks on the fit for the reader."""
     if not result.holds:
         yield f"the fit does not hold: {outcome_of(result)}: {explanation_of(result)}"
-    weighty = [*by_weight(result.typical_values)]
-    if weighty:
-        yield f"fitted values depend on typical values: {first_of(weighty)}"
+    for name, values in result.resting_on.items():
+        of = first_of([f"{value} ({result.sources.get(value, NOT_STATED)})" for value in values])
+        yield f"the interval of {name} rests on data that nobody measured: {of}"
     for unit in dict.fromkeys(kind.partition(".")[0] for kind in result.units):
         yield f"{unit} is not written: export it from a case of its own"
     if result.saturation != "quadratic":

@@ -29,8 +29,9 @@ from exfit.inference.linear import ResidualBlock
 from exfit.models.machines import Machine
 from exfit.plants.loaded_machine import Flow, loaded_at_rest
 from exfit.plants.parts import Names
+from exfit.results.cause import Cause
 from exfit.results.model import FittedParameter
-from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, NOT_CONVERGED, Cause, Verdict
+from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, NOT_CONVERGED, Verdict
 from exfit.signals import NOISE
 from exfit.util.arrays import Array
 from exfit.util.text import show

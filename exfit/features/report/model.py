@@ -1,7 +1,7 @@
 """The models of a fit with their parameters, what they were judged by, and what must be known."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from math import exp, log
+from math import exp, inf, log
 
 from exfit.case.parts import MEANINGS
 from exfit.errors import ExfitError
@@ -27,10 +27,9 @@ from exfit.output.blocks import (
 )
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import SheetRow
-from exfit.results.influences import DEVIATION, by_weight, moved_parameters
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.validation_result import Reported
-from exfit.util.vocabulary import ORIGIN_OF_CRITERIA, Criteria
+from exfit.util.vocabulary import NOT_STATED, ORIGIN_OF_CRITERIA, UNSTATED, Criteria
 
 Row = tuple[Cell, ...]
 
@@ -39,7 +38,6 @@ EXPONENTIAL: Mapping[str, tuple[str, Callable[[float, float], float]]] = {
     "exponential": ("VX = AEX exp(BEX E)", lambda e, se: e * se),
     "exponential-se": ("VX = E SE, SE = AEX exp(BEX E),", lambda _, se: se),
 }
-OFF = f"{100.0 * DEVIATION:g} % off"
 FITTED_NUMBERS = ("start", "fitted", "95 % interval", "standard error", "bounds")
 NO_DRAWING = "The model is that of the program: exfit has no drawing of it."
 BY_TWIN = (
@@ -137,7 +135,7 @@ def parameters(result: Reported) -> Iterator[Block]:
         heads = columns("parameter", *FITTED_NUMBERS, "unit", "source", numbers=FITTED_NUMBERS)
         rows = tuple(_fitted(name, each) for name, each in result.parameters.items())
         yield Table(heads, rows, "Fitted parameters")
-        yield from _typical_values(result)
+        yield from _given_values(result)
     for title, others in _not_fitted(result):
         if of_part := tuple(others):
             heads = columns("parameter", "value", "unit", "source", numbers=("value",))
@@ -172,32 +170,25 @@ def _fitted(name: str, parameter: FittedParameter) -> Row:
     )
 
 
-def _typical_values(result: FitResult) -> Iterator[Block]:
-    """Yield the typical values that would move a parameter if they were off, then the others."""
-    weighty = by_weight(result.typical_values)
-    values = {name: parameter.value for name, parameter in result.parameters.items()}
-    rows = tuple(
-        (
-            Cell(name, "doubt"),
-            Cell(number(typical.value, 6)),
-            Cell(moved_parameters(typical, values)),
-            Cell(number(max(typical.matters_to.values()), 2)),
-        )
-        for name, typical in weighty.items()
-    )
+def _given_values(result: FitResult) -> Iterator[Block]:
+    """Yield the given values whose standard errors the intervals include, and what each moves."""
+    given = {} if result.knowledge is None else result.knowledge.given_errors
+    own = {name: each for name, each in result.parameters.items() if each.std_error}
+    rows = []
+    for name, error in given.items():
+        shares = {n: abs(error.shifts[n]) / (each.std_error or inf) for n, each in own.items()}
+        most = max(shares, key=lambda n: shares[n], default=None)
+        if most is None:
+            continue
+        moved = f"{most} by {number(error.shifts[most], 2)} {own[most].unit}".rstrip()
+        source = result.sources.get(name, NOT_STATED)
+        mark: Mark = "doubt" if source in UNSTATED else ""
+        rows.append((Cell(name, mark), Cell(number(error.std_error, 2)), Cell(source), Cell(moved)))
     if rows:
-        heads = (
-            *columns("typical value", "value", numbers=("value",)),
-            TableColumn("would move", folds=True),
-            TableColumn("half widths of the interval", number=True),
+        heads = columns(
+            "given value", "standard error", "source", "moves most", numbers=("standard error",)
         )
-        yield Table(heads, rows, f"Typical values that matter: if they were {OFF}")
-    if harmless := [name for name in result.typical_values if name not in weighty]:
-        of = "Of the other typical values" if rows else "Of the typical values"
-        yield Note(
-            f"{of} ({', '.join(harmless)}), none would move a parameter by more than half the "
-            f"width of its interval if it were {OFF}."
-        )
+        yield Table(heads, tuple(rows), "Given values whose errors the intervals include")
 
 
 def _not_fitted(result: Reported) -> Iterator[tuple[str, Iterable[Row]]]:

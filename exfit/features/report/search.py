@@ -36,7 +36,6 @@ from exfit.output.blocks import (
 )
 from exfit.output.iterations import COLUMNS, COST, DAMPINGS, GRADIENT, LEGEND
 from exfit.results.comparisons import IterationResponses
-from exfit.results.influences import by_weight
 from exfit.results.model import FitResult, FittedParameter, Iteration, Minima
 from exfit.results.thinning import drawn_responses
 from exfit.signals import label_of
@@ -250,9 +249,6 @@ def identifiability(result: FitResult) -> Iterator[Block]:
         return
     if known.sentences:
         yield Note("The records do not determine every parameter", see="findings")
-    elif by_weight(result.typical_values):
-        text = "The records determine every parameter, and every combination of them"
-        yield Note(f"{text}, as far as the typical values that matter hold", see="parameters")
     else:
         yield Note("The records determine every parameter, and every combination of them.")
     if known.effects:

@@ -34,7 +34,7 @@ COLORS = ("#1f4e9c", "#c1272d", GREEN, "#b7791f", "#6b46c1", "#0e7490", "#4a5568
 STYLES = ("-", "--", ":")
 
 
-class Panel(Axes):
+class MeasuredAxes(Axes):
     """Axes that are measured once for the same ticks, however often they are moved."""
 
     measured: tuple[object, Array] | None = None  # the ticks, the room (pixels) around the axes
@@ -54,18 +54,20 @@ class Panel(Axes):
         return Bbox((extent + self.measured[1]).reshape(2, 2))
 
 
-class Page(Figure):
+class MeasuredFigure(Figure):
     """A figure whose axes are panels."""
 
     def add_subplot(self, *arguments: Any, **options: Any) -> Axes:
         """Add axes; see Figure.add_subplot."""
-        panel: Axes = super().add_subplot(*arguments, axes_class=Panel, **options)
+        panel: Axes = super().add_subplot(*arguments, axes_class=MeasuredAxes, **options)
         return panel
 
 
 def new_figure(height: float, title: str = "", width: float = WIDTH) -> Figure:
     """Make an empty figure of a size in inches, which gives its axes the room that labels leave."""
-    figure = Page(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD))
+    figure = MeasuredFigure(
+        figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=PAD, w_pad=PAD)
+    )
     if title:
         figure.suptitle(title, fontsize=11)
     return figure
@@ -136,7 +138,7 @@ def _with_aligned_labels(figure: Figure, canvas: FigureCanvasAgg) -> list[list[f
     columns, renderer = defaultdict[int, dict[Axes, float]](dict), canvas.get_renderer()
     for axes in figure.axes:
         place, label = axes.get_subplotspec(), axes.yaxis.label
-        if isinstance(axes, Panel):
+        if isinstance(axes, MeasuredAxes):
             axes.measured = None
         for axis in (axes.xaxis, axes.yaxis):
             if not axis.label.get_text():

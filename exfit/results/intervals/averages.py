@@ -8,7 +8,7 @@ s is what the parameters cannot make up for: beyond STRONG it is wrong at most o
 Source: Cox 1962, Further results on tests of separate families of hypotheses.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -22,7 +22,7 @@ from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference.confidence import Interval
+from exfit.inference.confidence import Interval, IntervalMethod
 from exfit.results.influences import STRONG, RecorderAverages
 from exfit.results.intervals.minima import own_values, variance_of
 from exfit.util.arrays import Array, median_step
@@ -155,12 +155,24 @@ def _averaged(
 def allowing_for_averages(
     uncertainty: UncertaintyAnalysis, residuals: Residuals, averages: RecorderAverages | None
 ) -> UncertaintyAnalysis:
-    """Return the uncertainty with intervals that hold the parameters with averages, too.
-
-    Each holds the one without them, and the same about the value with them, within its bounds.
-    """
+    """Return the uncertainty with intervals that hold the parameters with averages, too."""
     if averages is None:
         return uncertainty
+    return holding(uncertainty, residuals, averages.given, averages.values, "averages")
+
+
+def holding(
+    uncertainty: UncertaintyAnalysis,
+    residuals: Residuals,
+    given: Mapping[str, float],
+    others: Mapping[str, float],
+    method: IntervalMethod,
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with intervals that hold the parameters under another hypothesis.
+
+    Each holds that about the fitted value, ``given``, and the same about the value of ``others``,
+    within its bounds.
+    """
     parameters = {**uncertainty.confidence.parameters}
 
     def moved(free: FreeParameter, limit: float | None, shift: float) -> float | None:
@@ -171,10 +183,12 @@ def allowing_for_averages(
 
     for free in residuals.free:
         own = parameters[free.name]
-        if own.interval is not None:
-            given, with_them = averages.given[free.name], averages.values[free.name]
-            shift = free.scaled(with_them) - free.scaled(given)
+        if own.interval is not None and free.name in others:
+            shift = free.scaled(others[free.name]) - free.scaled(given[free.name])
             low, high = own.interval
             interval = moved(free, low, min(shift, 0.0)), moved(free, high, max(shift, 0.0))
-            parameters[free.name] = own._replace(interval=interval, method="averages")
+            by_noise = own.by_noise or own.interval
+            parameters[free.name] = own._replace(
+                interval=interval, method=method, by_noise=by_noise
+            )
     return uncertainty.with_parameters(parameters)

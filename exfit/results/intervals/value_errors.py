@@ -2,54 +2,83 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import hypot, sqrt
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
+from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.system import typical_values_used
-from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation, slopes_of
+from exfit.fitting.uncertainty import (
+    GivenError,
+    UncertaintyAnalysis,
+    linearisation,
+    slopes_of,
+    spread_of,
+)
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty, closed
-from exfit.results.influences import DEVIATION, TypicalValue
+from exfit.inference.noise import Noise
+from exfit.results.influences import first_of
 from exfit.results.intervals.determination import without_linear_intervals
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
-IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
 UNSEEN = 1e-9  # of the largest singular value: rounding
-TINY = float(np.finfo(float).tiny)  # where the errors given leave nothing of a variance
 
 
 class ErrorsOfValues(NamedTuple):
-    """Standard errors of given values, with effects; ``without`` has those without derivatives."""
+    """Standard errors of given values, with effects; ``without`` has those without derivatives.
+
+    ``together`` is by how much they move each parameter in all, a standard error in its unit.
+    """
 
     given: Mapping[str, GivenError]
+    together: Mapping[str, float]
     without: tuple[str, ...] = ()
 
 
-def errors_of_values(case: Case, problem: FitProblem, theta: Array) -> ErrorsOfValues:
-    """Estimate what standard errors of given values move at the minimum theta (N,)."""
+def errors_of_values(
+    case: Case, problem: FitProblem, theta: Array, noises: Sequence[Noise]
+) -> ErrorsOfValues:
+    """Estimate what standard errors of given values move at the minimum theta (N,).
+
+    The values are known beforehand to their standard errors S, and by the records, whose errors
+    have the standard deviation of the ``noises`` of the channels. To first order the residuals r of
+    the minimum, with the derivatives G by the values that the parameters cannot reproduce, give
+    them a posterior mean v = -C G'r and covariance C = (S^-2 + G'G)^-1. The parameters, which were
+    fitted with the given values, are off by what v moves, and uncertain by what C does.
+
+    Source: Gelman et al. 2013, section 14.8 (a prior as further data of a regression).
+    """
     residuals = problem.compressed
-    std_errors = case.std_errors()
+    std_errors = given_std_errors(case)
     std_errors = {name: std_errors[name] for name in std_errors if name in residuals.fixed}
     if not std_errors:
-        return ErrorsOfValues({})
-    shifts = shifts_by_values(residuals, theta, std_errors, bounds_hold=False)
-    if shifts is None:
-        return ErrorsOfValues({}, tuple(std_errors))
+        return ErrorsOfValues({}, {})
+    influence = influence_of_values(residuals, theta, std_errors, bounds_hold=False)
+    if influence is None:
+        return ErrorsOfValues({}, {}, tuple(std_errors))
+    of_priors = np.full(len(residuals.priors), residuals.noise)
+    spread = np.append(spread_of(residuals, noises), of_priors)
+    known = influence.beyond / spread[:, None]
+    precision = np.eye(len(std_errors)) + known.T @ known
+    mean = -np.linalg.solve(precision, known.T @ (residuals(theta) / spread))
+    covariance = np.linalg.inv(precision)
+    variance = np.sum(influence.shifts @ covariance * influence.shifts, axis=1)
+    together = np.sqrt(variance + (influence.shifts @ mean) ** 2)
+    left = influence.shifts * np.sqrt(np.diag(covariance))
     names = [free.name for free in residuals.free]
     given = {
         name: GivenError(std_error, dict(zip(names, column.tolist(), strict=True)))
-        for (name, std_error), column in zip(std_errors.items(), shifts.T, strict=True)
+        for (name, std_error), column in zip(std_errors.items(), left.T, strict=True)
         if column.any()
     }
-    return ErrorsOfValues(given)
+    return ErrorsOfValues(given, dict(zip(names, together.tolist(), strict=True)))
 
 
 def allowing_for(
@@ -61,7 +90,7 @@ def allowing_for(
 ) -> UncertaintyAnalysis:
     """Return the uncertainty with standard errors and intervals that allow for those of values.
 
-    Each value adds the square of its first-order shift to the variance of a parameter, and the
+    They add the square of their first-order shift to the variance of a parameter, and the
     square of 1.96 times that shift to that of each side of its interval, in scaled parameters; an
     open side stays open. The values count as independent of each other and of the noise.
     Correlation and covariance remain those of the records alone. As in `confidence` there is no
@@ -81,8 +110,10 @@ def allowing_for(
     widened, given = {}, errors.given
     for parameter, x, size in zip(problem.residuals.free, theta, sizes, strict=True):
         own, name = uncertainty.confidence.parameters[parameter.name], parameter.name
-        shift = hypot(*(error.shifts[name] for error in given.values()))
-        widened[name] = widened_by(shift, own, parameter, float(x), float(size), [*given])
+        of_name = {value: abs(error.shifts[name]) for value, error in given.items()}
+        names = sorted(of_name, key=lambda value: -of_name[value])
+        shift = errors.together[name]
+        widened[name] = widened_by(shift, own, parameter, float(x), float(size), names)
     return replace(uncertainty, given_errors=given).with_parameters(widened)
 
 
@@ -118,16 +149,16 @@ def given_error_notes(
     given, parameters = uncertainty.given_errors, uncertainty.confidence.parameters
     if not given:
         return
-    ratios = {}
-    for name, own in parameters.items():
-        if own.std_error and name not in of_record:
-            by_given = sum(error.shifts[name] ** 2 for error in given.values())
-            ratios[name] = own.std_error / sqrt(max(own.std_error**2 - by_given, TINY))
-    text = f"the intervals include the errors of {listed([*given])} (given)"
+    text = f"the intervals include the errors of {first_of([*given])} (given)"
+    ratios = {
+        name: (own.interval[1] - own.interval[0]) / (own.by_noise[1] - own.by_noise[0])
+        for name, own in parameters.items()
+        if name not in of_record and closed(own.interval) and closed(own.by_noise)
+    }
     if ratios:
         widest = max(ratios, key=lambda name: ratios[name])
         value = max(given, key=lambda name: abs(given[name].shifts[widest]))
-        times = f"the standard error of {widest} is {digits(ratios[widest])} times as large"
+        times = f"that of {widest} is {digits(ratios[widest])} times as wide as from noise alone"
         text += f": {times}, most by {value}" if len(given) > 1 else f": {times}"
     yield text
 
@@ -148,7 +179,8 @@ def widened_by(
     share, value = hypot(linear or 0.0, shift) / size, parameter.value(scaled)
     std_error = None if own.std_error is None else hypot(own.std_error, shift)
     relative = std_error / abs(value) if std_error is not None and value else None
-    wider = own._replace(std_error=std_error, relative_error=relative)
+    by_noise = own.by_noise or own.interval
+    wider = own._replace(std_error=std_error, relative_error=relative, by_noise=by_noise)
     if own.interval is None:
         return wider
     if share > UNDETERMINED:
@@ -167,16 +199,26 @@ def widened_by(
     return wider._replace(interval=(moved(low, -1.0), moved(high, 1.0)))
 
 
-def shifts_by_values(
-    residuals: Residuals, theta: Array, deviations: Mapping[str, float], bounds_hold: bool = True
-) -> Array | None:
-    """Shift of each free parameter with each of K values, (N, K), in its own unit.
+class Influence(NamedTuple):
+    """What K values do at a minimum: to the N parameters, in their units, and to the residuals.
 
-    ``deviations`` are those of the values by name. At the minimum theta (N,) the gradient stays
-    zero, so that to first order the parameters move by -(J'J)^-1 J' dr/dv times the deviation of v:
-    one Jacobian with a column more for each of these values gives both. A parameter on a bound
-    stays there or, unless ``bounds_hold``, moves as if it were let go, the others as if it stayed.
-    None where a derivative is not finite.
+    ``beyond`` (M, K) is what the parameters cannot reproduce.
+    """
+
+    shifts: Array
+    beyond: Array
+
+
+def influence_of_values(
+    residuals: Residuals, theta: Array, deviations: Mapping[str, float], bounds_hold: bool
+) -> Influence | None:
+    """Return what deviations of K values would move at the minimum theta (N,).
+
+    ``deviations`` are those of the values by name. The gradient stays zero, so that to first order
+    the parameters move by -(J'J)^-1 J' dr/dv times the deviation of v: one Jacobian with a column
+    more for each of these values gives both. A parameter on a bound stays there or, unless
+    ``bounds_hold``, moves as if it were let go, the others as if it stayed. None where a derivative
+    is not finite.
 
     Source: the implicit function theorem on the gradient, with the Gauss-Newton matrix.
     """
@@ -197,7 +239,8 @@ def shifts_by_values(
     count, values = len(residuals.free), residuals.values(theta)
     own, of_values = jacobian[:, :count], jacobian[:, count:] * [*deviations.values()]
     moving = np.array([free.bound(values[free.name]) is None for free in residuals.free])
-    return first_order_shifts(own, of_values, moving, bounds_hold)
+    shifts = first_order_shifts(own, of_values, moving, bounds_hold)
+    return Influence(shifts, of_values + own[:, moving] @ shifts[moving])
 
 
 def first_order_shifts(
@@ -224,41 +267,3 @@ def _least_squares(matrix: Array, right: Array) -> Array:
     size = np.linalg.norm(own, axis=0)
     size[size == 0.0] = 1.0
     return np.asarray(np.linalg.lstsq(own / size, other)[0] / size[:, None])
-
-
-def influence_of_typical_values(
-    case: Case, residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
-) -> dict[str, TypicalValue]:
-    """Estimate the effect of each typical value that is not 0, were it DEVIATION larger.
-
-    To first order, by `shifts_by_values`: nothing where a derivative is not finite. What matters
-    are shifts of parameters of the unit by more than half their interval or, without one that has
-    both ends, by more than two standard errors.
-    """
-    typical = {name: value for name, value in typical_values_used(case).items() if value}
-    if not typical:
-        return {}
-    deviations = {name: DEVIATION * value for name, value in typical.items()}
-    by_value = shifts_by_values(residuals, theta, deviations)
-    if by_value is None:
-        return {}
-    half_widths = {}
-    for symbol, own in uncertainty.confidence.parameters.items():
-        if symbol in residuals.of_records:
-            continue
-        if closed(own.interval):
-            half_widths[symbol] = 0.5 * (own.interval[1] - own.interval[0])
-        elif own.std_error is not None:
-            half_widths[symbol] = IN_STANDARD_ERRORS * own.std_error
-    influence = {}
-    for (name, value), column in zip(typical.items(), by_value.T, strict=True):
-        moved = zip(residuals.free, column.tolist(), strict=True)
-        shifts = {free.name: shift for free, shift in moved}
-        shares = {
-            symbol: abs(shifts[symbol]) / half_width
-            for symbol, half_width in half_widths.items()
-            if abs(shifts[symbol]) > half_width > 0.0
-        }
-        largest_first = dict(sorted(shares.items(), key=lambda each: -each[1]))
-        influence[name] = TypicalValue(value, shifts, largest_first)
-    return influence

@@ -12,7 +12,7 @@ from math import inf, isfinite
 
 from exfit.case.case import Case
 from exfit.registry import parts
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.verdict.causes.channels import unsteady_record, wrong_levels, wrong_voltage
 from exfit.verdict.causes.evidence import (
     Evidence,
@@ -22,7 +22,7 @@ from exfit.verdict.causes.evidence import (
     Recogniser,
     Suspicion,
 )
-from exfit.verdict.causes.unit import typical_values, with_model
+from exfit.verdict.causes.unit import with_model
 
 __all__ = ["Evidence", "FittedRecord", "Pace", "Recogniser", "Suspicion", "causes_of"]
 
@@ -30,7 +30,6 @@ ALWAYS: Mapping[str, Recogniser] = {
     "level of vt": wrong_voltage,
     "rest before the step": unsteady_record,
     "levels at rest": wrong_levels,
-    "typical values": typical_values,
 }
 FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
 
@@ -60,7 +59,8 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     suspicions = sorted(_credible(evidence, found), key=lambda each: -each.likelihood)
     if not nothing_to_explain:
         suspicions = likely(with_model(evidence, suspicions))
-    return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
+    causes = {suspicion.cause.sentence: suspicion.cause for suspicion in reversed(suspicions)}
+    return tuple(reversed(causes.values()))
 
 
 def recognisers_of(case: Case) -> Mapping[str, Recogniser]:

@@ -12,7 +12,7 @@ from exfit.dsp.filtering import Filtering
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.plants import VT0
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.util.arrays import Array, Mask
 from exfit.verdict.causes.evidence import (
     CERTAIN,
@@ -20,11 +20,11 @@ from exfit.verdict.causes.evidence import (
     Evidence,
     FittedRecord,
     Suspicion,
+    Trial,
     suspected,
 )
 from exfit.verdict.causes.trials import (
     Opened,
-    Trial,
     between,
     refitted,
     tried,
@@ -81,7 +81,7 @@ def _other_scale(
         cause = Cause(text, CHECK_BASE)
     else:
         return
-    yield from suspected(evidence, trial.cost, len(opened), cause, prior)
+    yield from suspected(evidence, trial, len(opened), cause, prior)
 
 
 def is_wrong_base(signal: str, factor: float) -> bool:
@@ -125,7 +125,7 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
             place = f"{channel.signal}{evidence.name_of(number)}"
             text = f"an offset of {place}: {more:+.3g} pu more would match"
             cause = Cause(text, check_zero(channel, more))
-            yield from suspected(evidence, trial.cost, 1, cause)
+            yield from suspected(evidence, trial, 1, cause)
 
 
 def check_zero(channel: Channel, more: float = 0.0) -> str:
@@ -158,7 +158,7 @@ def wrong_start(evidence: Evidence) -> Iterator[Suspicion]:
                 f"vt0 is {given:.5g} pu, but the record{evidence.name_of(number)} starts from "
                 f"{trial.values['cause.vt0']:.5g} pu"
             )
-            yield from suspected(evidence, trial.cost, 1, Cause(text, LEAVE_VT0_OUT))
+            yield from suspected(evidence, trial, 1, Cause(text, LEAVE_VT0_OUT))
 
 
 def clipped_channel(evidence: Evidence) -> Iterator[Suspicion]:

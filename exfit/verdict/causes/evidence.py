@@ -15,10 +15,11 @@ from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.noise import noise_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.inference.confidence import vagueness
+from exfit.results.cause import Cause
 from exfit.results.comparisons import Comparison
-from exfit.results.influences import RecorderAverages, TypicalValue
+from exfit.results.influences import RecorderAverages
 from exfit.results.intervals.determination import NEEDS_PROFILE
-from exfit.results.verdict import Cause
 
 LEAST_TIME = 30.0  # s
 TIMES_SEARCH = 3.0  # times what the search took
@@ -120,8 +121,7 @@ class Evidence:
 
     ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
     ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
-    known; ``typical_values`` are those that matter, with what they would move, the weightiest
-    first; ``averages`` are those of the recorder that it does not exclude. ``interrupted``: the
+    known; ``averages`` are those of the recorder that it does not exclude. ``interrupted``: the
     search, or what follows it, was cut short. ``pace`` watches the search for causes.
     """
 
@@ -131,7 +131,6 @@ class Evidence:
     records: Sequence[FittedRecord]
     uncertainty: UncertaintyAnalysis | None
     validation: Sequence[Comparison] = ()
-    typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
     averages: RecorderAverages | None = None
     interrupted: bool = False
     pace: Pace = field(default_factory=Pace)
@@ -184,9 +183,9 @@ class Evidence:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """The free parameters of the unit, without what belongs to a record."""
-        of_records = self.residuals.of_records
-        return tuple(free.name for free in self.residuals.free if free.name not in of_records)
+        """The free parameters of the unit, without what belongs to a record, or was given."""
+        asked = self.case.free()
+        return tuple(free.name for free in self.residuals.free if free.name in asked)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -198,12 +197,28 @@ class Evidence:
         return tuple(n for n in self.own if n in profiled and not parameters[n].determined)
 
     @property
+    def vague(self) -> dict[str, str]:
+        """The parameters of the unit that are determined, but not as a setting is; how well."""
+        if self.uncertainty is None:
+            return {}
+        known, values = self.uncertainty.confidence.parameters, self.values
+        words = {name: vagueness(values[name], known[name].interval) for name in self.own}
+        return {name: text for name, text in words.items() if text}
+
+    @property
     def without_profile(self) -> tuple[str, ...]:
         """The parameters of the unit whose intervals only a profile shows, which was not run."""
         if self.uncertainty is None:
             return ()
         parameters = self.uncertainty.confidence.parameters
         return tuple(name for name in self.own if parameters[name].why == NEEDS_PROFILE)
+
+
+class Trial(NamedTuple):
+    """The end of a trial: its cost, and every value by name."""
+
+    cost: float
+    values: Mapping[str, float]
 
 
 class Suspicion(NamedTuple):
@@ -227,12 +242,18 @@ def likelihood(evidence: Evidence, cost: float, numbers: int = 0) -> float:
 
 
 def suspected(
-    evidence: Evidence, cost: float, numbers: int, cause: Cause, prior: float = 0.0
+    evidence: Evidence, trial: Trial | float, numbers: int, cause: Cause, prior: float = 0.0
 ) -> Iterator[Suspicion]:
-    """Yield a cause if the ``cost`` with it is so much lower that it is worth naming.
+    """Yield a cause if the cost of its ``trial`` is so much lower that it is worth naming.
 
-    ``prior`` is the logarithm of how much likelier it is than others, before any record.
+    With a trial by linear theory, its cost, nothing is known of the values with it. ``prior`` is
+    the logarithm of how much likelier it is than others, before any record.
     """
+    if isinstance(trial, Trial):
+        cost = trial.cost
+        cause = cause._replace(values={name: trial.values[name] for name in evidence.own})
+    else:
+        cost = trial
     gained = likelihood(evidence, cost, numbers) - likelihood(evidence, evidence.cost)
     share = (evidence.cost - cost) / max(evidence.cost - evidence.noise_cost, TINY_COST)
     beyond_noise = evidence.cost > evidence.noise_cost

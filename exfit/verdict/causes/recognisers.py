@@ -18,7 +18,6 @@ from exfit.verdict.causes.unit import (
     machine_data,
     narrow_bound,
     not_ended,
-    typical_values,
     wrong_limit,
 )
 
@@ -30,7 +29,6 @@ WITHOUT_TRIAL: Mapping[str, Recogniser] = {
     "drift": drift,
     "level of vt": wrong_voltage,
     "rest before the step": unsteady_record,
-    "typical values": typical_values,
 }
 BY_TRIAL: Mapping[str, Recogniser] = {
     "sign of the step": wrong_sign,

@@ -13,7 +13,7 @@ from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.uncertainty import slices
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.util.arrays import Array, median, median_step
 from exfit.verdict.causes.evidence import (
     CERTAIN,
@@ -202,7 +202,7 @@ def averaging(evidence: Evidence) -> Iterator[Suspicion]:
                 f"{after}",
                 f"averaged: {window:.3g} on its channels{found}",
             )
-            yield from suspected(evidence, trial.cost, 1 + len(opened), cause)
+            yield from suspected(evidence, trial, 1 + len(opened), cause)
 
 
 def _likeliest_window(

@@ -8,7 +8,7 @@ import numpy as np
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.simulation.inputs import InputStep
 from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, suspected
 from exfit.verdict.causes.trials import (
@@ -79,7 +79,7 @@ def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
             correct_step(found),
         )
         prior = -RARE if change < USUAL_CHANGE else 0.0
-        yield from suspected(evidence, trial.cost, len(opened), cause, prior)
+        yield from suspected(evidence, trial, len(opened), cause, prior)
 
 
 def correct_step(sizes: Sequence[float]) -> str:
@@ -124,7 +124,7 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
                 f"{delay_found(delay + late, FARTHEST_DELAY)}; phasors and powers may be "
                 "filtered differently",
             )
-        yield from suspected(evidence, trial.cost, 1, cause)
+        yield from suspected(evidence, trial, 1, cause)
 
 
 def _detected_delay(record: FittedRecord) -> float:
@@ -170,7 +170,7 @@ def further_step(evidence: Evidence) -> Iterator[Suspicion]:
                 f"{trial.values['cause.step']:+.2g} pu at {trial.values['cause.at']:.4g} s",
                 "add it under vref, or end the record before it: window",
             )
-            yield from suspected(evidence, trial.cost, 2, cause)
+            yield from suspected(evidence, trial, 2, cause)
 
 
 def _likeliest_instant(

@@ -1,6 +1,6 @@
 """One thing more left open, by a fit or in the linear model: what would match the record."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import inf
 from typing import NamedTuple
@@ -15,10 +15,10 @@ from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.util.arrays import Array, Mask
 from exfit.util.text import yaml_number
-from exfit.verdict.causes.evidence import Evidence, Suspicion, suspected
+from exfit.verdict.causes.evidence import Evidence, Suspicion, Trial, suspected
 
 MOST_ITERATIONS = 25  # of each phase: to compare causes, not to print digits
 AT_NOISE = 1.2  # times the cost of the noise: a descent that ends so low needs no other
@@ -44,13 +44,6 @@ class Opened(NamedTuple):
     def within(cls, nuisance: Nuisance, start: float, factor: float) -> "Opened":
         """Leave open what may be wrong by a factor."""
         return cls(nuisance, start, *sorted((start / factor, start * factor)))
-
-
-class Trial(NamedTuple):
-    """The end of a trial: its cost, and every value by name."""
-
-    cost: float
-    values: Mapping[str, float]
 
 
 def with_experiment(residuals: Residuals, number: int, experiment: Experiment) -> Residuals:
@@ -124,7 +117,7 @@ def tried(
 ) -> Iterator[Suspicion]:
     """Suspect a cause, if the record is matched better by other residuals."""
     if trial := refitted(evidence, residuals):
-        yield from suspected(evidence, trial.cost, numbers, cause)
+        yield from suspected(evidence, trial, numbers, cause)
 
 
 class Explained(NamedTuple):

@@ -11,13 +11,11 @@ from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import MACHINE
-from exfit.results.influences import DEVIATION, first_of, moved_parameters
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.simulation.limits import Extreme, extremes
 from exfit.util.text import dotted, listed
 from exfit.verdict.causes.evidence import (
     CERTAIN,
-    LAST,
     Evidence,
     Suspicion,
     likelihood,
@@ -104,7 +102,7 @@ def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> It
     cause = Cause(f"the {part}: {listed(pairs)} would match", remedy_of(evidence.case, starts))
     ratios = [log(start / fixed[name]) for name, start in starts.items()]
     prior = -0.5 * sum((ratio / USUAL_ERROR) ** 2 for ratio in ratios) - rare
-    yield from suspected(evidence, trial.cost, len(names), cause, prior)
+    yield from suspected(evidence, trial, len(names), cause, prior)
 
 
 def of_machine(names: Sequence[str]) -> bool:
@@ -173,7 +171,7 @@ def _other_limit(evidence: Evidence, extreme: Extreme) -> Iterator[Suspicion]:
             text = f"a limit that the case does not have: {name} {value:.3g} would match"
             text += f" (given {given:g})"
         cause = Cause(text, f"check {name} in the data sheet and the settings")
-        yield from suspected(evidence, trial.cost, 1, cause)
+        yield from suspected(evidence, trial, 1, cause)
 
 
 def narrow_bound(evidence: Evidence) -> Iterator[Suspicion]:
@@ -198,7 +196,7 @@ def narrow_bound(evidence: Evidence) -> Iterator[Suspicion]:
             f"the bounds: {listed(held)}; beyond, {listed(values)} would match",
             "widen the bounds where the data sheet allows it",
         )
-        yield from suspected(evidence, trial.cost, len(sides), cause)
+        yield from suspected(evidence, trial, len(sides), cause)
 
 
 def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
@@ -224,18 +222,3 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
         "compare others: exfit rank CASE --models A,B",
     )
     return [*suspicions, Suspicion(cause, own)]
-
-
-def typical_values(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the typical values that the parameters of the unit rest on."""
-    names = [*evidence.typical_values]
-    if not names:
-        return
-    first = evidence.typical_values[names[0]]
-    moved = moved_parameters(first, evidence.values)
-    cause = Cause(
-        f"{first_of(names)} {'is' if len(names) == 1 else 'are'} typical: if {names[0]} "
-        f"({first.value:g}) were {100.0 * DEVIATION:g} % off, it would change {moved}",
-        "give the unit's own values, and say under sources where they come from",
-    )
-    yield Suspicion(cause, LAST)

@@ -12,6 +12,7 @@ def event(**changes):
     channels = {"vt": "vt", "angle": "a", "p": "p", "q": "q"}
     return {
         "model": "SEXS",
+        "given": "exact",
         "plant": {"type": "grid-playback", "machine": "GENROU", "network": {"f0": 60}},
         "record": {"file": "x.csv", "time": "t", "channels": {**channels, **changes}},
     }

@@ -33,6 +33,7 @@ SAME_COST = 1e-3  # the minimum of a program with its own integration
 def case(record, plant, folder="."):
     content = {
         "model": "SEXS",
+        "given": "exact",
         "plant": plant,
         "test": BUMP,
         "record": {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}},
@@ -53,6 +54,7 @@ def external(record, *arguments, **changes):
 def record():
     native = {
         "model": "SEXS",
+        "given": "exact",
         "plant": {"type": "open-circuit", **PLANT},
         "test": {**BUMP, "duration": 6.0},
         "simulation": {"output_step": 0.04},

@@ -46,6 +46,7 @@ def record():
 def case(record, plant, folder="."):
     content = {
         "model": "SEXS",
+        "given": "exact",
         "plant": plant,
         "test": BUMP,
         "record": {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}},

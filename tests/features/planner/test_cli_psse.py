@@ -284,6 +284,7 @@ def fitted_ac8b(results):
 def of_value(value):
     """Return an entry of a fitted parameter."""
     others = {"at_bound": None, "of_record": False, "std_error": None, "interval": None}
+    others |= {"noise_interval": None, "given_error": None}
     texts = {"interval_method": None, "why": None, "unit": "", "meaning": "", "physical": True}
     return {"value": value, "start": 1.0, "min": 0.0, "max": 1e9, **others, **texts}
 
@@ -404,14 +405,26 @@ def test_values_that_no_one_gave_are_named(run, fitted):
     assert "// ESAC1A: not stated: TB TC" in out
 
 
-def test_typical_values_that_matter_are_named(run, fitted):
-    moves = {"value": 1.0, "shifts": {"KA": 30.0, "TE": 0.1}, "matters_to": {"KA": 2.0}}
-    named(fitted, typical_values={"KE": moves, "SE1": {**moves, "matters_to": {}}})
+def test_given_values_without_a_source_that_an_interval_rests_on_are_named(run, fitted):
+    content = result_of(fitted)
+    ka = content["parameters"]["KA"] | {
+        "interval": [300.0, 400.0],
+        "noise_interval": [340.0, 360.0],
+    }
+    shifts = dict.fromkeys(content["parameters"], 0.0)
+    content["knowledge"]["given_errors"] = {
+        name: {"std_error": 0.1, "shifts": shifts | {"KA": shift}}
+        for name, shift in (("SE1", 30.0), ("SE2", 0.1), ("machine.Tpd0", 20.0))
+    }
+    content["parameters"]["KA"], content["sources"]["machine.Tpd0"] = ka, "measured"
+    named(fitted, **content)
+    said = "the interval of KA rests on data that nobody measured: SE1 (not stated)"
     _, out, err = run("export", fitted)
-    assert "fitted values depend on typical values: KE\n" in err
-    assert "// fitted values depend on typical values: KE." in out.splitlines()
-    named(fitted, typical_values={"KE": {**moves, "shifts": {"K": 1.0}}})
-    assert "typical_values: what they move are not the parameters" in run("export", fitted)[2]
+    assert f"{said}\n" in err
+    assert f"// {said}." in out.splitlines()
+    content["knowledge"]["given_errors"]["SE1"]["shifts"] = {"K": 1.0}
+    named(fitted, **content)
+    assert "given_errors: what they move are not the parameters" in run("export", fitted)[2]
 
 
 def with_limiter(folder, model, name, place=None, **changes):

@@ -12,7 +12,8 @@ from scipy.stats import binom
 from tiers import few_of
 
 from exfit.inference.confidence import LEVEL
-from exfit.workflows.case_search import STAGES, SearchState, in_turn
+from exfit.workflows.case_search import STAGES
+from exfit.workflows.search_state import SearchState, in_turn
 
 RECORDS = 8
 LEAST = binom.ppf(1e-3, RECORDS, LEVEL)  # fewer hold the truth in one of a thousand such tests

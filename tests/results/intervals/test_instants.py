@@ -9,7 +9,8 @@ from exfit.results.intervals.determination import (
     intervals_near,
     minima_between_samples,
 )
-from exfit.workflows.case_search import STAGES, SearchState, in_turn
+from exfit.workflows.case_search import STAGES
+from exfit.workflows.search_state import SearchState, in_turn
 
 NAME, INSTANT = "st6b_instant", "vref.at"
 

@@ -13,7 +13,8 @@ from exfit.case.load import parse_case
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import problem_of, residuals_of
 from exfit.results.intervals.samples_at_steps import without_contradicting_samples
-from exfit.workflows.case_search import STAGES, WEIGHTED, SearchState, in_turn, samples_at_steps
+from exfit.workflows.case_search import STAGES, WEIGHTED, samples_at_steps
+from exfit.workflows.search_state import SearchState, in_turn
 
 TIME = np.arange(0.0, 6.0, 0.01)
 SAMPLE = 2.0  # s: an instant of these

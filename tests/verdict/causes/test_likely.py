@@ -1,6 +1,6 @@
 """Which causes are worth a line."""
 
-from exfit.results.verdict import Cause
+from exfit.results.cause import Cause
 from exfit.verdict.causes import FAR_LESS_LIKELY, Suspicion, likely
 from exfit.verdict.causes.evidence import CERTAIN, LAST
 
