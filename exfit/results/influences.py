@@ -8,7 +8,7 @@ from exfit.inference.confidence import closed
 from exfit.results.cause import Cause
 from exfit.results.verdict import REJECTED
 from exfit.util.text import digits, listed, rounded_value
-from exfit.util.vocabulary import NOT_STATED, UNSTATED
+from exfit.util.vocabulary import UNSTATED
 
 if TYPE_CHECKING:
     from exfit.fitting.uncertainty import GivenError
@@ -40,7 +40,7 @@ def resting_on(
         if high - low < WIDENED * (outer - inner):
             continue
         weighty = [n for n in shares if shares[n] > WEIGHTY * sum(shares.values())]
-        unstated = [n for n in weighty if sources.get(n, NOT_STATED) in UNSTATED]
+        unstated = [n for n in weighty if sources.get(n) in UNSTATED]
         if unstated:
             resting[name] = tuple(sorted(unstated, key=lambda value: -shares[value]))
     return resting

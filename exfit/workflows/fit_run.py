@@ -306,7 +306,8 @@ def _analysed(
         if uncertainty is not None:
             at = problem, best.x, names_of_records(fine)
             uncertainty = allowing_for_bias(uncertainty, *at)
-            errors = errors_of_values(case, problem, best.x, uncertainty.confidence.noise)
+            noises = uncertainty.confidence.noise
+            errors = errors_of_values(case, problem, best.x, noises, fine)
             windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
             analysis.windows = windows
             uncertainty = allowing_for(errors, with_spread(uncertainty, windows), *at)

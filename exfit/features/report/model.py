@@ -29,7 +29,7 @@ from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import SheetRow
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.validation_result import Reported
-from exfit.util.vocabulary import NOT_STATED, ORIGIN_OF_CRITERIA, UNSTATED, Criteria
+from exfit.util.vocabulary import ORIGIN_OF_CRITERIA, UNSTATED, Criteria
 
 Row = tuple[Cell, ...]
 
@@ -181,7 +181,7 @@ def _given_values(result: FitResult) -> Iterator[Block]:
         if most is None:
             continue
         moved = f"{most} by {number(error.shifts[most], 2)} {own[most].unit}".rstrip()
-        source = result.sources.get(name, NOT_STATED)
+        source = result.sources.get(name, "the record at rest")
         mark: Mark = "doubt" if source in UNSTATED else ""
         rows.append((Cell(name, mark), Cell(number(error.std_error, 2)), Cell(source), Cell(moved)))
     if rows:

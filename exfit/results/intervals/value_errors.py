@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import hypot
+from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
+from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.nuisances import Nuisance, prefix_from
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
@@ -22,7 +24,8 @@ from exfit.fitting.uncertainty import (
     spread_of,
 )
 from exfit.inference.confidence import NORMAL, UNDETERMINED, Uncertainty, closed
-from exfit.inference.noise import Noise
+from exfit.inference.noise import Noise, effective_samples
+from exfit.plants import VT0
 from exfit.results.influences import first_of
 from exfit.results.intervals.determination import without_linear_intervals
 from exfit.util.arrays import Array
@@ -43,9 +46,16 @@ class ErrorsOfValues(NamedTuple):
 
 
 def errors_of_values(
-    case: Case, problem: FitProblem, theta: Array, noises: Sequence[Noise]
+    case: Case,
+    problem: FitProblem,
+    theta: Array,
+    noises: Sequence[Noise],
+    setups: Sequence[ExperimentSetup] = (),
 ) -> ErrorsOfValues:
     """Estimate what standard errors of given values move at the minimum theta (N,).
+
+    So do those of the voltages that tests start from, where these are means of their records
+    (``setups``).
 
     The values are known beforehand to their standard errors S, and by the records, whose errors
     have the standard deviation of the ``noises`` of the channels. To first order the residuals r of
@@ -58,9 +68,11 @@ def errors_of_values(
     residuals = problem.compressed
     std_errors = given_std_errors(case)
     std_errors = {name: std_errors[name] for name in std_errors if name in residuals.fixed}
+    levels = _with_levels_open(residuals, () if case.kind.plays_back else setups)
+    std_errors |= levels[1]
     if not std_errors:
         return ErrorsOfValues({}, {})
-    influence = influence_of_values(residuals, theta, std_errors, bounds_hold=False)
+    influence = influence_of_values(levels[0], theta, std_errors, bounds_hold=False)
     if influence is None:
         return ErrorsOfValues({}, {}, tuple(std_errors))
     of_priors = np.full(len(residuals.priors), residuals.noise)
@@ -199,6 +211,24 @@ def widened_by(
     return wider._replace(interval=(moved(low, -1.0), moved(high, 1.0)))
 
 
+def _with_levels_open(
+    residuals: Residuals, setups: Sequence[ExperimentSetup]
+) -> tuple[Residuals, dict[str, float]]:
+    """Leave open the voltages that are means of records at rest; return their standard errors."""
+    experiments, std_errors = [*residuals.experiments], dict[str, float]()
+    for number, setup in enumerate(setups):
+        experiment, test, vt = experiments[number], setup.test, setup.record.signals.get("vt")
+        if test.vt0 is not None or vt is None or VT0 not in experiment.own:
+            continue
+        rest = vt[(setup.record.time < (inf if test.steady is None else test.steady))]
+        rest = rest[np.isfinite(rest)]
+        if len(rest) > 1 and np.ptp(rest) > 0.0:
+            level = Nuisance(f"{prefix_from(setup.name)}{VT0}", "vt0")
+            experiments[number] = replace(experiment, nuisances=(*experiment.nuisances, level))
+            std_errors[level.name] = float(np.std(rest)) / sqrt(effective_samples(rest))
+    return replace(residuals, experiments=experiments, counter=None), std_errors
+
+
 class Influence(NamedTuple):
     """What K values do at a minimum: to the N parameters, in their units, and to the residuals.
 
@@ -222,7 +252,13 @@ def influence_of_values(
 
     Source: the implicit function theorem on the gradient, with the Gauss-Newton matrix.
     """
-    given = {name: residuals.fixed[name] for name in deviations}
+    levels = {
+        own.name: each.own[VT0]
+        for each in residuals.experiments
+        for own in each.nuisances
+        if own.name in deviations
+    }
+    given = {name: levels.get(name, residuals.fixed.get(name, 0.0)) for name in deviations}
     added = [
         FreeParameter(name, value or deviations[name], -np.inf, np.inf, logarithmic=False)
         for name, value in given.items()
