@@ -38,6 +38,7 @@ from exfit.results.intervals.value_errors import (
 )
 from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FitResult, FittedParameter, Iteration
+from exfit.results.verdict import Verdict
 from exfit.util.vocabulary import Criteria
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.causes.evidence import time_for_causes
@@ -129,10 +130,7 @@ def fit_result(
         pace=pace,
     )
     verdict = verdict_of(evidence)
-    if uncertainty is not None and verdict.matches and not verdict.explained:
-        for cause in verdict.causes[:MOST_CAUSES]:
-            uncertainty = holding(uncertainty, residuals, values, cause.values, "causes")
-        analysis.uncertainty = uncertainty
+    uncertainty = analysis.uncertainty = _holding_causes(uncertainty, residuals, values, verdict)
     noted = [*minima_notes(residuals, found, minima, uncertainty)]
     if uncertainty is not None and verdict.no_interval:
         uncertainty = analysis.uncertainty = uncertainty.without_intervals(verdict.no_interval)
@@ -200,6 +198,17 @@ def fit_result(
         criteria=Criteria(**dict(case.report.criteria)),
         other_program=other_program_of(case, program, simulated),
     )
+
+
+def _holding_causes(
+    uncertainty: UncertaintyAnalysis | None, residuals: Residuals, values: Values, verdict: Verdict
+) -> UncertaintyAnalysis | None:
+    """Return intervals that hold the values of likely causes where residuals are no noise."""
+    if uncertainty is None or verdict.explained or not verdict.matches:
+        return uncertainty
+    for cause in verdict.causes[:MOST_CAUSES]:
+        uncertainty = holding(uncertainty, residuals, values, cause.values, "causes")
+    return uncertainty
 
 
 @dataclass
