@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from textwrap import wrap
 from types import MappingProxyType
@@ -121,6 +122,7 @@ def with_sources(
     }
 
 
+@cache
 def plain_text(name: str) -> str:
     """Write a text in YAML, in quotes where it would be read as something else."""
     # three dots end a document of YAML
