@@ -13,6 +13,7 @@ from loose_records import SWAPPED, loose, sound
 from tiers import few_of
 
 from exfit.case.load import parse_case
+from exfit.case.stated_values import taken_apart
 from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
 from exfit.features.planner.buses import Bus
@@ -127,7 +128,8 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
     text = "".join(loose(*one, random, bus=7, machine_id="G1") for one in records)
     case = imported_case(read_unit(text, "unit.dyr", 7, "g1"), "unit.dyr").text
     assert max(map(len, case.splitlines())) <= 100
-    mine, theirs = read_yaml(case, Path("case.yaml"))[0].value, yaml.safe_load(case)
+    read = read_yaml(case, Path("case.yaml"))[0].value, yaml.safe_load(case)
+    mine, theirs = (taken_apart(content).content for content in read)
     places = {"machine": ("plant", "parameters"), "exciter": ("parameters", "fixed")}
     places["limiter"] = ("limiters", 0, "parameters")
     for one, values in records:
