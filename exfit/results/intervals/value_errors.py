@@ -31,6 +31,7 @@ from exfit.results.intervals.determination import without_linear_intervals
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
+NEGLIGIBLE = 1e-3  # of what all values move: one that moves less, as a limit that does not act
 UNSEEN = 1e-9  # of the largest singular value: rounding
 
 
@@ -88,7 +89,7 @@ def errors_of_values(
     given = {
         name: GivenError(std_error, dict(zip(names, column.tolist(), strict=True)))
         for (name, std_error), column in zip(std_errors.items(), left.T, strict=True)
-        if column.any()
+        if np.any(np.abs(column) > NEGLIGIBLE * together)
     }
     return ErrorsOfValues(given, dict(zip(names, together.tolist(), strict=True)))
 
