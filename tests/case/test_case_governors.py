@@ -120,7 +120,7 @@ def test_a_governor_is_found_from_a_grid_event_of_another_simulator(tmp_path):
     path, header = tmp_path / "record.csv", "t,vt,angle,p,q"
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
     (tmp_path / "case.yaml").write_text(EVENT)
-    result = fit(tmp_path / "case.yaml", search="local")
+    result = fit(tmp_path / "case.yaml", search="local", given="exact")
     truth = {"machine.H": 4.471, "governor.R": 0.05, "governor.T1": 0.4, "governor.T2": 2.1}
     for name, value in truth.items():
         parameter = result.parameters[name]

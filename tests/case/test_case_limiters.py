@@ -31,6 +31,7 @@ FREE = (
     ("duration: 8.0, ", ""),
 )
 RECORD = """\
+given: exact
 record: {file: record.csv, time: t, channels: {vt: vt, efd: efd, ifd: ifd}}
 parameters: {free: {KA: {start: 170.0, min: 50.0, max: 400.0}}}
 estimate: {search: local}

@@ -251,7 +251,8 @@ def suspected(
     """
     if isinstance(trial, Trial):
         cost = trial.cost
-        cause = cause._replace(values={name: trial.values[name] for name in evidence.own})
+        own = {name: trial.values[name] for name in evidence.own if name in trial.values}
+        cause = cause._replace(values=own)
     else:
         cost = trial
     gained = likelihood(evidence, cost, numbers) - likelihood(evidence, evidence.cost)

@@ -133,7 +133,7 @@ def test_governor_regulator_and_inertia_are_found_in_one_event_of_another_simula
     content["estimate"] = {"search": "local"}
     path = tmp_path / "case.yaml"
     path.write_text(yaml.safe_dump(content))
-    found = fit(path).parameters
+    found = fit(path, given="exact").parameters
     truth = {"KPR": 80.0, "KIR": 5.0, "TE": 1.2, "machine.H": 4.471}
     truth |= {"governor.R": 0.05, "governor.T1": 0.4, "governor.T3": 7.0}
     assert {name: found[name].value for name in truth} == pytest.approx(truth, rel=3e-3)

@@ -172,6 +172,7 @@ def without_twin(record, arguments=(), **changes):
     command = [sys.executable, str(PROGRAM), *arguments]
     own = {"type": "external", "command": command, "names": {"K": "K_A", "T": "machine.Tpd0"}}
     content = {
+        "given": "exact",
         "plant": {**own, "parallel": 1 if arguments else 2, "time_limit": 20.0},
         "test": BUMP,
         "record": {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}},

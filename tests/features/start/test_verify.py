@@ -44,16 +44,15 @@ def test_one_command_leads_from_a_record_to_a_report_whose_intervals_hold_the_tr
     """No file is edited, and each value is given once."""
     ran = run("verify", SAMPLES / "field_record.csv", "--answers", ANSWERS, "-o", "report.html")
     assert ran.code == 0, ran.err
-    *_, verdict, last = ran.out.splitlines()
-    assert verdict.startswith("verdict: good: ")
-    assert last == "report: report.html"
+    assert "\nverdict: matches, not all determined: 1 of 7 parameters is not determined" in ran.out
+    assert ran.out.splitlines()[-1] == "report: report.html"
     parameters = result_in(empty_folder / "runs" / "field_record-fit")["parameters"]
     missed = [
         symbol
         for symbol, truth in TRUTH.items()
-        if not parameters[symbol]["interval"][0] <= truth <= parameters[symbol]["interval"][1]
+        if (own := parameters[symbol]["interval"]) is None or not own[0] <= truth <= own[1]
     ]
-    assert missed == []
+    assert missed == ["KD"]  # the maker's saturation leaves it open
     page = (empty_folder / "report.html").read_text(encoding="utf-8")
     assert "N. N." in page
 
