@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "plants"))
 
 from test_andes import UNITS, in_a_dip, read, unit_of
-from two_buses import TwoBuses, cases, reference
+from two_buses import case_of, cases, reference
 
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
@@ -44,18 +44,23 @@ def widened(values, exciter):
 
 
 def compared(name):
-    """Return the models of a case of a program, its difference in vt, and whether limits act."""
+    """Return the models of a case of a program, its difference, and whether limits act.
+
+    The difference is that of vt, or where the program shows none that of the rotor's angle.
+    """
     told, rows = reference(name)
-    times, case = [row["t"] for row in rows], TwoBuses(told)
-    got = [row["vt"] for row in case.shown(times)]
+    times, case = [row["t"] for row in rows], case_of(told)
+    signal = "vt" if "vt" in rows[0] else "degrees"
+    got = [row[signal] for row in case.shown(times)]
     wide = widened(case.values, case.unit.exciter.name)
-    free = [row["vt"] for row in TwoBuses(told, **wide).shown(times)]
-    apart = max(abs(ours - row["vt"]) for ours, row in zip(got, rows, strict=True))
+    free = [row[signal] for row in case_of(told, **wide).shown(times)]
+    apart = max(abs(ours - row[signal]) for ours, row in zip(got, rows, strict=True))
     acts = max(abs(a - b) for a, b in zip(got, free, strict=True)) > ACTS
     models = models_of(case.unit)
     if "machine" in told:  # its exciter holds the field voltage
         models.remove(case.unit.exciter.name)
-    return models, f"{told['program']} {told['version']}", apart, acts
+    unit = "" if signal == "vt" else "°"
+    return models, (f"{told['program']} {told['version']}", unit), apart, acts
 
 
 def table():
@@ -68,18 +73,18 @@ def table():
     for name in UNITS:
         apart, _ = in_a_dip(name)
         for model in models_of(unit_of(read(f"andes_load_{name}")[0])[0]):
-            found[model].append(["ANDES 2.0.0", float(apart["vt"]), False])
-    yield "| model | program | curves | vt differs by, pu | limits act |"
+            found[model].append([("ANDES 2.0.0", ""), float(apart["vt"]), False])
+    yield "| model | program | curves | vt differs by, pu, or the rotor's angle, ° | limits act |"
     yield "|---|---|---|---|---|"
     without = []
     for model in sorted(name for catalogue in CATALOGUES for name in catalogue):
         programs = defaultdict(list)
         for program, *row in found[model]:
             programs[program].append(row)
-        for program, rows in programs.items():
+        for (program, unit), rows in programs.items():
             worst = max(apart for apart, _ in rows)
             acts = "yes" if any(acts for _, acts in rows) else "no"
-            yield f"| {model} | {program} | {len(rows)} | {worst:.1e} | {acts} |"
+            yield f"| {model} | {program} | {len(rows)} | {worst:.1e}{unit} | {acts} |"
         without += [] if programs else [model]
     yield ""
     yield f"No curve on load: {', '.join(without)}. Those rest on diagrams and second typings."

@@ -53,7 +53,9 @@ class TwoBuses:
     """The unit of a case, with the values that its records are imported as, or some changed."""
 
     def __init__(self, told, **changes):
-        records = told["records"] if "machine" in told else [MACHINE_RECORD, *told["records"]]
+        records = told["records"]
+        if "GEN" not in records[0]:
+            records = [MACHINE_RECORD, *records]
         parts = read_unit("\n".join(records), "case.dyr")
         values = {**parts.exciter.values, **prefixed(MACHINE, parts.machine.values)}
         dialect = {"PowerWorld": "powerworld", "PSS/E": "psse"}[told["program"]]
@@ -84,6 +86,8 @@ class TwoBuses:
             load = {"YP": LOAD[0] / square, "YQ": -LOAD[1] / square}
         self.values = values | prefixed(NETWORK, network | load) | {VT0: 1.0} | changes
         self.load, self.pulse, self.boost = frozenset(load), told.get("vref"), told.get("boost")
+        boosted, disturbed = self.boost is not None, not self.pulse
+        self.moved = ("vref", *(["vs"] if boosted else []), *(["fault_B"] if disturbed else []))
 
     def inputs(self, end):
         """Return what moves the unit: a fault or a pulse, and the boost that fades."""
@@ -96,29 +100,125 @@ class TwoBuses:
         within = (times >= FAULT[0]) & (times < FAULT[1])  # vt is 1 - VCUTOFF at most then
         return Inputs(0.0, end, steps, {"vs": RecordedInput(times, np.where(within, 0.0, fading))})
 
-    def shown(self, times):
-        """Return what the unit shows at some instants."""
-        unit, inputs = self.unit, self.inputs(max(times) + STEP)
-        moved = ("vref", "vs") if self.boost else ("vref",)
-        system = infinite_bus(
+    @property
+    def system(self):
+        """The unit in its network."""
+        unit = self.unit
+        return infinite_bus(
             unit.exciter,
             unit.machine,
             unit.saturation,
-            moved if self.pulse else (*moved, "fault_B"),
+            self.moved,
             "Q",
             unit.stabiliser,
             unit.dialect,
             unit.governor,
             load=self.load,
         )
-        simulator = Simulator(system, inputs, np.array(times, dtype=float), STEP)
+
+    def shown(self, times):
+        """Return what the unit shows at some instants."""
+        inputs = self.inputs(max(times) + STEP)
+        simulator = Simulator(self.system, inputs, np.array(times, dtype=float), STEP)
         signals = simulator.response(self.values).signals
         return [{name: x[k] for name, x in signals.items()} for k in range(len(times))]
 
 
-def differences(name, signals, **changes):
+class BehindALine(TwoBuses):
+    """A unit behind a line to a stiff source, as PSS/E ran it in steps of 5 ms.
+
+    At 1 s its reference rises to what the case says, or a line opens: that from bus 1, stiff, to
+    bus 2, with the unit, of three equal ones that also join them to bus 3, which has a load of
+    constant admittance. The unit then sees another source.
+    """
+
+    AT, STEP = 1.0, 0.005  # s
+    P, Q, V2, V3, LOAD = 1.0, -0.03247, 1.02, 0.99341, 2.5 + 0.3j  # of the .raw, as the next line
+    Y, Z1 = 1.0 / (0.01 + 0.12j), 1e-5j  # of a line; of the source at bus 1
+
+    def __init__(self, told, **changes):
+        super().__init__(told)
+        self.load = frozenset()
+        network = {"f0": 60.0, "R": 0.0, "Ra": 0.0, "Rc": 0.0, "Xc": 0.0}
+        if "raised" in told:
+            self.values |= prefixed(NETWORK, network | told["network"]) | changes
+            self.angles, self.moved = (0.0, 0.0), ("vref",)
+            before = self.system.rest(self.values).setpoints["vref"]
+            self.moves = {"vref": told["raised"] - before}
+            return
+        before, after = self.sources()
+        network |= {"P": self.P, "Q": self.Q, "R": before["R"], "X": before["X"]}
+        self.values |= prefixed(NETWORK, network) | {VT0: self.V2} | changes
+        self.values["K"] = 1e-5  # below the sheet's 0.01, with which efd moves by 5e-4
+        self.moves = {name: after[name] - before[name] for name in before}
+        self.angles, self.moved = (before["angle"], after["angle"]), ("vref", *self.moves)
+
+    def sources(self):
+        """Yield E, its angle to bus 1, R and X that bus 2 sees, before the line opens and then."""
+        load = np.conj(self.LOAD) / self.V3**2
+        current = (self.P - 1j * self.Q) / self.V2 - 2.0 * self.Y * self.V2
+        joined = [[-self.Y, -self.Y], [-self.Y, 2.0 * self.Y + load]]
+        v1, v3 = np.linalg.solve(joined, [current, self.Y * self.V2])
+        stiff = (v1 / self.Z1 + self.Y * (2.0 * v1 - self.V2 - v3)) * abs(v1) / v1
+        for between in (self.Y, 0.0):
+            admittances = [
+                [1.0 / self.Z1 + between + self.Y, -between, -self.Y],
+                [-between, between + self.Y, -self.Y],
+                [-self.Y, -self.Y, 2.0 * self.Y + load],
+            ]
+            seen = np.linalg.inv(admittances)[1]
+            e, z = seen[0] * stiff, seen[1]
+            yield {"E": abs(e), "angle": np.angle(e), "R": z.real, "X": z.imag}
+
+    def inputs(self, end):
+        """Return what moves the unit."""
+        moves = self.moves.items()
+        return Inputs(0.0, end, tuple(InputStep(self.AT, size, name) for name, size in moves))
+
+    def with_degrees(self, t, signals):
+        """Return signals with the angle of the rotor to bus 1, in degrees."""
+        return {**signals, "degrees": np.degrees(signals["delta"] + self.angles[t > self.AT])}
+
+    def shown(self, times):
+        """Return what the unit shows at some instants."""
+        return [self.with_degrees(*row) for row in zip(times, super().shown(times), strict=True)]
+
+    def repeated(self, times):
+        """Return the same in the program's own steps: x + h (3 f - f of the step before) / 2.
+
+        At the switching f is the mean of before and behind it.
+        """
+        system, h, shown = self.system, self.STEP, []
+        at, instants = round(self.AT / h), [round(t / h) for t in times]
+        states, setpoints = system.rest(self.values)
+        still, moved = dict.fromkeys(self.moved, 0.0), {"vref": 0.0, **self.moves}
+        last = None
+        for k in range(max(instants) + 1):
+            motions = [
+                system.motion(self.values, setpoints, states, inputs)
+                for inputs in ([still] if k < at else [still, moved] if k == at else [moved])
+            ]
+            slopes = {x: sum(m.slopes[x] for m in motions) / len(motions) for x in states}
+            if k in instants:
+                shown.append(self.with_degrees(k * h, motions[0].outputs))
+            last = last or slopes
+            states = {x: states[x] + h * (1.5 * slopes[x] - 0.5 * last[x]) for x in states}
+            for x, (low, high) in motions[0].limits.items():
+                states[x] = min(max(states[x], low), high)
+            last = slopes
+        return shown
+
+
+def case_of(told, **changes):
+    """Return the unit of a case in its network, some values changed."""
+    line = "raised" in told or "line" in told
+    return BehindALine(told, **changes) if line else TwoBuses(told, **changes)
+
+
+def differences(name, signals, shown=None, **changes):
     """Return the largest differences from a reference's signals, with some values changed."""
     told, rows = reference(name)
-    got = TwoBuses(told, **changes).shown([row["t"] for row in rows])
+    case, times = case_of(told, **changes), [row["t"] for row in rows]
+    got = case.shown(times) if shown is None else shown(case, times)
     pairs = list(zip(got, rows, strict=True))
     return {s: max(abs(ours[s] - theirs[s]) for ours, theirs in pairs) for s in signals}
