@@ -214,8 +214,8 @@ class Inputs:
 
     def level(self, signal: str, at: float) -> float:
         """Return the sum of an input's exact steps at an instant; each counts when complete."""
-        made = (c.step for c in self.steps if c.signal == signal and not c.smooth and c.end <= at)
-        return sum(made, start=0.0)
+        _, _, ends, sizes = self._changes(signal)
+        return sum(sizes[ends <= at].tolist(), start=0.0)
 
     def input(self, signal: str, part: GridSegment) -> Array:
         """Return an input at the grid points (n + 1,) of a segment."""
@@ -225,11 +225,27 @@ class Inputs:
     def stepped(self, signal: str, part: GridSegment) -> Array:
         """Sum of the steps and ramps of an input."""
         u = np.full(part.steps + 1, self.level(signal, part.start))
-        for change in self.steps:
-            rising = change.at <= part.start < change.end
-            if change.signal == signal and (change.smooth or rising):
-                u += change.step * change.share(part)
+        changes, starts, ends, _ = self._changes(signal)
+        for k in np.flatnonzero((starts <= part.start) & (part.start < ends)):
+            u += changes[k].step * changes[k].share(part)
         return u
+
+    def _changes(self, signal: str) -> tuple[list[InputStep], Array, Array, Array]:
+        """Steps of an input, from when to when each moves its segment (s), and its size.
+
+        A smooth one may move any segment, and is in no level.
+        """
+        if signal not in self._known:  # a table of an angle has hundreds, and as many segments
+            own = [change for change in self.steps if change.signal == signal]
+            smooth = np.array([change.smooth for change in own], dtype=np.bool_)
+            starts, ends, sizes = np.array([(c.at, c.end, c.step) for c in own]).reshape(-1, 3).T
+            starts, ends = np.where(smooth, -np.inf, starts), np.where(smooth, np.inf, ends)
+            self._known[signal] = own, starts, ends, sizes
+        return self._known[signal]
+
+    @cached_property
+    def _known(self) -> dict[str, tuple[list[InputStep], Array, Array, Array]]:
+        return {}
 
     def moves(self, signal: str) -> list["InputMove"]:
         """Return the moves of an input in order: what follows without a pause is one."""
