@@ -15,7 +15,7 @@ from exfit.fitting.nuisances import OF_SYSTEM, Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.records.record import Record
 from exfit.simulation.inputs import Direction, InputStep
-from exfit.simulation.simulator import Response, Simulator
+from exfit.simulation.simulator import LARGEST_STEP, Response, Simulator
 from exfit.util.arrays import Array
 
 if TYPE_CHECKING:
@@ -192,6 +192,16 @@ class Experiment:
         )
         # moved back: what the values shift must not be shifted twice
         return replace(self, simulator=simulator.with_inputs(steps, delay))
+
+    def coarse(self) -> "Experiment":
+        """Return it with the longest steps: for what is small, of which they err by a small share.
+
+        It stays as it is on a literal grid, and where another program simulates.
+        """
+        own = self.simulator
+        if not own.located or own.step >= LARGEST_STEP or own.responder is not None:
+            return self
+        return replace(self, simulator=own.remade(step=LARGEST_STEP, least=1, rough=True))
 
     # ---- what is simulated, as a recorder shows it
 

@@ -25,7 +25,6 @@ DRAWN = 8  # times the starts that are taken
 MERGED = 3.0  # standard errors: first legs that end so near go on as one; 480 linear ones did
 LINEAR_ITERATIONS = 40  # with 25 of them one start in fifty ends elsewhere
 COARSENESS = 5  # times the step: it moves minima by 0.2 standard errors at most in sample cases
-LOCATED_STEP = 0.01  # s: the least of a search where crossings of limits are located
 COARSE_ITERATIONS = 50  # where limits make the cost creep from kink to kink
 NEAR = 1e-3  # of the cost: what the next leg gains in an iteration or two
 NEAR_STEP = 1e-6  # units
@@ -126,11 +125,12 @@ def coarse_form(residuals: Residuals) -> Residuals:
     """
     values, experiments = residuals.values(residuals.start), list[Experiment]()
     for experiment in residuals.experiments:
-        own = experiment.simulator
-        step = LOCATED_STEP if own.located else COARSENESS * own.step
-        coarse = own if step <= own.step else own.remade(step=step, least=1, rough=True)
+        own, coarse = experiment.simulator, experiment.coarse()
+        if not own.located:
+            longer = own.remade(step=COARSENESS * own.step, least=1, rough=True)
+            coarse = replace(experiment, simulator=longer)
         try:
-            experiments.append(replace(experiment, simulator=coarse).with_enough_substeps(values))
+            experiments.append(coarse.with_enough_substeps(values))
         except SimulationError:
             experiments.append(experiment)
     return replace(residuals, experiments=experiments)

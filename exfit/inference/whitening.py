@@ -134,4 +134,4 @@ def _in_time(carried: Array, order: Rows) -> tuple[Array, Rows]:
     nothing = ROUNDING * max(np.max(carried, initial=0.0), -np.min(carried, initial=0.0))
     begun = np.argmax((carried > nothing) | (carried < -nothing), axis=0)
     in_turn = np.argsort(begun, kind="stable")
-    return carried[:, in_turn], begun[in_turn]
+    return np.take(carried, in_turn, axis=1), begun[in_turn]

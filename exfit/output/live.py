@@ -36,7 +36,7 @@ OTHER_LINES = 6  # beside the history: title, what is hidden, two of names, prog
 PLOT_HEIGHTS = (20, 14)  # lines of a plot beside the history and below it
 PLOT_WIDTH = 100  # characters at most
 SHARE_OF_TIME = 0.03  # of the time of a fit: so much may be spent on showing it
-QUIET = 5.0  # s: after so long without a line one says that the fit goes on
+QUIET = 4.0  # s: after so long without a line one says that the fit goes on
 STAGES = {
     "screening": ("screening", "points"),
     "refining": ("search", "further starts"),

@@ -1,9 +1,9 @@
 """From parameter values to a response: the start at rest, the sub-steps, the samples."""
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 ComplexArray = NDArray[np.complex128]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
+Answer = TypeVar("Answer")
 
 POINTS_ALONG = 100  # of a response, where its sub-steps are checked
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
@@ -47,6 +48,7 @@ MOST_STATES = 20
 LARGEST_GROWTH = 35.0  # logarithm: of a rounding of 1e-16 to about 1 pu
 SAFE = 0.5  # of the accuracy: parameters move in a fit
 READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
+MOST_KEPT = 1 << 21  # numbers: 16 MB
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
 
@@ -67,6 +69,15 @@ class Response(NamedTuple):
     time: Array
     signals: Mapping[str, Array]
     substeps: int
+
+
+class Kept(NamedTuple):
+    """Outputs (M, ny) of one parameter set, and their derivatives (M, ny, N) by directions."""
+
+    asked: tuple[tuple[str, ...], tuple[float, ...]]
+    directions: tuple[Direction, ...]
+    samples: Array
+    slopes: Array
 
 
 class Responder(Protocol):
@@ -126,6 +137,8 @@ class Simulator:
         self.accuracy = accuracy
         self._share = 1.0  # of the inputs
         self._course: tuple[tuple[int, int], LocatedCourse] | None = None
+        self._kept: Kept | None = None
+        self._answers: dict[str, tuple[object, Any]] = {}
         self._located = LocatedTest(system.inputs, inputs, step, 1.0) if located else None
         # of a run with located crossings, the points at which it is read as a whole
         self._grid = (
@@ -156,9 +169,25 @@ class Simulator:
             return sum(map(len, self._located.grids))
         return sum(segment.steps for segment in self._grid)
 
+    def _copied(self) -> "Simulator":
+        result = copy(self)
+        result._kept, result._answers = None, {}
+        return result
+
+    def _answer(self, what: str, asked: object, find: Callable[[], Answer]) -> Answer:
+        """Return the last answer where the same is asked again, as at the end of a search."""
+        known = self._answers.get(what)
+        if known is None or known[0] != asked:
+            known = self._answers[what] = asked, find()
+        answer: Answer = known[1]
+        return answer
+
+    def _of_system(self, values: Values) -> tuple[float, ...]:
+        return tuple(values[name] for name in self.system.parameters)
+
     def with_responder(self, responder: Responder | None) -> "Simulator":
         """Make the simulator of the same test whose response another gives, or the equations."""
-        result = copy(self)
+        result = self._copied()
         result.responder = responder
         return result
 
@@ -168,11 +197,13 @@ class Simulator:
         The instant of a smooth step may be another, and the size of any. It costs little: the grid
         and the sub-steps found so far are shared. Raises ValueError where a step is another.
         """
+        if steps == self.inputs.steps and delay == self.delay:
+            return self
         if [_fixed(change) for change in steps] != [_fixed(change) for change in self.inputs.steps]:
             raise ValueError("only the sizes of steps and the times of smooth ones may change")
         pairs = zip(steps, self.inputs.steps, strict=True)
         changed = {new.signal for new, old in pairs if new != old}
-        result = copy(self)
+        result = self._copied()
         result.inputs, result.delay = replace(self.inputs, steps=steps), delay
         if result._located is not None:
             if changed:
@@ -214,7 +245,7 @@ class Simulator:
 
     def at_times(self, times: Array) -> "Simulator":
         """Return the simulator of the same run that is sampled at other times (M,) in s."""
-        result = copy(self)
+        result = self._copied()
         result.times, result._sampling = times, result._sampling_of(times)
         return result
 
@@ -320,9 +351,14 @@ class Simulator:
         that, but where the rest is so unstable that rounding alone would. Raises SimulationError
         where that response does not stay finite.
         """
+        asked = signals, self._of_system(values)
+        return self._answer("fine", asked, lambda: self._fine(values, signals)) or self
+
+    def _fine(self, values: Values, signals: tuple[str, ...] | None) -> "Simulator | None":
+        """Find the simulator with sub-steps enough, None where it is this one."""
         simulator = self._with_substeps(values)
         if self.accuracy is None or self.growth(values) > LARGEST_GROWTH:
-            return simulator
+            return None if simulator is self else simulator
         judged = signals or tuple(name for name in OF_STEP if name in self.system.outputs)
         while simulator.step > SHORTEST_STEP:
             errors = simulator.step_errors(values, judged or self.system.outputs, relative=True)
@@ -334,7 +370,7 @@ class Simulator:
             finer = max((s for s in STEPS if s <= share * simulator.step), default=SHORTEST_STEP)
             finer_one = simulator.remade(step=finer, least=1).with_responder(self.responder)
             simulator = finer_one._with_substeps(values)
-        return simulator
+        return None if simulator is self else simulator
 
     def growth(self, values: Values) -> float:
         """Logarithm by which a deviation from the rest grows within the test, 0 at a stable rest.
@@ -364,24 +400,24 @@ class Simulator:
         many more samples shows no more. Beside a smooth jump of what is recorded the step itself is
         another there.
         """
-        if self.located:
-            return self._changes(self.remade(), values, outputs, relative)
-        times = distinct(np.concatenate([segment.times for segment in self._grid]))
-        for change in self.inputs.steps:
-            if change.smooth and change.signal not in REFERENCES:
-                times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
-        return self._changes(self.remade(times=times, delay=0.0), values, outputs, relative)
+        asked = outputs, self._of_system(values)
+        moved, sizes = self._answer("halved", asked, lambda: self._halved(values, outputs))
+        errors = moved / np.maximum(sizes, 1.0) if relative else moved
+        return dict(zip(outputs, map(float, errors), strict=True))
 
-    @staticmethod
-    def _changes(
-        coarse: "Simulator", values: Values, outputs: tuple[str, ...], relative: bool
-    ) -> dict[str, float]:
+    def _halved(self, values: Values, outputs: tuple[str, ...]) -> tuple[Array, Array]:
+        """Largest change of outputs (ny,) by halving every step, and their largest value."""
+        coarse = self.remade()
+        if not self.located:
+            times = distinct(np.concatenate([segment.times for segment in self._grid]))
+            for change in self.inputs.steps:
+                if change.smooth and change.signal not in REFERENCES:
+                    times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
+            coarse = self.remade(times=times, delay=0.0)
         samples, parts = coarse.samples(values, outputs)
         finer = coarse.remade(step=coarse.step / 2.0, least=parts)
         moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
-        if relative:
-            moved /= np.maximum(np.max(np.abs(samples), axis=0), 1.0)
-        return dict(zip(outputs, map(float, moved), strict=True))
+        return moved, np.max(np.abs(samples), axis=0)
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
         """Simulate the outputs (those of the responder by default) at the sample times."""
@@ -524,14 +560,22 @@ class Simulator:
     ) -> tuple[Array, Array]:
         """Return outputs (M, ny) and their exact derivatives (M, ny, directions).
 
-        A direction costs the same whatever moves in it; one of the delay alone costs nothing.
-        Raises SimulationError as ``substeps``, and ValueError where a direction moves the instant
-        of a step that is not smooth.
+        A direction costs the same whatever moves in it; one of the delay alone costs nothing. The
+        last ones are kept: much is made of those at the end of a search. Raises SimulationError as
+        ``substeps``, and ValueError where a direction moves the instant of a step that is not
+        smooth.
         """
-        samples, slopes, parts = self.tangents_of_many([values], outputs, [directions])
-        if parts[0] == NO_SUBSTEPS:
-            self.substeps(values)
-        return samples[0], slopes[0]
+        asked = outputs, self._of_system(values)
+        kept = self._kept
+        if kept is None or kept.asked != asked or any(d not in kept.directions for d in directions):
+            samples, slopes, parts = self.tangents_of_many([values], outputs, [directions])
+            if parts[0] == NO_SUBSTEPS:
+                self.substeps(values)
+            if self.responder is not None or slopes.size > MOST_KEPT:
+                return samples[0], slopes[0]
+            kept = self._kept = Kept(asked, tuple(directions), samples[0], slopes[0])
+        places = [kept.directions.index(direction) for direction in directions]
+        return kept.samples.copy(), np.take(kept.slopes, places, axis=-1)
 
     def tangents_of_many(
         self,

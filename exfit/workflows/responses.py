@@ -1,6 +1,7 @@
 """The responses to values: beside records, after each iteration, at rest, before the test."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise, takewhile
 from math import isnan, nan
@@ -149,6 +150,7 @@ def with_iteration_responses(
     """Return the comparison of a setup with the responses of the iterations that led to it.
 
     Iterations without a finite response are left out. A record of more than MOST_SAMPLES has none.
+    The steps are longer than those of the fit, by which no figure differs.
     """
     if not history or len(comparison.time) > MOST_SAMPLES:
         return comparison
@@ -162,7 +164,11 @@ def with_iteration_responses(
     signal = comparison.judged_by
     place = setup.experiment.signals.index(signal)
     channel = setup.channels[place]
-    samples, _ = setup.experiment.samples_of_many(sets)
+    experiment, coarse = setup.experiment, setup.experiment.coarse()
+    if coarse is not experiment:
+        with suppress(SimulationError):
+            experiment = coarse.with_enough_substeps(sets[-1])
+    samples, _ = experiment.samples_of_many(sets)
     responses = [compared(channel, own[:, place]) for own in samples]
     finite = [bool(np.isfinite(response[channel.kept]).all()) for response in responses]
     if not any(finite):

@@ -256,6 +256,24 @@ def test_tangents_are_exact_with_a_smooth_ramp_and_an_exact_one(model):
     assert_exact(simulator, lively_values(model), directions)
 
 
+def test_derivatives_asked_again_are_the_same_whatever_was_made_of_the_first():
+    """Of fewer directions too; and those of other values, outputs or inputs are their own."""
+    values, (first, second) = lively_values("AC1A"), each(("KA", "TE"))
+    simulator = Simulator(system_of("AC1A"), UP, CLOCK, 1e-3)
+    expected = [array.copy() for array in simulator.tangents(values, ("vt",), (first, second))]
+    for array in simulator.tangents(values, ("vt",), (first, second)):
+        array *= 2.0
+    samples, slopes = simulator.tangents(values, ("vt",), (second,))
+    assert np.array_equal(samples, expected[0])
+    assert np.array_equal(slopes[..., 0], expected[1][..., 1])
+    for other, at, outputs in (
+        (simulator, values | {"KA": 1.01 * values["KA"]}, ("vt",)),
+        (simulator, values, ("efd",)),
+        (simulator.with_inputs(simulator.inputs.steps, 0.1), values, ("vt",)),
+    ):
+        assert not np.array_equal(other.tangents(at, outputs, (second,))[1], slopes)
+
+
 def test_a_direction_that_moves_several_parameters_is_the_sum_of_theirs():
     values, names = lively_values("AC1A"), ("KA", "TE", "machine.Tpd0")
     simulator = Simulator(system_of("AC1A"), UP, CLOCK, 1e-3)

@@ -28,7 +28,6 @@ from exfit.dsp.sampling import sampling_of
 from exfit.estimate import LocalMinimum, Progress, Stop
 from exfit.fitting.descents import descent_near, stopped
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
-from exfit.fitting.further_starts import LOCATED_STEP
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
@@ -97,7 +96,7 @@ def propagated_noise(
     The response to noise is that of the simulation, linear in it, about the values. A ``rough`` one
     is much the same all along the record.
     """
-    experiment = coarse(setup.experiment)
+    experiment = setup.experiment.coarse()
     by_rest = rest_noise(setup, experiment, values)
     columns = list[Array]()
     for signal, deviation in noise_of_inputs(experiment.with_inputs(values)).items():
@@ -120,14 +119,6 @@ def propagated_noise(
         own.append(variance)
         first += channel.size
     return PropagatedNoise(np.concatenate(own), np.hstack(columns))
-
-
-def coarse(experiment: Experiment) -> Experiment:
-    """Return an experiment with longer steps: of what is small their error is as small a share."""
-    own = experiment.simulator
-    if not own.located or own.step >= LOCATED_STEP:
-        return experiment
-    return replace(experiment, simulator=own.remade(step=LOCATED_STEP, least=1, rough=True))
 
 
 def responses_to_samples(
@@ -316,7 +307,7 @@ def whitened(
         times = [np.flatnonzero(channel.kept) for channel in setup.experiment.channels]
         in_time = np.argsort(np.concatenate(times), kind="stable")
         white = whitening(each, in_time, scale, ROUGH_ROWS if rough else ROWS_BEFORE)
-        own = coarse(setup.experiment) if rough else setup.experiment
+        own = setup.experiment.coarse() if rough else setup.experiment
         experiments.append(replace(own, whitening=white))
     return replace(residuals, experiments=experiments)
 
@@ -330,7 +321,8 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     generator = np.random.default_rng(SEED)
     values, moves = residuals.values(theta), residuals.moves(theta)
     gradient, jacobians = np.zeros(len(theta)), []
-    for experiment in map(coarse, residuals.experiments):
+    for whole in residuals.experiments:
+        experiment = whole.coarse()
         simulator = experiment.with_inputs(values)
         errors, own = experiment.tangents(values, moves)
         jacobians.append(own)
