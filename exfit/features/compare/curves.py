@@ -92,6 +92,8 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
     check_finite(time, label, table.place)
     check_increasing(time, label, table.place, may_repeat=True)
     last = np.append(np.diff(time) > 0.0, True)  # of times that repeat, what holds from then on
+    for column, samples in columns.items():
+        check_finite(np.nan_to_num(samples), column, table.place)
     signals = {signal: columns[column][last] for signal, column in places.items()}
     return Curve(name, path, table.sha256, time[last], signals, table.names, int(np.sum(~last)))
 
