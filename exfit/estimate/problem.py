@@ -310,7 +310,6 @@ STATUS = {
     Stop.UNCONFIRMED: -7,
     Stop.LOST: -8,
 }
-AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)  # that the caller named
 
 
 class SolverIteration(NamedTuple):

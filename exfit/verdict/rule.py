@@ -66,7 +66,10 @@ def verdict_of(evidence: Evidence) -> Verdict:
     contradicted.sort(key=lambda each: -each.likelihood)
     if contradicted and good_but_for_averages:
         words, reason = MATCHES, contradicted[0].reason
-    causes = (*(each.cause for each in contradicted), *causes_of(evidence, matched))
+    of_values = tuple(each.cause for each in contradicted)
+    causes = causes_of(evidence, matched)
+    # beside a misfit a value may have moved to make up for what is wrong
+    causes = (*of_values, *causes) if matched else (*causes, *of_values)
     if words == MATCHES:
         causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)

@@ -9,6 +9,7 @@ import numpy as np
 
 from exfit import estimate
 from exfit.case.case import Case
+from exfit.case.given_errors import given_std_errors
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.channel_weights import as_fitted
@@ -43,6 +44,7 @@ LOWER_BY_TWIN = (
     "the program confirms it"
 )
 ENCLOSED = "the intervals enclose another minimum, which the record does not reject"
+BY_THE_RECORD = "given values count as exact here; the intervals of a fit allow for their errors"
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 POINTS = 5  # of a side: enough for a smooth figure
@@ -225,6 +227,8 @@ def _notes(
     if verdict.misfit:
         yield f"no parameter has an interval: {verdict.misfit}"
     yield from search_range_notes(case)
+    if given_std_errors(case):
+        yield BY_THE_RECORD
     if not best.success:
         yield f"the fit did not end at a minimum: {best.message}"
     if by_twin and profiles.lower is not None:

@@ -231,7 +231,7 @@ def section(results: Sequence[Outcome], seed: int) -> str:
         f"{LINES} lines.",
         f"* Another verdict: {'; '.join(f'{words} ({k})' for words, k in wrong.items())}.",
         f"* Not to be seen in their record: {hidden}.",
-        "* The model stands last of the causes, since no other model is tried: `exfit rank` does.",
+        "* The model stands second where the likeliest cause leaves much unexplained, else last.",
         f"* The same {len(results)} cases without their fault: {plain} good, {len(doubted)} "
         f"matches, not all determined, {len(alarms)} worse.",
         "",

@@ -8,7 +8,9 @@ FOLDER/cases.jsonl; what stands there is not done again, so that a study that wa
 on. Counted are "good" fits with an interval that misses the truth by more than its own width, the
 printed 95 % intervals that hold it, the faults whose cause stands in the first two lines, and the
 widths of intervals, where nothing is wrong, against those with exact given values. A fault counts
-as seen where the best values of the free parameters leave more than 20 of its chi-square.
+as seen where the best values of the free parameters leave more than 20 of its chi-square. With
+``--only planner`` twelve units are fitted whose planner has TC and TB off; counted are also
+intervals that miss the truth and stand in the exported record without a line about it.
 """
 
 import argparse
@@ -32,9 +34,10 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from planted_cases import Task, WrongCase, cause_line, drawn, tasks
+from planted_cases import Task, WrongCase, cause_line, drawn, planner_tasks, tasks
 
 from exfit.errors import ExfitError
+from exfit.features.planner.export import export
 from exfit.results.cause import Cause
 from exfit.results.model import FitResult
 from exfit.results.verdict import GOOD
@@ -45,7 +48,8 @@ SEEN = 20.0  # chi-square
 LINES = 2  # in which the cause should stand
 WORKERS = 2  # processes
 NICE = 10
-GROUPS = ("right", "values", "recorder", "stimulus", "model")
+PLANNER = "planner"
+GROUPS = ("right", "values", "recorder", "stimulus", "model", PLANNER)
 REFUSED = "refused"
 
 Outcome = dict[str, Any]
@@ -63,6 +67,7 @@ def outcome(task: Task) -> Outcome:
         causes = result.verdict.causes if result.verdict else ()
         found["verdict"] = result.verdict.sentence if result.verdict else ""
         found["intervals"] = intervals(result, case.truth)
+        found["silent"] = silent(result, found["intervals"]) if task.group == PLANNER else []
         if task.group == "model":
             found["seen"] = left_over(result, case)
     except ExfitError as refusal:
@@ -85,6 +90,13 @@ def left_over(result: FitResult, case: WrongCase) -> float:
     overlays = result.comparison.overlays.items()
     left = [np.nansum((overlay.error / case.noise[name]) ** 2) for name, overlay in overlays]
     return float(sum(left)) - case.chance
+
+
+def silent(result: FitResult, known: dict[str, list[float | None]]) -> list[str]:
+    """Return the intervals that miss the truth without a line in the exported record."""
+    text = export(result).text
+    missing = [name for name, each in known.items() if not holds(*each)]
+    return [name for name in missing if f"interval of {name} rests on data" not in text]
 
 
 def intervals(result: FitResult, truth: dict[str, float]) -> dict[str, list[float | None]]:
@@ -210,6 +222,7 @@ def summary(outcomes: Sequence[Outcome]) -> list[str]:
         f"of the faults that are seen; or the value that is off is fitted, and its interval holds: "
         f"{share(sum(map(is_answered, seen)), len(seen))}",
         f"width of intervals where nothing is wrong, over that with exact given values: {ratio}",
+        f"exported without a line: {sum(len(each.get('silent', ())) for each in outcomes)}",
     ]
 
 
@@ -222,17 +235,19 @@ def stored(path: Path) -> dict[str, Outcome]:
 
 
 def chosen(given: argparse.Namespace) -> list[Task]:
-    """Return the tasks that the arguments ask for: every second one of each seed."""
+    """Return the tasks that the arguments ask for: of each seed every second one."""
+    if given.only == PLANNER:
+        return planner_tasks(OPEN_SEED if given.seed is None else given.seed)[: given.cases]
     halves = [tasks(OPEN_SEED)[::2], [] if given.seed is None else tasks(given.seed)[1::2]]
-    both = [task for half in halves for task in half if given.only in (None, task.group)]
-    return both[: given.cases]
+    chosen = [[task for task in half if given.only in (None, task.group)] for half in halves]
+    return [task for half in chosen for task in half[: given.cases]]
 
 
 def arguments() -> argparse.Namespace:
     """Return the arguments of the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="where the results are, and are added")
-    parser.add_argument("--cases", type=int, help="the first of these many; all by default")
+    parser.add_argument("--cases", type=int, help="of each half the first of these many")
     parser.add_argument("--only", choices=GROUPS)
     parser.add_argument("--seed", type=int, help="of the other half, which is left out without it")
     parser.add_argument("--workers", type=int, default=WORKERS, help="processes")

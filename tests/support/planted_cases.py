@@ -43,6 +43,7 @@ from exfit.util.vocabulary import SOURCES
 
 CERTIFIED = 1e-3  # standard error of a value with a certificate, of the value
 CERTIFICATE = "certificate" if "certificate" in SOURCES else "measured"
+OFF_BY_PLANNER = (0.03, 0.14)
 OFF = ((0.02, 0.05), (0.05, 0.10), (0.10, 0.15))  # by strength: how far a given value is off
 COUNTS = (1, 2, 4)  # of given values that are off
 SETTLED = 4  # turns of the iteration by which vt follows the speed
@@ -98,6 +99,7 @@ RIVALS = {
     ),
 }  # fmt: skip
 TWO_CHANNELS = tuple(name for name, unit in UNITS.items() if len(unit.noise) > 1)
+LEAD_LAG = ("EXAC1", "ST1A", "ST3A")
 WITHOUT_SUPPLY = ("AC1A", "AC8B", "EXAC1", "REXS", "ST1A")  # vt enters as what is regulated alone
 
 
@@ -265,7 +267,7 @@ REPEATS = {"recorder": 4, "stimulus": 4, "model": 13}  # of each strength
 
 @dataclass(frozen=True)
 class Task:
-    """What is drawn: a kind (right, values or one of `KINDS`), its strength, a unit and a seed."""
+    """What is drawn: a kind (of `KINDS`, right, values, planner), its strength, a unit, a seed."""
 
     kind: str
     level: int
@@ -302,6 +304,12 @@ def tasks(seed: int) -> list[Task]:
     return [drawn[place] for place in order]
 
 
+def planner_tasks(seed: int) -> list[Task]:
+    """List twelve units whose planner has TC and TB off."""
+    units = cycle(LEAD_LAG)
+    return [Task("planner", 0, next(units), (seed, number)) for number in range(12)]
+
+
 @dataclass(frozen=True, eq=False)
 class WrongCase:
     """A drawn case: in words what is wrong, and what a cause should name.
@@ -334,11 +342,14 @@ def drawn(task: Task) -> WrongCase:
     own = deepcopy(case)
     own["test"]["vt0"] = float(rng.uniform(0.98, 1.02))
     case["test"]["vt0"] = {"start": "auto"}  # as exfit new writes it
+    del case["given"]  # exact in the other studies
     case["parameters"] = {"fixed": dict(unit.fixed), "free": free_near(unit.free, rng)}
     draft = Draft(rng, unit, noise, sampling, own, case)
     names: tuple[str, ...] = ()
     if task.kind == "values":
         names = values_off(draft, task.level)
+    elif task.kind == "planner":
+        names = planner_off(draft)
     elif task.kind == "right":
         certify(draft)
     else:
@@ -395,6 +406,20 @@ def values_off(draft: Draft, level: int) -> tuple[str, ...]:
         patterns += [rf"\b{name}\b" for name in names]
     draft.words = ", ".join(texts)
     return tuple(patterns)
+
+
+def planner_off(draft: Draft) -> tuple[str, ...]:
+    """Put TC and TB off, in a case of which all is from a planner; return patterns of names."""
+    fixed, texts = draft.case["parameters"]["fixed"], []
+    draft.case["parameters"]["sources"] = dict.fromkeys(fixed, "planner")
+    plant = draft.case["plant"]
+    plant["sources"] = dict.fromkeys(plant["parameters"], "planner")
+    for name in ("TC", "TB"):
+        factor = 1.0 + draft.sign() * draft.rng.uniform(*OFF_BY_PLANNER)
+        fixed[name] *= factor
+        texts.append(f"{name} times {factor:.3f}")
+    draft.words = ", ".join(texts)
+    return (r"\bTC\b", r"\bTB\b")
 
 
 def certify(draft: Draft) -> None:

@@ -33,7 +33,7 @@ CRITERIA = {
 }
 LOCAL = (
     "the standard errors are those of linear theory at the values of the case, for a correct "
-    "model; size and time of each step count as known"
+    "model; given values, and size and time of each step, count as known"
 )
 
 

@@ -33,7 +33,7 @@ from exfit.verdict.causes.trials import (
 )
 from exfit.verdict.run_quality import levels_at_rest, other_levels, unsteady_signals
 
-LEAST_CHANGE = 0.02  # of vt's scale: no base is wrong by less
+LEAST_CHANGE = 5e-3  # of vt's scale: the error of an instrument transformer of class 0.5
 LEAST_ERROR_OF_BASE = 1e-3  # of another channel: less is no base, and no instrument's error
 LARGEST_FACTOR = 3.0  # of a scale, about what the levels at rest say
 FARTHEST_VOLTAGE = 0.2  # pu: how far vt0 may be from the case's
@@ -58,8 +58,7 @@ def _other_scale(
     evidence: Evidence, number: int, record: FittedRecord, channel: Channel
 ) -> Iterator[Suspicion]:
     signal, place = channel.signal, f"{channel.signal}{evidence.name_of(number)}"
-    match = record.comparison
-    levels = levels_at_rest(match.time, match.overlays.get(signal), record.steady_until)
+    levels = levels_at_rest(record.comparison, signal, record.steady_until)
     factor = 1.0 if signal == "vt" or levels is None else _factor_between(*levels)
     start = channel.scale * factor
     scale = Nuisance("cause.scale", "scale", signal=signal)
@@ -72,6 +71,9 @@ def _other_scale(
         return
     starts = "" if levels is None else _starts(*levels)
     found, prior = trial.values["cause.scale"] / channel.scale, 0.0
+    # the errors of a channel are so many times those of its recorder
+    share = channel.samples / evidence.residuals.samples
+    trial = trial._replace(cost=trial.cost / abs(found) ** (2.0 * share))
     if with_voltage and levels is not None:
         before, after = ((vt - 1.0) / TESTED_AT for vt in (levels[0], trial.values["cause.vt0"]))
         prior = 0.5 * (before**2 - after**2) - RARE
@@ -117,9 +119,7 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
     for number, record, experiment, channel in evidence.channels:
         if channel.signal == "vt" or is_found(experiment, channel, "offset"):
             continue
-        match = record.comparison
-        overlay = match.overlays.get(channel.signal)
-        levels = levels_at_rest(match.time, overlay, record.steady_until)
+        levels = levels_at_rest(record.comparison, channel.signal, record.steady_until)
         start = channel.offset + (0.0 if levels is None else levels[1] - levels[0])
         offset = Nuisance("cause.offset", "offset", signal=channel.signal)
         opened = [Opened.around(offset, start, FARTHEST_OFFSET)]
@@ -224,6 +224,5 @@ def wrong_levels(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect signals that start elsewhere than their record."""
     for record in evidence.records:
         if record.steady_until is not None:
-            match = record.comparison
-            for cause in other_levels(match.time, match.overlays, record.steady_until):
+            for cause in other_levels(record.comparison, record.steady_until):
                 yield Suspicion(cause, LAST)

@@ -24,7 +24,7 @@ from exfit.verdict.causes.trials import (
 )
 
 LARGEST_FACTOR = 5.0  # of the size of a step
-LEAST_CHANGE = 0.02  # of the size of a step: no one errs by less
+LEAST_CHANGE = 5e-3  # of the size of a step
 USUAL_CHANGE = 0.05  # errors of a step's size are rarely less
 RARE = 5.0  # log-likelihood of what is rare
 FARTHEST_DELAY = 2.0  # s

@@ -54,15 +54,21 @@ def with_experiment(residuals: Residuals, number: int, experiment: Experiment) -
 
 
 def with_opened(residuals: Residuals, number: int, opened: Sequence[Opened]) -> Residuals:
-    """Return residuals that leave more open about the record of one experiment."""
+    """Return residuals that leave more open about the record of one experiment.
+
+    What is found of it already is found between these bounds instead.
+    """
     experiment = residuals.experiments[number]
-    nuisances = (*experiment.nuisances, *(each.nuisance for each in opened))
+    places = {replace(each.nuisance, name="") for each in opened}
+    again = {own.name for own in experiment.nuisances if replace(own, name="") in places}
+    kept = (own for own in experiment.nuisances if own.name not in again)
+    nuisances = (*kept, *(each.nuisance for each in opened))
     free = [
         FreeParameter(each.nuisance.name, each.start, each.low, each.high, logarithmic=False)
         for each in opened
     ]
     changed = with_experiment(residuals, number, replace(experiment, nuisances=nuisances))
-    return replace(changed, free=[*residuals.free, *free])
+    return replace(changed, free=[*(f for f in residuals.free if f.name not in again), *free])
 
 
 def with_freed(residuals: Residuals, freed: Sequence[FreeParameter]) -> Residuals:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import log, sqrt
+from math import inf, isfinite, log, sqrt
 
 import numpy as np
 
@@ -207,9 +207,10 @@ def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
 
 
 def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
-    """Return suspicions, the likeliest first, and last that of the model.
+    """Return suspicions, the likeliest first, with that of the model.
 
-    None of another one was tried: it is what is left where nothing else is wrong.
+    None of another one was tried: it stands second where the first leaves much unexplained, else
+    last.
     """
     samples = max(1, evidence.residuals.samples)
     noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
@@ -221,4 +222,6 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
         f"the model: the unit may be of another type than {evidence.case.subject}",
         "compare others: exfit rank CASE --models A,B",
     )
-    return [*suspicions, Suspicion(cause, own)]
+    compared = [each.likelihood for each in suspicions if isfinite(each.likelihood)]
+    place = 1 if max(compared, default=inf) < own else len(suspicions)
+    return [*suspicions[:place], Suspicion(cause, own), *suspicions[place:]]
