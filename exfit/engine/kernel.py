@@ -21,7 +21,7 @@ from exfit.engine.sampling import (
     address,
     function,
 )
-from exfit.engine.system import System, trace
+from exfit.engine.system import System, trace, traced_for
 from exfit.util.arrays import Array
 from exfit.util.cache import keep_private, private_cache, read_private
 
@@ -179,7 +179,7 @@ def text_of(system: System, outputs: tuple[str, ...]) -> str:
 
     It is traced anew for the IR, which is seldom written: to differentiate a trace adds to it.
     """
-    return trace(system, outputs).text
+    return traced_for(system, outputs).text
 
 
 class Kernel:

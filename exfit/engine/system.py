@@ -92,12 +92,25 @@ def trace(system: System, outputs: Sequence[str]) -> Trace:
 
 
 @cache
+def whole_trace(system: System) -> Trace:
+    """Return the trace of a system with all its outputs, to be read: nobody adds to its graph."""
+    return trace(system, system.outputs)
+
+
+def traced_for(system: System, outputs: Sequence[str]) -> Trace:
+    """Return the same trace with some of the outputs alone."""
+    whole = whole_trace(system)
+    nodes = dict(zip(system.outputs, whole.outputs, strict=True))
+    return whole._replace(outputs=tuple(nodes[name] for name in outputs))
+
+
+@cache
 def parameters_used(system: System, outputs: tuple[str, ...] | None = None) -> frozenset[str]:
     """Name parameters on which a response of the system, or of some outputs, can depend."""
-    traced = trace(system, system.outputs if outputs is None else outputs)
-    targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
+    of = traced_for(system, system.outputs if outputs is None else outputs)
+    targets = [*of.rest, *of.slopes, *of.outputs, *of.clamped]
     reached = {node.index for node in in_order(targets)}
-    pairs = zip(system.parameters, traced.p, strict=True)
+    pairs = zip(system.parameters, of.p, strict=True)
     return frozenset(name for name, node in pairs if node.index in reached)
 
 

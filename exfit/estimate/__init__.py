@@ -18,9 +18,11 @@ algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10
 Iterative methods for optimization, chapters 2 and 3.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from exfit.estimate.problem import (
+    AT_TOLERANCE,
     STATUS,
     Functions,
     OneByOne,
@@ -30,22 +32,23 @@ from exfit.estimate.problem import (
     Stop,
     half_square,
 )
-from exfit.estimate.searches import (
-    ArmijoDamping,
-    LineSearch,
-    RatioDamping,
-    Searches,
-    TrustRegion,
-    to_half,
-    to_parabola,
-)
-from exfit.estimate.solver import Descent, least_squares
-from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
 
 if TYPE_CHECKING:
     from exfit.estimate.profiling import CostProfile, LowerMinimum, ProfileEnd, profile, profiles
+    from exfit.estimate.searches import (
+        ArmijoDamping,
+        LineSearch,
+        RatioDamping,
+        Searches,
+        TrustRegion,
+        to_half,
+        to_parabola,
+    )
+    from exfit.estimate.solver import Descent, least_squares
+    from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
 
 __all__ = [
+    "AT_TOLERANCE",
     "STATUS",
     "ArmijoDamping",
     "CostProfile",
@@ -76,8 +79,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:  # what many a fit does without
-        from exfit.estimate import profiling
-
-        return getattr(profiling, name)
+    if name in __all__:  # what a check or many a fit does without
+        for place in ("searches", "solver", "starts", "profiling"):
+            module = import_module(f"{__name__}.{place}")
+            if hasattr(module, name):
+                return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -310,6 +310,7 @@ STATUS = {
     Stop.UNCONFIRMED: -7,
     Stop.LOST: -8,
 }
+AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)  # that the caller named
 
 
 class SolverIteration(NamedTuple):

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
+from exfit.estimate import (
+    AT_TOLERANCE,
+    LocalMinimum,
+    MultistartResult,
+    Result,
+    SolverIteration,
+    Stop,
+)
 from exfit.fitting.descents import Announce, following, stopped
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS
@@ -26,7 +33,6 @@ Doubt = Callable[[Result], str]  # what speaks against an end; "" where nothing 
 METHODS_OF_AUTO = ("dgn", "lm-then-dgn")
 CONFIRMED = 2  # descents that must lead to a minimum which is in doubt
 PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
-AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
 
 
 class Judge(NamedTuple):

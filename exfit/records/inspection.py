@@ -42,6 +42,7 @@ from exfit.util.text import LARGEST
 
 REFERENCE = "vref"
 BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
+ABOVE_NOISE = 5.0  # times the noise of p: then it moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,16 +114,22 @@ class Inspection:
 
     @property
     def _moved_by_grid(self) -> bool:
-        """Whether q falls as vt rises, where a step of the reference would raise both."""
-        voltage, reactive = self.channel_of("vt"), self.channel_of("q")
-        if voltage is None or reactive is None:
+        """Whether q falls as vt rises, where a step of the reference would raise both.
+
+        Nor would such a step move p more than q, as the loss of a line does.
+        """
+        voltage, active, reactive = map(self.channel_of, ("vt", "p", "q"))
+        if voltage is None or active is None or reactive is None:
             return False
         apart = max(round(BETWEEN_CHANGES / median_step(self.time)), 1)
-        of_vt, of_q = (
+        of_vt, of_p, of_q = (
             samples[apart:] - samples[:-apart]
-            for samples in (self.samples[voltage.name], self.samples[reactive.name])
+            for samples in (self.samples[each.name] for each in (voltage, active, reactive))
         )
-        return float(np.nansum(of_vt * of_q)) < 0.0
+        of_one_scale = _scale(active) == _scale(reactive)
+        least = max(np.nansum(of_q**2), len(of_p) * (ABOVE_NOISE * active.noise) ** 2)
+        swings = of_one_scale and float(np.nansum(of_p**2)) > least
+        return swings or float(np.nansum(of_vt * of_q)) < 0.0
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -187,6 +194,11 @@ class Inspection:
             "unreadable": dict(self.unreadable),
             "findings": list(self.findings),
         }
+
+
+def _scale(power: InspectedChannel) -> str:
+    """The prefix of the unit of a power: M of MW and of Mvar; pu."""
+    return (power.unit or "").removesuffix("W").removesuffix("var")
 
 
 def inspect(

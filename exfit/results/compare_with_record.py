@@ -48,15 +48,7 @@ def compare_with_record(
     at = setup.with_start_values(values)
     samples, substeps = setup.experiment.samples(at)
     first = None if start is None else setup.experiment.samples(setup.with_start_values(start))[0]
-    overlays = {
-        channel.signal: Overlay(
-            compared(channel, setup.experiment.measured(channel, at)),
-            compared(channel, samples[:, k]),
-            None if first is None else compared(channel, first[:, k]),
-            _reference(setup, at, samples[0, k]) if channel.signal == "vt" else None,
-        )
-        for k, channel in enumerate(setup.channels)
-    }
+    overlays = _overlays(setup, at, samples, first)
     errors = setup.experiment.compared(samples[None], [at])[0]
     channels = {signal: match_of(overlay) for signal, overlay in overlays.items()}
     if moves is None:
@@ -78,6 +70,27 @@ def compare_with_record(
         played=_played(setup, overlays, samples) if setup.driving else None,
         limiters=limiter_actions(*setup.experiment.at(at)),
     )
+
+
+def overlays_of(setup: ExperimentSetup, values: Values) -> dict[str, Overlay]:
+    """Return the response to the values beside the record, signal by signal, and nothing else."""
+    at = setup.with_start_values(values)
+    return _overlays(setup, at, setup.experiment.samples(at)[0])
+
+
+def _overlays(
+    setup: ExperimentSetup, at: Values, samples: Array, first: Array | None = None
+) -> dict[str, Overlay]:
+    """Lay samples (M, channels), and those of the start values, over what was measured."""
+    return {
+        channel.signal: Overlay(
+            compared(channel, setup.experiment.measured(channel, at)),
+            compared(channel, samples[:, k]),
+            None if first is None else compared(channel, first[:, k]),
+            _reference(setup, at, samples[0, k]) if channel.signal == "vt" else None,
+        )
+        for k, channel in enumerate(setup.channels)
+    }
 
 
 def _played(

@@ -11,6 +11,7 @@ import re
 import stat
 import sys
 import time
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from errno import EINVAL, EISDIR, ENOTDIR
@@ -119,7 +120,9 @@ def utf8(data: bytes, path: Path) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         byte = f"byte 0x{data[error.start]:02x}"
-        raise ExfitError(f"{path}:{line}: not UTF-8 text: {byte}") from None
+        utf_16 = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
+        remedy = "; it is UTF-16: save it as UTF-8" if utf_16 else ""
+        raise ExfitError(f"{path}:{line}: not UTF-8 text: {byte}{remedy}") from None
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """What a reader of a fit must know beside its numbers, and what is wrong before it."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 from math import inf, sqrt
 
@@ -15,7 +14,6 @@ from exfit.dsp.jumps import scatter
 from exfit.dsp.quality import noise_of
 from exfit.dsp.sampling import present_samples
 from exfit.fitting.experiment import Channel, ExperimentSetup
-from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.nuisances import prefix_from
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
@@ -23,7 +21,7 @@ from exfit.models.machines.machine import unusual_reactances
 from exfit.plants import MACHINE, REFERENCES
 from exfit.registry import parts
 from exfit.results.cause import Cause
-from exfit.results.compare_with_record import compare_with_record
+from exfit.results.compare_with_record import overlays_of
 from exfit.results.comparisons import Comparison, Overlay
 from exfit.signals import POSITIVE_AT_REST
 from exfit.util.arrays import Array, Mask
@@ -81,7 +79,7 @@ def notes(
 
 def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator[str]:
     """Note the distance from a minimum of a search that a tolerance of the case ended."""
-    if solution.stop not in AT_TOLERANCE:
+    if solution.stop not in estimate.AT_TOLERANCE:
         return
     ended = "the search ended at a tolerance of the case, not at a minimum"
     distance = distance_from_minimum(residuals, solution)
@@ -123,7 +121,7 @@ def distance_from_minimum(residuals: Residuals, solution: estimate.Result) -> fl
     where z^2 is twice the decrease that the model promises, in variances of the residuals. It is 0
     for a search that ended by itself.
     """
-    if solution.stop not in AT_TOLERANCE:
+    if solution.stop not in estimate.AT_TOLERANCE:
         return 0.0
     freedom = max(1, residuals.samples - len(solution.x))
     variance = max(2.0 * solution.cost / freedom, np.finfo(float).tiny)
@@ -255,20 +253,20 @@ def _beside_response(
     setup: ExperimentSetup, values: Values, steady: float, free_machine: bool
 ) -> Iterator[str]:
     """Warn of channels that rest or move unlike the response, or are not at rest."""
-    comparison = compare_with_record(setup, values)
+    time = setup.record.time
     given = {
         signal: overlay
-        for signal, overlay in comparison.overlays.items()
+        for signal, overlay in overlays_of(setup, values).items()
         if not any(each.rescales(signal) for each in setup.experiment.nuisances)  # left to the fit
     }
-    before = comparison.time < steady
+    before = time < steady
     against = {name: text for name, y in given.items() if (text := _against(name, y, before))}
     # where vt goes the other way, the step has the other sign, and all follow it
     yield from [against["vt"]] if "vt" in against else against.values()
     sound = {name: y for name, y in given.items() if name not in against}
     far = FAR_FROM_FREE_MACHINE if free_machine else FAR_FROM_BASE
     for cause in (
-        *other_levels(replace(comparison, overlays=sound), steady, far),
+        *other_levels(time, sound, steady, far),
         *unsteady_signals(setup.record, steady, setup.channels),
     ):
         yield f"{cause.cause}: {cause.remedy}"

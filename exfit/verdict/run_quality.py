@@ -14,7 +14,7 @@ from exfit.fitting.system import typical_values_used
 from exfit.plants import BREAKER, GOVERNOR, NETWORK, SPEED, acts_without_load
 from exfit.records.record import Record
 from exfit.results.cause import Cause
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import Comparison, Overlay
 from exfit.signals import unit_of_signal
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.limit_hits import limiter_actions
@@ -179,15 +179,16 @@ def rest_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
     if test.steady is not None and test.begin is None:
         causes = unsteady_signals(setup.record, test.steady, setup.channels)
         yield from (cause.sentence for cause in causes)
-        yield from (cause.sentence for cause in other_levels(comparison, test.steady))
+        levels = other_levels(comparison.time, comparison.overlays, test.steady)
+        yield from (cause.sentence for cause in levels)
 
 
 def other_levels(
-    comparison: Comparison, steady: float, far: float = FAR_FROM_BASE
+    time: Array, overlays: Mapping[str, Overlay], steady: float, far: float = FAR_FROM_BASE
 ) -> Iterator[Cause]:
-    """Yield the signals of a comparison that start elsewhere than their record, ``far`` off."""
-    for signal in comparison.overlays:
-        levels = None if signal == "vt" else levels_at_rest(comparison, signal, steady)
+    """Yield the signals that start elsewhere than their record over ``time`` (M,), ``far`` off."""
+    for signal, overlay in overlays.items():
+        levels = None if signal == "vt" else levels_at_rest(time, overlay, steady)
         if levels is None:
             continue
         measured, simulated = levels
@@ -199,13 +200,12 @@ def other_levels(
 
 
 def levels_at_rest(
-    comparison: Comparison, signal: str, until: float | None
+    time: Array, overlay: Overlay | None, until: float | None
 ) -> tuple[float, float] | None:
     """Levels of a signal before an instant (s), measured and simulated; None if unseen."""
-    overlay = comparison.overlays.get(signal)
     if overlay is None or until is None:
         return None
-    before = (comparison.time < until) & np.isfinite(overlay.error)
+    before = (time < until) & np.isfinite(overlay.error)
     if not before.any():
         return None
     return float(np.mean(overlay.measured[before])), float(np.mean(overlay.simulated[before]))

@@ -15,6 +15,7 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
 from exfit.signals import OF_FLAT_RUN
+from exfit.simulation.flat_run import FLAT_DRIFT, flat_drift
 from exfit.verdict.diagnostics import (
     case_warnings,
     diagram_notes,
@@ -23,7 +24,6 @@ from exfit.verdict.diagnostics import (
     search_range_notes,
 )
 from exfit.verdict.run_quality import state_of_rest_notes, typical_notes
-from exfit.workflows.responses import FLAT_DRIFT, flat_drift
 
 Values = Mapping[str, float]
 

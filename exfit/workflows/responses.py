@@ -34,9 +34,8 @@ from exfit.results.comparisons import (
 )
 from exfit.results.description import Behaviour, FlatRun, HitLimits, SmallSignalView
 from exfit.results.model import Iteration
-from exfit.simulation.inputs import Inputs
+from exfit.simulation.flat_run import FLAT_DRIFT, flat_drift
 from exfit.simulation.limits import limits_hit
-from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import small_signal
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import PHASES
@@ -45,9 +44,6 @@ from exfit.workflows.case_description import fixed_values
 Values = Mapping[str, float]
 TestWithValues = tuple[ExperimentSetup, Values]
 
-FLAT_SECONDS = 60.0
-FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
-FLAT_DRIFT = 1e-9  # pu
 MOST_RESPONSES = 40  # colours that an eye still distinguishes, and columns of a table
 MOST_SAMPLES = 20_000  # of a record, 20 s at 1 kHz: a table of 9 MB, written within a second
 NOT_NAMED = "the planner's base"  # a model as found whose case does not say where it is from
@@ -258,18 +254,6 @@ def behaviour_of(
         hits = limits_hit(*setup.experiment.at(setup.with_start_values(values)))
         limits.append(HitLimits(setup.name, hits))
     return Behaviour(tuple(flat_runs), tuple(map(_small_signal, alike.values())), tuple(limits))
-
-
-def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str]) -> float:
-    """Measure the stray of signals from their start (pu) in FLAT_SECONDS without any change.
-
-    ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
-    is no rest.
-    """
-    at_rest = Inputs(0.0, FLAT_SECONDS, ())
-    still = simulator.remade(inputs=at_rest, times=FLAT_TIMES, least=1, delay=0.0)
-    flat, _ = still.samples(values, tuple(signals))
-    return float(np.max(np.abs(flat - flat[0])))
 
 
 def _small_signal(alike: Sequence[TestWithValues]) -> SmallSignalView:

@@ -282,6 +282,14 @@ def test_texts_of_any_language_are_read_with_a_mark_at_the_beginning_or_without(
         assert read_json(path) == {"unit": "Höllental 😀"}
 
 
+@pytest.mark.parametrize("order", ["le", "be"])
+def test_a_text_in_utf_16_is_refused_with_the_remedy(tmp_path, order):
+    path = tmp_path / "file.json"
+    path.write_bytes("\ufeff{}".encode(f"utf-16-{order}"))
+    with pytest.raises(ExfitError, match=r":1: .* byte 0xf[ef]; it is UTF-16: save it as UTF-8"):
+        read_json(path)
+
+
 def test_without_a_root_a_file_lies_where_its_path_says(monkeypatch):
     monkeypatch.delenv(ROOT, raising=False)
     assert on_disk(Path("../a/../b.csv")) == Path("../a/../b.csv")

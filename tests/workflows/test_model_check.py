@@ -11,8 +11,8 @@ from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.models import MODELS
+from exfit.simulation.flat_run import flat_drift
 from exfit.workflows.model_check import AGREEMENT, STEPS, check, deviations
-from exfit.workflows.responses import flat_drift
 
 WITHOUT_RECORD = """\
 model: AC1A

@@ -74,7 +74,22 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
         raise RecordError(
             f"{path}: no column seems to be the time; --time names one: {listed(table.names)}"
         )
-    ending = MEASURED if name == RECORD else SIMULATED
+    places = _places(table, choice, MEASURED if name == RECORD else SIMULATED)
+    columns = table.numbers(places.values(), frozenset(places.values()))
+    time = table.instants(clock)
+    refuse_uneven(path, {clock[0]: time} | columns)
+    label = Clock(clock).label
+    check_finite(time, label, table.place)
+    check_increasing(time, label, table.place, may_repeat=True)
+    last = np.append(np.diff(time) > 0.0, True)  # of times that repeat, what holds from then on
+    for column, samples in columns.items():
+        check_finite(np.nan_to_num(samples), column, table.place)
+    signals = {signal: columns[column][last] for signal, column in places.items()}
+    return Curve(name, path, table.sha256, time[last], signals, table.names, int(np.sum(~last)))
+
+
+def _places(table: RecordTable, choice: ColumnChoice, ending: str) -> dict[str, str]:
+    """Return the column of each signal of a table: that chosen, or the usual one."""
     chosen = {signal: _chosen(table, names) for signal, names in choice.columns.items()}
     places = {signal: column for signal, column in chosen.items() if column is not None}
     for signal in COMPARED:
@@ -84,16 +99,9 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
     for signal, column in places.items():
         unit = table.units.get(column)
         if unit is not None and needs_base(unit):
-            raise RecordError(f"{path}: column {column!r} is in {unit}, {signal} is compared in pu")
-    columns = table.numbers(places.values(), frozenset(places.values()))
-    time = table.instants(clock)
-    refuse_uneven(path, {clock[0]: time} | columns)
-    label = Clock(clock).label
-    check_finite(time, label, table.place)
-    check_increasing(time, label, table.place, may_repeat=True)
-    last = np.append(np.diff(time) > 0.0, True)  # of times that repeat, what holds from then on
-    signals = {signal: columns[column][last] for signal, column in places.items()}
-    return Curve(name, path, table.sha256, time[last], signals, table.names, int(np.sum(~last)))
+            where = f"{table.path}: column {column!r}"
+            raise RecordError(f"{where} is in {unit}, {signal} is compared in pu")
+    return places
 
 
 def _table_of(source: Path) -> Path:

@@ -18,7 +18,7 @@ from exfit.cli.options import (
     progress_option,
     quiet_option,
 )
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def batch(
         from exfit.output.terminal import console
 
         show_batch(console(), fleet)
-    _exit(fleet)
+    _exit(fleet, quiet)
 
 
 def _observer(
@@ -201,12 +201,15 @@ def _cases_of(tables: Sequence[Path], folder: Path) -> "dict[Path, CaseMaking]":
     return made
 
 
-def _exit(fleet: "Fleet") -> None:
+def _exit(fleet: "Fleet", quiet: bool) -> None:
     rows = fleet.of_run
     done = [row for row in rows if row.status == "done"]
     if fleet.interrupted and not done:
         raise Interruption("no case is done")
-    if not fleet.interrupted and any(row.status in WITHOUT_FIT for row in rows):
+    without = [row for row in rows if row.status in WITHOUT_FIT]
+    if without and not fleet.interrupted:
+        if quiet:
+            raise FileError(f"{row.case}: {row.reason}" for row in without)
         raise SystemExit(FAILED)
     if fleet.interrupted or not all(row.holds for row in done):
         raise SystemExit(NOT_CONVERGED)

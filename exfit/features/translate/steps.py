@@ -16,7 +16,7 @@ from exfit.engine.trace import evaluate
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.models import GOVERNORS, MODELS, STABILISERS, find
-from exfit.models.machines import MACHINES
+from exfit.models.machines import find_machine
 from exfit.models.sheet import Model, typical
 from exfit.plants import (
     GOVERNOR,
@@ -218,7 +218,7 @@ def translation_task(result: FitResult, target: Model, sizes: Sequence[float]) -
 
 def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
     """Return the plants in which two models are compared: of a fit on load both."""
-    machine = MACHINES[result.machine_model or DEFAULT_MACHINE]
+    machine = find_machine(result.machine_model or DEFAULT_MACHINE)
     given = {**typical(machine.sheet), **result.machine}
     values = {MACHINE + symbol: value for symbol, value in given.items()} | {VT0: RATED_VOLTAGE}
     form = SATURATION[result.saturation]

@@ -14,10 +14,10 @@ import numpy as np
 
 from exfit import estimate
 from exfit.errors import SimulationError
-from exfit.estimate import Stop
+from exfit.estimate import AT_TOLERANCE, Stop
 from exfit.estimate.lockstep import finish_all
 from exfit.fitting.experiment import Experiment, ExperimentSetup
-from exfit.fitting.global_search import AT_TOLERANCE, SearchResult
+from exfit.fitting.global_search import SearchResult
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals

@@ -58,7 +58,8 @@ def _other_scale(
     evidence: Evidence, number: int, record: FittedRecord, channel: Channel
 ) -> Iterator[Suspicion]:
     signal, place = channel.signal, f"{channel.signal}{evidence.name_of(number)}"
-    levels = levels_at_rest(record.comparison, signal, record.steady_until)
+    match = record.comparison
+    levels = levels_at_rest(match.time, match.overlays.get(signal), record.steady_until)
     factor = 1.0 if signal == "vt" or levels is None else _factor_between(*levels)
     start = channel.scale * factor
     scale = Nuisance("cause.scale", "scale", signal=signal)
@@ -119,7 +120,9 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
     for number, record, experiment, channel in evidence.channels:
         if channel.signal == "vt" or is_found(experiment, channel, "offset"):
             continue
-        levels = levels_at_rest(record.comparison, channel.signal, record.steady_until)
+        match = record.comparison
+        overlay = match.overlays.get(channel.signal)
+        levels = levels_at_rest(match.time, overlay, record.steady_until)
         start = channel.offset + (0.0 if levels is None else levels[1] - levels[0])
         offset = Nuisance("cause.offset", "offset", signal=channel.signal)
         opened = [Opened.around(offset, start, FARTHEST_OFFSET)]
@@ -224,5 +227,6 @@ def wrong_levels(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect signals that start elsewhere than their record."""
     for record in evidence.records:
         if record.steady_until is not None:
-            for cause in other_levels(record.comparison, record.steady_until):
+            match = record.comparison
+            for cause in other_levels(match.time, match.overlays, record.steady_until):
                 yield Suspicion(cause, LAST)

@@ -566,3 +566,10 @@ def test_a_result_that_cannot_be_read_costs_its_parameters_only(fits):
     assert any(
         "A: its parameters are not shown: fit/result.json" in note for note in agreement.notes
     )
+
+
+def test_a_sample_beyond_all_measure_is_refused_with_its_place(run):
+    time = clock(0.01)
+    write("a.csv", t=time, vt=rise(time))
+    write("b.csv", t=time, vt=np.where(time == time[5], 1e308, rise(time)))
+    assert run("a.csv", "b.csv") == (1, "", "Error: b.csv:7: vt: 1e+308 exceeds 1e+100\n")

@@ -69,18 +69,20 @@ def test_a_table_with_an_angle_and_no_reference_is_an_event_too(tmp_path):
     assert not RecordSettings().inspect(write_table(tmp_path / "other.csv", columns)).is_event
 
 
-@pytest.mark.parametrize("moved_by", ["grid", "reference"])
+@pytest.mark.parametrize("moved_by", ["grid", "reference", "line"])
 def test_a_frequency_shows_an_event_where_q_falls_as_the_voltage_rises(tmp_path, moved_by):
+    """Or where p moves more than q, as behind the loss of a line, and not if a reference moves."""
     course = smooth_course()
+    less = 0.8 + (course.p - 0.8) / 3.0
     columns = {
         "t": course.time,
         "vt": course.vt,
         "frequency [Hz]": course.frequency,
-        "p": course.p,
-        "q": course.q if moved_by == "reference" else 0.3 - course.q,
+        "p": course.p if moved_by == "line" else less,
+        "q": 0.3 - course.q if moved_by == "grid" else course.q,
     }
     inspection = RecordSettings().inspect(write_table(tmp_path / "event.csv", columns))
-    assert inspection.is_event == (moved_by == "grid")
+    assert inspection.is_event == (moved_by != "reference")
 
 
 @pytest.mark.parametrize(

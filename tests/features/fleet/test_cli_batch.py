@@ -49,7 +49,9 @@ def test_a_case_without_a_fit_is_exit_code_1_and_a_poor_fit_3(run):
     case_file(Path("cases/c.yaml"), record, **poor)
     assert run("batch", "cases", "-q").code == 3
     Path("cases/d.yaml").write_text("model: SEXS\nrecord: 3\n")
-    assert run("batch", "cases", "-q").code == 1
+    code, out, err = run("batch", "cases", "-q")
+    assert (code, out) == (1, "")
+    assert "cases/d.yaml:2: record: " in err  # what is wrong is said, however quiet
     assert run("batch", "cases/a.yaml", "-q").code == 0  # the others are not of this run
     assert len(rows()) == 4
 

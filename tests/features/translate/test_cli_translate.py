@@ -67,6 +67,14 @@ def test_json_is_all_that_is_printed(run, fitted):
     assert printed.err == ""
 
 
+def test_a_result_with_a_machine_that_is_none_is_refused(run, fitted):
+    result = json.loads((Path(fitted) / "result.json").read_text())
+    Path("result.json").write_text(json.dumps({**result, "machine_model": "GENABC"}))
+    code, _, err = run("translate", "result.json", "--model", "EXAC1")
+    assert code == 1
+    assert "GENABC is not a machine model" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
