@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ SQUARINGS = 5  # of a Jacobian, to bound its spectral radius
 UNDERFLOW = 1e-200  # a smaller norm of a power may have lost all digits
 WORTH_A_BLOCK = 3  # sets that take longer one by one than a block of them together
 NO_SUBSTEPS = 0  # sub-steps of a set of values that has no response
+KEPT = 32  # answers: a Jacobian is asked for where residuals were, and by one record after another
 
 
 def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]:
@@ -34,8 +35,15 @@ def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]
     of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
     Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
     on the values alone, and a change of one sub-step moves a response by less than the
-    method's own error. NO_SUBSTEPS where the start is no rest, or beyond MOST_SUBSTEPS.
+    method's own error. NO_SUBSTEPS where the start is no rest, or beyond MOST_SUBSTEPS. The
+    answer cannot be written to: it serves all who ask the same.
     """
+    return _substeps_at_rest(system, step, p.tobytes())
+
+
+@lru_cache(KEPT)
+def _substeps_at_rest(system: System, step: float, sets: bytes) -> NDArray[np.int64]:
+    p = np.frombuffer(sets).reshape(-1, len(system.parameters))
     rest = linear_kernel(system).at_rest(p)
     lag_rate = _lag_rates(system, p)
     with np.errstate(all="ignore"):
@@ -51,6 +59,7 @@ def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]
         moves = np.any(_moving(unsure, radius), axis=1)
         required = _parts(step, np.maximum(lag_rate[~sure], radius))
         parts[~sure] = np.where(moves, NO_SUBSTEPS, required)
+    parts.flags.writeable = False
     return parts
 
 
