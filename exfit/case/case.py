@@ -61,8 +61,9 @@ class Case:
     ``given_records`` holds, by name, the records that were given as arrays instead of files,
     ``given_values`` the values of parameters that were given in place of those of the sections,
     ``given_sources`` where values that were given beside the case come from, ``given_std_errors``
-    their standard errors. ``external`` is the section of what simulates the unit in place of
-    exfit: ``plant`` is its twin then, if any, and the search local unless the case says otherwise.
+    their standard errors, ``freed`` those values of the file that are fitted, too. ``external`` is
+    the section of what simulates the unit in place of exfit: ``plant`` is its twin then, if any,
+    and the search local unless the case says otherwise.
     """
 
     path: Path
@@ -94,6 +95,7 @@ class Case:
     given_values: Mapping[str, GivenValue] = field(default_factory=dict)
     given_sources: Mapping[str, str] = field(default_factory=dict)
     given_std_errors: Mapping[str, float] = field(default_factory=dict)
+    freed: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the name, what is studied, and the free parameters, in one line."""

@@ -1,24 +1,30 @@
-"""A case file with sources and standard errors by name, written anew with these beside the values.
+"""A case file written anew: with other values, or with what is stated of values beside them.
 
-Only the values and what is stated of them change: comments, order and all else stay.
+Only these change: comments, order and all else stay.
 """
 
 import re
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 
+from exfit.case.case import Case
 from exfit.case.case_draft import LONGEST
+from exfit.case.changes import Changes, freed, part_of
+from exfit.case.load import parse_case
 from exfit.case.stated_values import FREE, GIVEN, STATED, sections_of, taken_apart
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.util.files import write
-from exfit.util.text import Place, dotted
+from exfit.util.text import Place, dotted, near
 
 COMMENT = re.compile(r"(?:^|(?<=\s))#[^\r\n]*", re.MULTILINE)
 OF_MAP = "# each is from: "  # how a comment begins that cases had above their sources
 FAR = 40  # columns: text in braces that begins further right goes on below its key
+KEY = re.compile(r"[^.\[\]]+|\[\d+\]")  # of a place such as test.vref[0].at
 
 
 class Replacement(NamedTuple):
@@ -61,6 +67,74 @@ def rewrite(path: Path) -> list[str]:
     return rewriting.moved
 
 
+def with_changes(path: Path, changes: Changes) -> str:
+    """Return the text of a case file with other values, comments and order kept.
+
+    ``changes`` has a text of YAML for each place, such as ``test.vref[0].step``, "" where it is
+    left out; what is not there is added. Beside the name of a column stands what is added to it.
+
+    Raises CaseError for a file that cannot be read as YAML, or cannot be changed so.
+    """
+    text = read_text(path)
+    top, _ = read_yaml(text, path)
+    content = top.value
+    for name, value in changes.items():
+        place = tuple(int(k[1:-1]) if k[0] == "[" else k for k in KEY.findall(name))
+        content = _changed(content, place, value)
+        rewriting = _Rewriting(text)
+        rewriting.change(place, value)
+        text = rewriting.text()
+    try:
+        same = read_yaml(text, path)[0].value == content
+    except CaseError:
+        same = False
+    if not same:
+        lines = "; ".join(f"{name}: {value or 'left out'}" for name, value in changes.items())
+        raise CaseError(f"{path}: not changed: an alias repeats it; change by hand: {lines}")
+    return text
+
+
+def with_freed(case: Case, names: Iterable[str]) -> Case:
+    """Return a case of a file whose fit finds given values, too.
+
+    Raises CaseError for names of no given value, and for a value of 0, of which no bounds follow.
+    """
+    values, faults, starts = case.values(), list[str](), dict[str, float]()
+    for name in names:
+        part = part_of(case, name)
+        if part is None:
+            faults.append(f"{name}: not a parameter; {near(name, case.rows())}")
+        elif name in case.free():
+            faults.append(f"{name}: is fitted already")
+        elif name in case.ties.by_name:
+            faults.append(f"{name}: follows {case.ties.by_name[name].text}; free what that uses")
+        elif part.free is None:
+            faults.append(f"{name}: belongs to the network, of which nothing is fitted")
+        elif not values[name]:
+            place = dotted((*part.free, name.removeprefix(part.prefix)))
+            faults.append(f"{name}: is 0: no bounds follow from it; give {place} in the case")
+        else:
+            starts[name] = values[name]
+    if faults:
+        raise CaseError(f"--free: {fault}" for fault in faults)
+    text = with_changes(case.path, freed(case, starts))
+    return replace(parse_case(text, case.path), freed=(*starts,))
+
+
+def _changed(content: Any, place: Place, value: str) -> Any:
+    """Return content with the value that a text of YAML has at a place, without it for ""."""
+    if not place:
+        return read_yaml(f"value: {value}", Path("changes"))[0].value["value"]
+    key, rest = place[0], place[1:]
+    if isinstance(key, int):
+        items = [] if content is None else [*content]
+        return [*items[:key], _changed((*items, None)[key], rest, value), *items[key + 1 :]]
+    entries = {"column": content} if isinstance(content, str) else {**(content or {})}
+    if value or (rest and key in entries):
+        return {**entries, key: _changed(entries.get(key), rest, value)}
+    return {name: entry for name, entry in entries.items() if name != key}
+
+
 class _Rewriting:
     """The edits of a text, section by section."""
 
@@ -97,6 +171,43 @@ class _Rewriting:
         for name, (_, value) in _pairs(pairs[FREE][1]).items() if FREE in pairs else ():
             if name in stated and isinstance(value, yaml.MappingNode):
                 self._free(value, ", ".join(stated[name]))
+
+    def change(self, place: Place, value: str) -> None:
+        """Put a text in the place of a value; add it where there is none, remove it for ""."""
+        node = above = self.top
+        missing = [*place]
+        while missing and (inner := _entry(node, missing[0])) is not None:
+            above, node = node, inner
+            del missing[0]
+        if value and missing:
+            self._add(node, missing, value)
+        elif value:
+            self._edit(node.start_mark.index, _end(node), value)
+        elif not missing and len(above.value) > 1:
+            self._remove(above, str(place[-1]))
+        elif not missing:
+            self._edit(above.start_mark.index, _end(above), "{}")
+
+    def _add(self, node: Any, place: list[str | int], value: str) -> None:
+        """Add a value to a node, below which its place is missing."""
+        key = place[0]
+        for inner in reversed(place[1:]):
+            value = f"[{value}]" if isinstance(inner, int) else f"{{{inner}: {value}}}"
+        entry = f"{key}: {value}" if isinstance(key, str) else value
+        if isinstance(node, yaml.ScalarNode):
+            column = self._raw(node)
+            self._edit(node.start_mark.index, _end(node), f"{{column: {column}, {entry}}}")
+        elif not node.value:
+            self._edit(node.start_mark.index + 1, node.start_mark.index + 1, entry)
+        elif node.flow_style:
+            last = _end(node.value[-1])
+            self._edit(last, last, f", {entry}")
+        else:
+            mark = "" if isinstance(key, str) else "- "
+            end = self._line_end(_end(node.value[-1]))
+            before = "" if self.before[:end].endswith("\n") else self.newline
+            indent = " " * node.start_mark.column
+            self._edit(end, end, f"{before}{indent}{mark}{entry}{self.newline}")
 
     def _raw(self, node: Any) -> str:
         return self.before[node.start_mark.index : node.end_mark.index]
@@ -187,6 +298,22 @@ def _pairs(node: Any) -> dict[str, tuple[Any, Any]]:
     if not isinstance(node, yaml.MappingNode):
         return {}
     return {key.value: (key, value) for key, value in node.value}
+
+
+def _entry(node: Any, key: str | int) -> Any:
+    """Return the value of a key, or of an index, of a node; None where it has none."""
+    if isinstance(key, str):
+        return _pairs(node).get(key, (None, None))[1]
+    items = node.value if isinstance(node, yaml.SequenceNode) else []
+    return items[key] if key < len(items) else None
+
+
+def _end(node: Any) -> int:
+    """Return where a node, or a pair of nodes, ends: in a block what follows is none of it."""
+    if isinstance(node, tuple):
+        return _end(node[1])
+    in_block = not isinstance(node, yaml.ScalarNode) and not node.flow_style and node.value
+    return _end(node.value[-1]) if in_block else int(node.end_mark.index)
 
 
 def _end_of(key: Any, value: Any) -> int:

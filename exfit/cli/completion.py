@@ -55,6 +55,18 @@ def assigned_parameters(ctx: click.Context, _: click.Parameter, incomplete: str)
     return _beginning((f"{name}=" for name in names), incomplete)
 
 
+def given_values(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
+    """Return parameters that the case names and does not fit, behind those given already."""
+    from exfit.case.peek import free_of, parameters_of
+
+    given, comma, last = incomplete.rpartition(",")
+    if (case := _case(ctx)) is None:
+        return []
+    taken = {*free_of(case), *given.split(",")}
+    names = _beginning((name for name in parameters_of(case) if name not in taken), last)
+    return [f"{given}{comma}{name}" for name in names]
+
+
 def noises(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
     """Return the signals, each ready for its noise."""
     from exfit.signals import COMPARED

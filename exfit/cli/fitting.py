@@ -15,6 +15,7 @@ from exfit.cli.options import (
     Output,
     Refusal,
     cases_argument,
+    completed,
     output_options,
     parameters_option,
     print_json,
@@ -60,6 +61,20 @@ SERIES = "fits"  # the folder of a series by default
     "error; or exact.",
 )
 @set_option
+@click.option(
+    "--free",
+    "names",
+    multiple=True,
+    metavar="TE,KD",
+    help="Given values that this fit finds, too.",
+    shell_complete=completed("given_values"),
+)
+@click.option(
+    "--apply",
+    "cause",
+    metavar="N",
+    help="Fit CASE with a cause of its last fit, by number or word, as CASE-WORD.yaml beside it.",
+)
 @parameters_option
 @click.option(
     "--watch", is_flag=True, help="Repeat the fit when the case or one of its files changes."
@@ -75,6 +90,8 @@ def fit(
     search: str | None,
     given: "GivenAs | None",
     changes: tuple[str, ...],
+    names: tuple[str, ...],
+    cause: str | None,
     parameters: Path | None,
     watch: bool,
     verbose: bool,
@@ -98,6 +115,10 @@ def fit(
     --set overrides --parameters, and both override the case: they give the start of a free
     parameter, and the value of another. The result lists the values changed.
 
+    --free fits given values within a factor of 4, such as machine.Tpd0. --apply carries out the
+    remedy of a cause that the last fit of CASE named, in runs/CASE-fit or in DIR: it writes the
+    changed case beside CASE, comments kept, and fits that one into a folder of its own.
+
     Several cases or strategies are checked first, then every case is fitted with every strategy.
     Each fit has a folder CASE-STRATEGY in runs/fits, or in DIR, where fits.csv, fits.json and
     fits.png compare them. Strategies are compared by one run from the start of each case, unless
@@ -110,14 +131,11 @@ def fit(
     """
     from exfit.output import run_folder
 
-    beside = Given(parameters, changes, given)
+    freed = tuple(name.strip() for each in names for name in each.split(","))
+    beside = Given(parameters, changes, given, freed)
     several = len(cases) > 1 or len(strategies) > 1
-    if verbose and (several or not output.shown):
-        raise click.UsageError("--verbose is for one fit, without --quiet or --json.")
-    if watch and several:
-        raise click.UsageError("--watch takes one case and one strategy.")
-    if watch and not output.shown:
-        raise click.UsageError("--watch cannot be combined with --quiet or --json.")
+    alone = {"--verbose": verbose, "--watch": watch, "--apply": cause is not None}
+    refuse_mixed([name for name, given in alone.items() if given], several, output)
     if several:
         fit_several(cases, beside, strategies, search, output)
         return
@@ -126,9 +144,25 @@ def fit(
         folder = output.folder(f"{case.stem}-fit", run_folder.OF_FIT)
         fit_again_and_again(case, beside, folder, settings, output, verbose)
         return
+    if cause is not None:
+        from exfit.cli.applying import applied
+
+        case, output = applied(case, cause, output)
     result, _ = fit_case(beside.load(case), output, settings, verbose)
     if not result.holds:
         raise SystemExit(NOT_CONVERGED)
+
+
+def refuse_mixed(alone: Sequence[str], several: bool, output: Output) -> None:
+    """Raise UsageError for options of one fit, with several fits or without what they show."""
+    if "--verbose" in alone and (several or not output.shown):
+        raise click.UsageError("--verbose is for one fit, without --quiet or --json.")
+    if "--watch" in alone and several:
+        raise click.UsageError("--watch takes one case and one strategy.")
+    if "--watch" in alone and not output.shown:
+        raise click.UsageError("--watch cannot be combined with --quiet or --json.")
+    if "--apply" in alone and (several or "--watch" in alone):
+        raise click.UsageError("--apply takes one case and one strategy, without --watch.")
 
 
 def fit_case(

@@ -38,11 +38,16 @@ parameters_option = click.option(
 )
 
 
-def _assigned(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Complete a parameter of the case; only a shell asks for it."""
-    from exfit.cli.completion import assigned_parameters
+def completed(by: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
+    """Make what completes by a function of `exfit.cli.completion`; only a shell asks for it."""
 
-    return assigned_parameters(ctx, parameter, incomplete)
+    def words(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+        from exfit.cli import completion
+
+        found: list[str] = getattr(completion, by)(ctx, parameter, incomplete)
+        return found
+
+    return words
 
 
 set_option = click.option(
@@ -51,7 +56,7 @@ set_option = click.option(
     multiple=True,
     metavar="KA=400",
     help="Value of a parameter.",
-    shell_complete=_assigned,
+    shell_complete=completed("assigned_parameters"),
 )
 ANY_PATH = click.Path(path_type=Path)
 ABOVE_ZERO = click.FloatRange(min=0.0, min_open=True)
@@ -279,12 +284,14 @@ def refuse_own_files(
 class Given(NamedTuple):
     """Values given beside a case: a file of parameters, and those of --set over it.
 
-    ``counting`` says how given values count, None: as the case says.
+    ``counting`` says how given values count, None: as the case says. The fit finds those that
+    ``freed`` names, too.
     """
 
     parameters: Path | None
     changes: tuple[str, ...]
     counting: "GivenAs | None" = None
+    freed: tuple[str, ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -302,7 +309,7 @@ class Given(NamedTuple):
     def _own(self, case: Path) -> "Case":
         path = self.parameters
         if path is None and not self.changes:
-            return load(case)
+            return self._freed(load(case))
         from exfit.workflows.given_values import (
             fitted_code,
             read_parameters,
@@ -310,11 +317,18 @@ class Given(NamedTuple):
             with_given_values,
         )
 
-        loaded = load(case, *(fitted_code(path) if path else ()))
+        loaded = self._freed(load(case, *(fitted_code(path) if path else ())))
         if path:
             values = read_parameters(loaded, path)
             loaded = with_given_values(loaded, values, path, sources_in(path))
         return with_given_values(loaded, assignments(self.changes, "--set"), "--set")
+
+    def _freed(self, case: "Case") -> "Case":
+        if not self.freed:
+            return case
+        from exfit.case.rewriting import with_freed
+
+        return with_freed(case, self.freed)
 
 
 def load(case: Path, model_sha256: str = "", program_sha256: str = "") -> "Case":

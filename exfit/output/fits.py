@@ -27,6 +27,7 @@ from exfit.output.blocks import (
     unresolved,
 )
 from exfit.output.validations import comparisons, in_a_line, played, rejections
+from exfit.results.causes_in_words import causes_in_words
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.text import listed, percentage
@@ -75,7 +76,7 @@ def _brief(
     yield from notes(result.notes[:noted])
     if noted < len(result.notes):
         yield paragraph(f"{len(result.notes) - noted} further notes", "doubt")
-    listed = [*_causes(result)]
+    listed = [*_causes(result, folder)]
     yield from listed[:causes]
     if causes < len(listed):
         yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
@@ -135,7 +136,7 @@ def whole(
     else:
         yield from played(result.comparisons)
     yield from rejections(result.validation)
-    yield from _causes(result)
+    yield from _causes(result, folder)
     if folder is not None:
         yield paragraph(written_to(folder))
     yield verdict(result)
@@ -154,10 +155,10 @@ def verdict(result: FitResult) -> Note:
     return Note(result.verdict.sentence, "verdict", "verdict:", mark)
 
 
-def _causes(result: FitResult) -> Iterator[Note]:
+def _causes(result: FitResult, folder: Path | None) -> Iterator[Note]:
     """Yield the likeliest causes, each with its remedy."""
     label = "note:" if result.verdict.verdict == GOOD else "cause:"
-    yield from remarks(label, (cause.sentence for cause in result.verdict.causes), kind="remedy")
+    yield from remarks(label, causes_in_words(result, folder), kind="remedy")
 
 
 def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:

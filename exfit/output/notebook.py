@@ -6,6 +6,7 @@ from exfit.errors import ExfitError
 from exfit.output.blocks import Block, Cell, Note, Table, columns, interval, number, row
 from exfit.output.figures import overlay
 from exfit.output.html import html
+from exfit.results.causes_in_words import causes_in_words
 from exfit.results.model import FitResult, FittedParameter
 from exfit.util.text import near, percentage
 
@@ -18,7 +19,7 @@ def fit_html(result: FitResult) -> str:
     """Write the parameters of a fit and what it leaves unresolved as HTML."""
     unresolved = () if result.knowledge is None else result.knowledge.sentences
     remarks = (
-        *(cause.sentence for cause in result.verdict.causes),
+        *causes_in_words(result),
         *(f"unresolved: {text}" for text in unresolved),
         *result.notes,
     )

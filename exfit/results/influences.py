@@ -114,7 +114,7 @@ class RecorderAverages(NamedTuple):
 
     ``chi_square`` is by how much better they match than samples of single instants; ``given`` are
     the fitted values without them, ``values`` with them; ``beyond`` are the parameters of the unit
-    that these take out of their interval.
+    that these take out of their interval; ``changes`` are those of the case.
     """
 
     window: float
@@ -122,6 +122,7 @@ class RecorderAverages(NamedTuple):
     given: Mapping[str, float]
     values: Mapping[str, float]
     beyond: tuple[str, ...]
+    changes: Mapping[str, str]
 
     @property
     def shown(self) -> bool:
@@ -150,7 +151,6 @@ class RecorderAverages(NamedTuple):
     @property
     def cause(self) -> Cause:
         """What averages would change, and what to do."""
-        window = f"{self.window:.3g}"
         names = self.beyond[:MOST_NAMED] or [*self.values][:MOST_NAMED]
         moved = ", ".join(
             f"{name} {self.values[name]:.3g} ({self.given[name]:.3g})" for name in names
@@ -162,6 +162,7 @@ class RecorderAverages(NamedTuple):
         )
         return Cause(
             f"{words}: {moved} then",
-            f"give averaged: {window} on its channels, with delay: {0.5 * self.window:.3g} if it "
-            "averages over the time before a sample; or averaged: 0 if it does not average",
+            "ask for its setting; averaged: 0 on its channels if it does not average",
+            "averaged",
+            self.changes,
         )

@@ -33,6 +33,8 @@ from exfit.util.vocabulary import TYPICAL, Criteria
 if TYPE_CHECKING:
     from exfit.output.notebook import Figure
 
+OF_PROGRAMME = "test"  # the label among the inputs of a fit that a programme makes
+
 
 NEAR = 2.0  # times a cost: below it another one is given to a thousandth
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
@@ -250,10 +252,11 @@ class FitResult:
     ``cost`` is the minimised sum, ``comparisons`` are with each record, ``knowledge`` are errors
     and intervals of the parameters, None where these are not known; ``about`` identifies unit
     and test. ``inputs`` is the SHA-256 of every file by its label,
-    ``files`` its name. ``given_values`` are those in place of the case's. ``as_found`` is
-    the model before the test, ``criteria`` are those by which a report judges;
-    ``other_program`` is what simulated the records where exfit did not; ``windows`` is T'd0
-    over windows of its records, None unless it is fitted to several steps by playback.
+    ``files`` its name. ``given_values`` are those in place of the case's, ``freed`` those of its
+    given values that were fitted, too. ``as_found`` is the model before the test, ``criteria`` are
+    those by which a report judges; ``other_program`` is what simulated the records where exfit did
+    not; ``windows`` is T'd0 over windows of its records, None unless it is fitted to several steps
+    by playback.
     ``behaviour`` and ``as_found`` are None where the fit was interrupted.
     """
 
@@ -315,6 +318,7 @@ class FitResult:
     files: Mapping[str, str] = field(default_factory=dict, metadata=IN_FILE)
     case_text: str = field(default="", metadata=IN_FILE)
     as_found: AsFound | None = field(default=None, metadata=IN_FILE)
+    freed: tuple[str, ...] = field(default=(), metadata=IN_FILE)
     criteria: Criteria = field(default_factory=Criteria, metadata=IN_FILE)
     other_program: OtherProgram | None = field(default=None, metadata=IN_FILE)
 

@@ -196,6 +196,7 @@ def other_levels(
             yield Cause(
                 f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu",
                 "check its base, and the data and power of the machine in the case",
+                signal,
             )
 
 
@@ -229,4 +230,5 @@ def unsteady_signals(record: Record, steady: float, channels: Sequence[Channel])
                 f"{signal} moves by {drift:.2g} {unit_of_signal(signal)} before {steady:g} s, "
                 "where the record should be at rest",
                 "the values that the fit starts from are uncertain",
+                signal,
             )

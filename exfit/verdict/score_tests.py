@@ -1,6 +1,7 @@
 """Whether a record contradicts what its case holds fixed: a score test of each such value."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from math import erfc, exp, hypot, log, sqrt
 from typing import NamedTuple
 
@@ -15,13 +16,12 @@ from exfit.fitting.uncertainty import slices, slopes_of, spread_of, spread_of_er
 from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.plants import REFERENCES, VT0
 from exfit.registry import parts
-from exfit.results.cause import Cause
+from exfit.results.cause import Cause, Remedy
 from exfit.results.verdict import REJECTED
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 from exfit.verdict.causes import Evidence
-from exfit.verdict.causes.channels import CHECK_BASE, LEAVE_VT0_OUT, check_zero, is_found
-from exfit.verdict.causes.steps import correct_instant, correct_step
+from exfit.verdict.causes.channels import check_zero, is_found, measured_vt0, rescaled
 from exfit.verdict.causes.trials import (
     LinearFit,
     Opened,
@@ -49,7 +49,7 @@ class Held(NamedTuple):
     """
 
     words: str = ""
-    remedy: str = ""
+    remedy: Callable[[], Remedy] = partial(Remedy, "")
     size: float = 1.0
     unit: str = ""
     rare: float = 0.0
@@ -102,7 +102,7 @@ class Contradiction(NamedTuple):
     def cause(self) -> Cause:
         """The change that would match better, with a remedy."""
         better = self.held.better(self.change)
-        return Cause(f"{self.held.words}: {better} would match better", self.held.remedy)
+        return Cause(f"{self.held.words}: {better} would match better", *self.held.remedy())
 
     @property
     def likelihood(self) -> float:
@@ -272,7 +272,7 @@ def _held_value(evidence: Evidence, names: tuple[str, ...]) -> Held:
     words = listed([f"{name} = {fixed[name]:.4g}" for name in names])
     return Held(
         words,
-        remedy_of(evidence.case, {name: fixed[name] for name in names}),
+        partial(remedy_of, evidence.case, {name: fixed[name] for name in names}),
         rare=0.0 if of_machine(names) else RARE,
         std_error=max(std_errors.get(name, 0.0) / abs(fixed[name]) for name in names),
         names=names,
@@ -296,17 +296,33 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
         if step.step and ("step", place) not in found:
             words = f"the step of {step.step:+g} pu{of_record}"
             yield (
-                Held(words, correct_step([step.step]), step.step),
+                Held(words, _of_steps(evidence, number, {place: step.step}), step.step),
                 opened("step", step.step, place),
             )
     if not kinds & {"at", "shift", "delay"} and steps:
-        remedy = correct_instant(experiment.simulator.delay)
-        held = Held(f"the time of the step{of_record}", remedy, unit="s")
+        held = Held(f"the time of the step{of_record}", _of_steps(evidence, number, {}), unit="s")
         yield held, opened("delay", experiment.simulator.delay)
     if VT0 in experiment.own and "vt0" not in kinds:
         given = evidence.records[number].given_vt0
-        voltage = Held(f"vt0 = {given:g}{of_record}", LEAVE_VT0_OUT, unit="pu") if given else Held()
+        voltage = Held()
+        if given:
+            remedy = partial(measured_vt0, evidence, number)
+            voltage = Held(f"vt0 = {given:g}{of_record}", remedy, unit="pu")
         yield voltage, opened("vt0", experiment.own[VT0])
+
+
+def _of_steps(evidence: Evidence, number: int, sizes: Mapping[int, float]) -> Callable[[], Remedy]:
+    """Make what gives the remedy for the sizes of steps, or for their time where there are none."""
+
+    def remedy() -> Remedy:
+        from exfit.verdict.causes.steps import correct_instant, correct_step
+
+        if sizes:
+            return correct_step(evidence, number, sizes)
+        delay = evidence.residuals.experiments[number].simulator.delay
+        return correct_instant(evidence, number, delay)
+
+    return remedy
 
 
 def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Array]]:
@@ -325,6 +341,14 @@ def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Arra
         constant[rows] = -channel.weight
         if not is_found(experiment, channel, "scale"):
             rare = RARE if channel.signal == "vt" else 0.0
-            yield Held(f"the base of {place}", CHECK_BASE, rare=rare), simulated
+            remedy = partial(rescaled, evidence, number, channel)
+            yield Held(f"the base of {place}", remedy, rare=rare), simulated
         if channel.signal != "vt" and not is_found(experiment, channel, "offset"):
-            yield Held(f"the zero of {place}", check_zero(channel), unit="pu"), constant
+            yield (
+                Held(
+                    f"the zero of {place}",
+                    partial(check_zero, evidence, number, channel),
+                    unit="pu",
+                ),
+                constant,
+            )

@@ -185,6 +185,7 @@ def fit_result(
         versions=versions(),
         inputs=hashes,
         verdict=verdict,
+        freed=case.freed,
         given_values=given_values(case),
         windows=analysis.windows,
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),

@@ -14,7 +14,7 @@ from exfit.errors import CaseError
 from exfit.fitting.nuisances import names_of
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
-from exfit.util.text import magnitude_fault, near
+from exfit.util.text import listed, magnitude_fault, near
 from exfit.util.vocabulary import SOURCES
 
 if TYPE_CHECKING:
@@ -245,3 +245,5 @@ def given_value_notes(case: Case) -> Iterator[str]:
         )
     for (verb, source), values in changes.items():
         yield f"the fit {verb} {', '.join(values)}, given by {source}"
+    if case.freed:
+        yield f"the fit finds {listed(case.freed)}, which the case gives, by --free"

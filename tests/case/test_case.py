@@ -286,7 +286,7 @@ def test_a_case_can_be_written_out_again():
 
 def test_a_case_has_every_section_of_the_document():
     own = {"path", "from_file", "parts", "ties", "external"}
-    own |= {"given_records", "given_values", "given_sources", "given_std_errors"}
+    own |= {"given_records", "given_values", "given_sources", "given_std_errors", "freed"}
     assert {field.name for field in fields(Case)} - own == {*CaseDocument.model_fields}
 
 

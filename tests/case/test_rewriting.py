@@ -1,11 +1,13 @@
 """Case files whose sources are moved beside their values: the same case, with all comments."""
 
+import re
+
 import pytest
 import yaml
 from places import CONFIGS
 
-from exfit.case.load import parse_case
-from exfit.case.rewriting import rewrite
+from exfit.case.load import load_case, parse_case
+from exfit.case.rewriting import rewrite, with_changes, with_freed
 from exfit.case.stated_values import taken_apart
 from exfit.case.yaml import read_yaml
 from exfit.errors import CaseError
@@ -135,3 +137,59 @@ def test_check_says_what_it_moved(tmp_path, run, monkeypatch):
     assert ran.out.startswith("case.yaml: written beside the values: parameters.sources (K)\n")
     assert "K: {value: 200, source: maker}" in (tmp_path / "case.yaml").read_text()
     assert run("check", "case.yaml", "--write").out.startswith("case.yaml: as it was\n")
+
+
+CHANGES = {
+    "plant.parameters.Tpd0": "",
+    "plant.free.Tpd0": "{start: 3.0, min: 1.0, max: 9.0}",
+    "plant.free.Xq.max": "4.0",
+    "test.vref[0].step": "-0.05",
+    "test.vref[1]": "{at: 2.0, step: 0.01}",
+    "record.channels.vt.scale": "1.1",
+    "record.mask[0]": "[1.0, 2.0]",
+    "estimate.iterations": "100",
+    "stabiliser": "",
+}
+CHANGED = (
+    ("    Tpd0: 6.0   # s, of the plate\n", "    # s, of the plate\n"),
+    ("      max: 3.0\n", "      max: 4.0\n    Tpd0: {start: 3.0, min: 1.0, max: 9.0}\n"),
+    ("step: 0.05}]", "step: -0.05}, {at: 2.0, step: 0.01}]"),
+    ("channels: {vt: V}}", "channels: {vt: {column: V, scale: 1.1}}, mask: [[1.0, 2.0]]}"),
+)
+
+
+def test_other_values_leave_comments_and_order_as_they_are(tmp_path):
+    text = f"{TEXT}record: {{file: a.csv, time: t, channels: {{vt: V}}}}   # of 2024\n"
+    path = tmp_path / "case.yaml"
+    path.write_text(text, newline="\n")
+    expected = re.sub("stabiliser: .*\n", "", text) + "estimate: {iterations: 100}\n"
+    for old, new in CHANGED:
+        assert old in expected
+        expected = expected.replace(old, new)
+    assert with_changes(path, CHANGES) == expected
+
+
+def test_the_only_value_of_a_section_leaves_it_empty(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text("parameters: {fixed: {TE: 1.0}, free: {KA: 1}}\n")
+    assert with_changes(path, {"parameters.fixed.TE": ""}) == (
+        "parameters: {fixed: {}, free: {KA: 1}}\n"
+    )
+
+
+def test_what_an_alias_repeats_is_not_changed_in_one_place(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text("a: &one {x: 1}\nb: *one\n")
+    with pytest.raises(CaseError, match=r"an alias repeats it; change by hand: b\.x: 2"):
+        with_changes(path, {"b.x": "2"})
+
+
+def test_names_that_cannot_be_freed_are_refused_all_at_once():
+    case = load_case(CONFIGS / "ac1a_good.yaml")
+    with pytest.raises(CaseError) as refused:
+        with_freed(case, ["KA", "machine.Tpdo", "TB"])
+    assert str(refused.value).splitlines() == [
+        "--free: KA: is fitted already",
+        "--free: machine.Tpdo: not a parameter; did you mean machine.Tpd0?",
+        "--free: TB: is 0: no bounds follow from it; give parameters.free.TB in the case",
+    ]

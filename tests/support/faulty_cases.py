@@ -84,7 +84,7 @@ class Kind:
 class FaultyCase:
     """A case with a fault, the same without it, and the noise of a weighted error.
 
-    ``exact`` is the faulty record before noise was added.
+    ``exact`` is the faulty record before noise was added, ``content`` that of its case.
     """
 
     kind: str
@@ -94,6 +94,7 @@ class FaultyCase:
     sound: Case
     noise: float
     exact: Signals
+    content: Content
 
 
 def wrong_model(draft: Draft) -> None:
@@ -391,6 +392,7 @@ def drawn(name: str, seed: tuple[int, ...]) -> FaultyCase:
         sound=Case.from_dict(sound, plain, name=name),
         noise=noise,
         exact=draft.cut(clock, spoilt),
+        content=draft.case,
     )
 
 

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from exfit.case.case import Case
+from exfit.case.changes import Changes, number_text
 from exfit.case.schema import Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.dsp.sampling import sampling_of
@@ -45,6 +46,7 @@ LEAST_STIFFNESS = 0.5  # pu of power a rad of angle: machines have more than one
 JUMP_AFTER_HOLD = 4.0  # times the usual change between samples
 LOST_VOLTAGE, LONGEST_LOSS = 0.05, 3  # pu, samples
 BESIDE_SPIKE, BEND = 2, 3.0  # samples; times what most bends stay below
+SCALE = "record.channels.{}.scale"  # the place of a factor
 SPIKE = 8.0  # times the noise
 LEAST_SWING = 1e-3  # pu, rms: with less in record or response nothing can be compared
 LEAST_OVER_NOISE = 4.0  # times the noise of the record: the same
@@ -75,13 +77,27 @@ STILL_UNLIKE = 0.2  # of the sizes of both: a better one is not right
 
 def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the records of grid events of faults that they show themselves."""
-    for record in evidence.records:
+    for number, record in enumerate(evidence.records):
         steady = record.steady_until
         if steady is not None:
             measured = record.setup.record
             rated = _rating(evidence.case)
             for cause in (*clock_causes(measured), *record_causes(measured, steady, rated)):
-                yield Suspicion(cause, CERTAIN)
+                changes = _of_record(evidence, number, cause.changes)
+                yield Suspicion(cause._replace(changes=changes), CERTAIN)
+
+
+def _of_record(evidence: Evidence, number: int, changes: Changes) -> Changes:
+    """Return the changes of a record of a case, which may have factors and masks already."""
+    given, own = evidence.case.recordings[number].record, dict[str, str]()
+    for place, text in changes.items():
+        signal = place.split(".")[2] if place.count(".") > 2 else ""
+        factor = getattr(given.channels.get(signal), "scale", 1.0)
+        if place == SCALE.format(signal) and isinstance(factor, float):
+            text = number_text(factor * float(text))
+        place = place.replace("mask[0]", f"mask[{len(given.mask)}]")
+        own[evidence.place(number, place)] = text
+    return own
 
 
 def _rating(case: Case) -> float:
@@ -115,13 +131,27 @@ def clock_causes(record: Record) -> Iterator[Cause]:
             f"the clock jumps from {gap.start:g} to {gap.end:g} s, about {gap.lost} samples are "
             f"missing{more}",
             "the voltage and the angle that drive the unit are unknown there: use a record "
-            "without the gap, or a window before or after it",
+            "without the gap, or its longer part",
+            "window",
+            _longer_part(record, gap.start, gap.end),
         )
     if sampling.step > SLOWEST:
         yield Cause(
             f"samples are {sampling.step:g} s apart; swings of a unit need {SLOWEST:g} s at most",
             "check the unit of the time, or export the record at 30 samples per second or more",
         )
+
+
+def _longer_part(record: Record, end: float, start: float) -> Changes:
+    """Return the change that leaves the longer part of a record, until or from an instant (s)."""
+    first, last = float(record.time[0]), float(record.time[-1])
+    begin, until = (first, end) if end - first > last - start else (start, last)
+    return {"record.window": f"[{begin:.9g}, {until:.9g}]"}
+
+
+def _median_of(name: str, lost: int = 1) -> Changes:
+    """Return the change that takes the median of a channel over more samples than are wrong."""
+    return {f"record.channels.{name}.filter": f"{{median: {2 * lost + 1}}}"}
 
 
 def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[Cause]:
@@ -134,14 +164,15 @@ def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[C
     if "vt" in level and not low <= level["vt"] <= high:
         text = f"vt rests at {level['vt']:.4g} pu, not between {low:g} and {high:g}"
         remedy = "check its unit, and its base: the rated voltage, line to line"
+        factor = 1.0 / level["vt"]
         for ratio, what in ((1.0 / ROOT, "1 / sqrt(3)"), (ROOT, "sqrt(3)")):
             if abs(level["vt"] / ratio - 1.0) < NEAR_ROOT:
-                text = f"{text}; it is about {what}"
+                text, factor = f"{text}; it is about {what}", 1.0 / ratio
                 remedy = (
                     "a voltage from phase to ground is taken for one from phase to phase, or the "
                     "reverse: check the base, or record.phasors.voltage.connection"
                 )
-        yield Cause(text, remedy)
+        yield Cause(text, remedy, "base", {SCALE.format("vt"): number_text(factor)})
     p, q = level.get("p"), level.get("q", 0.0)
     if p is None:
         return
@@ -151,6 +182,8 @@ def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[C
             f"p rests at {p:.3g} pu: a generator feeds power, p is above {MOTORING:g} pu",
             "if the channel counts power into the unit, give scale: -1 on p, and on q if the same "
             "meter measures it",
+            "polarity",
+            {SCALE.format("p"): "-1.0"},
         )
     apparent = hypot(p, q)
     if apparent > MOST_POWER:
@@ -184,6 +217,8 @@ def _held(record: Record, steady: float) -> Iterator[Cause]:
                 "jumps",
                 "the recorder held its last sample: mask that part, or use a record of the PMU "
                 "itself, not of a historian that stores changes",
+                "mask",
+                {"record.mask[0]": f"[{start:.6g}, {end:.6g}]"},
             )
 
 
@@ -221,7 +256,9 @@ def _spiky(record: Record) -> Iterator[Cause]:
         yield Cause(
             f"vt is {voltage[lost[0]]:.2g} pu at {record.time[lost[0]]:.4g} s, in {len(lost)} "
             f"of {len(voltage)} samples: below {LOST_VOLTAGE:g} pu",
-            "the measurement was lost there: correct these samples, or give a window without them",
+            "the measurement was lost there: correct these samples, or give a median filter",
+            "spikes",
+            _median_of("vt", len(lost)),
         )
     for name, samples in record.signals.items():
         present = np.isfinite(samples)
@@ -234,13 +271,16 @@ def _spiky(record: Record) -> Iterator[Cause]:
         ]
         if outlying:
             at = ", ".join(f"{t[row]:.4g}" for row in outlying[:3])
-            remedy = (
-                "it drives the unit: give a median filter on the channel, or correct these samples"
-                if name in DRIVING
-                else "outliers: 6 on the channel leaves them out"
-            )
+            remedy = "outliers: 6 on the channel leaves them out"
+            changes: Changes = {f"record.channels.{name}.outliers": "6"}
+            if name in DRIVING:
+                remedy = (
+                    "it drives the unit: give a median filter on the channel, or correct these "
+                    "samples"
+                )
+                changes = _median_of(name)
             count = "an outlier" if len(outlying) == 1 else f"{len(outlying)} outliers"
-            yield Cause(f"{name} has {count}, at {at} s", remedy)
+            yield Cause(f"{name} has {count}, at {at} s", remedy, "spikes", changes)
 
 
 def _others_bend(record: Record, name: str, at: float) -> bool:
@@ -270,8 +310,10 @@ def _jumping_angle(record: Record) -> Iterator[Cause]:
             yield Cause(
                 f"angle jumps by {size:+.2g} rad at {record.time[k + 1]:.4g} s, while p moves by "
                 f"less than {LEAST_STIFFNESS:g} pu for each rad",
-                "the clock of the PMU was set there, or the sample is wrong: give a window without "
-                "it, or correct the angle",
+                "the clock of the PMU was set there, or the sample is wrong: correct the angle, or "
+                "use the longer part",
+                "window",
+                _longer_part(record, float(record.time[k]), float(record.time[k + 1])),
             )
             return
 

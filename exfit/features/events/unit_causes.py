@@ -3,11 +3,12 @@
 Each is tried by one more fit of the record, of a unit that is otherwise in this.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from exfit.case.case import Case
+from exfit.case.changes import between, freed, number_text
 from exfit.case.parts import added_part
 from exfit.case.schema import Governor, Stabiliser
 from exfit.fitting.parameters import FreeParameter
@@ -89,7 +90,9 @@ def other_swing(evidence: Evidence) -> Iterator[Suspicion]:
     form = "standard" if own == "andes" else "andes"
     cause = Cause(
         f"the equation of the speed: dialect: {form} would match (the case has {own})",
-        f"where the record is that of a simulator in which {FORMS[form]}, write dialect: {form}",
+        f"right where the record is that of a simulator in which {FORMS[form]}",
+        form,
+        {"plant.dialect": form},
     )
     residuals = of_case(evidence, with_plant_keys(evidence.case, dialect=form))
     yield from tried(evidence, residuals, cause)
@@ -99,30 +102,36 @@ def missing_governor(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect a missing governor, by the one of two simple ones that matches better."""
     if evidence.case.parts.governor is not None:
         return
-    costs = {}
+    trials = {}
     for name, data in STAND_INS.items():
         section = Governor(model=name, parameters=data)
         governed = with_control(evidence.case, GOVERNOR, section, GOVERNORS[name])
-        freed = [
+        opened = [
             FreeParameter(f"{GOVERNOR}{symbol}", at, at / WIDE, at * WIDE, logarithmic=True)
             for symbol, at in STARTS[name].items()
         ]
-        trial = refitted(evidence, with_freed(of_case(evidence, governed), freed))
+        trial = refitted(evidence, with_freed(of_case(evidence, governed), opened))
         if trial is not None:
-            costs[name] = trial.cost
-    if not costs:
+            trials[name] = trial
+    if not trials:
         return
-    name = min(costs, key=lambda name: costs[name])
-    yield from suspected(
-        evidence,
-        costs[name],
-        len(STARTS[name]),
-        Cause(
-            f"a governor that the case lacks: P follows the speed; a {name} would match",
-            "if one was in service, add it: governor: {model: ..., parameters: {...}}",
-        ),
-        of_stand_in(evidence, costs[name]),
+    name = min(trials, key=lambda name: trials[name].cost)
+    trial = trials[name]
+    data = STAND_INS[name] | {each: trial.values[f"{GOVERNOR}{each}"] for each in STARTS[name]}
+    cause = Cause(
+        f"a governor that the case lacks: P follows the speed; a {name} would match",
+        "if one was in service, add it, by its own model if that is known",
+        "governor",
+        {"governor": f"{{model: {name}, {_parameters(data)}}}"},
     )
+    prior = of_stand_in(evidence, trial.cost)
+    yield from suspected(evidence, trial.cost, len(STARTS[name]), cause, prior)
+
+
+def _parameters(data: Mapping[str, float]) -> str:
+    """Write parameters in the form of a case."""
+    values = ", ".join(f"{name}: {number_text(value)}" for name, value in data.items())
+    return f"parameters: {{{values}}}"
 
 
 def of_stand_in(evidence: Evidence, cost: float) -> float:
@@ -148,22 +157,28 @@ def missing_stabiliser(evidence: Evidence) -> Iterator[Suspicion]:
         data = {"HLIM": NO_LIMIT, "T2_T4": 1.0, "T1_T3": 2.0}
         section = Stabiliser(model="STAB1", inputs=(heard,), parameters=data)
         other = with_control(case, STABILISER, section, STABILISERS["STAB1"])
-        freed = [
+        opened = [
             FreeParameter(gain, start, low, high, logarithmic=False),
             FreeParameter(washout, 3.0, 0.3, 30.0, logarithmic=True),
             FreeParameter(lead, 2.0, 0.1, 50.0, logarithmic=True),
         ]
 
-        if trial := refitted(evidence, with_freed(of_case(evidence, other), freed)):
+        if trial := refitted(evidence, with_freed(of_case(evidence, other), opened)):
+            of_model = {
+                name.removeprefix(STABILISER): trial.values[name] for name in (gain, washout, lead)
+            }
+            found = data | of_model
             amplification = trial.values[gain] * trial.values[washout]
             cause = Cause(
                 f"a stabiliser that the case lacks: one with input {heard} and a gain of "
                 f"{amplification:.2g} would match",
-                f"if one was in service, add it: stabiliser: {{model: ..., inputs: [{heard}], "
-                "parameters: {...}}, or give its output as channel vs",
+                "if one was in service, add it, by its own model if that is known, or give its "
+                "output as channel vs",
+                "stabiliser",
+                {"stabiliser": f"{{model: STAB1, inputs: [{heard}], {_parameters(found)}}}"},
             )
             prior = of_stand_in(evidence, trial.cost)
-            yield from suspected(evidence, trial, len(freed), cause, prior)
+            yield from suspected(evidence, trial, len(opened), cause, prior)
 
 
 def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
@@ -177,7 +192,9 @@ def idle_control(evidence: Evidence) -> Iterator[Suspicion]:
         kind = prefix.rstrip(".")
         cause = Cause(
             f"the {kind} {model.name}: the record would match without it",
-            f"was it in service? If it was not, leave out the section {kind}",
+            "was it in service?",
+            f"without-{kind}",
+            {kind: ""},
         )
         residuals = of_case(evidence, with_control(case, prefix))
         yield from tried(evidence, residuals, cause)
@@ -187,13 +204,14 @@ def other_motion(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the inertia or the damping of the machine."""
     fixed = evidence.residuals.fixed
     inertia, damping = fixed.get(INERTIA), fixed.get(DAMPING)
-    freed = []
+    parameters = []
     if inertia:
-        freed.append(freed_within(INERTIA, inertia, LARGEST_FACTOR))
+        parameters.append(freed_within(INERTIA, inertia, LARGEST_FACTOR))
     if damping is not None:
         high = MOST_DAMPING + damping
-        freed.append(FreeParameter(DAMPING, damping, min(0.0, damping), high, logarithmic=False))
-    for parameter in freed:
+        low = min(0.0, damping)
+        parameters.append(FreeParameter(DAMPING, damping, low, high, logarithmic=False))
+    for parameter in parameters:
         yield from _other_number(evidence, parameter, "check the data of the machine and turbine")
 
 
@@ -207,28 +225,40 @@ def other_transformer(evidence: Evidence) -> Iterator[Suspicion]:
     other = of_case(evidence, with_plant_keys(case, power_at=place))
     largest = LARGEST_TRANSFORMER + reactance
     start = reactance or USUAL_TRANSFORMER
-    freed = FreeParameter(REACTANCE, start, 0.0, largest, logarithmic=False)
+    open_value = FreeParameter(REACTANCE, start, 0.0, largest, logarithmic=False)
     check = "check on which side of the step-up transformer vt is recorded, and its X on this base"
-    yield from _other_number(evidence, freed, check)
+    yield from _other_number(evidence, open_value, check)
     if reactance:
         cause = Cause(
             f"the place of p and q: power_at: {place} would match (the case has {own})",
             "check on which side of the step-up transformer they are recorded",
+            place,
+            {"plant.power_at": place},
         )
         yield from tried(evidence, other, cause)
         return
 
-    if trial := refitted(evidence, with_freed(other, [freed])):
+    if trial := refitted(evidence, with_freed(other, [open_value])):
         text = (
             f"vt is recorded behind a transformer, p and q at the {place}: network.X "
             f"{trial.values[REACTANCE]:.3g} with power_at: {place} would match"
         )
-        yield from suspected(evidence, trial, 2, Cause(text, check))
+        changes = {
+            "plant.power_at": place,
+            **freed(case, {REACTANCE: trial.values[REACTANCE]}),
+        }
+        yield from suspected(evidence, trial, 2, Cause(text, check, "transformer", changes))
 
 
-def _other_number(evidence: Evidence, freed: FreeParameter, check: str) -> Iterator[Suspicion]:
+def _other_number(evidence: Evidence, parameter: FreeParameter, check: str) -> Iterator[Suspicion]:
     """Suspect a fixed number, if another one would match."""
-    given = evidence.residuals.fixed[freed.name]
-    if trial := refitted(evidence, with_freed(evidence.residuals, [freed])):
-        text = f"{freed.name} {trial.values[freed.name]:.3g} would match (given {given:g})"
-        yield from suspected(evidence, trial, 1, Cause(text, check))
+    given = evidence.residuals.fixed[parameter.name]
+    if trial := refitted(evidence, with_freed(evidence.residuals, [parameter])):
+        found, name = trial.values[parameter.name], parameter.name
+        text = f"{name} {found:.3g} would match (given {given:g})"
+        words, changes = "" if name == REACTANCE else ", or free it", dict[str, str]()
+        changes |= freed(evidence.case, {name: found})
+        if name == DAMPING:  # it may be 0
+            found_between = between(found, parameter.low, parameter.high)
+            changes |= {"plant.free.D": f"{found_between[:-1]}, scale: linear}}"}
+        yield from suspected(evidence, trial, 1, Cause(text, check + words, name, changes))

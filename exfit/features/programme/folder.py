@@ -25,7 +25,7 @@ from exfit.features.programme.result import (
 from exfit.output import run_folder
 from exfit.output.figure_files import FigureFiles, PlannedFigure, PlannedFigures
 from exfit.results.io import load_result, result_text
-from exfit.results.model import FitResult
+from exfit.results.model import OF_PROGRAMME, FitResult
 from exfit.results.tables import table
 from exfit.runs import store
 from exfit.runs.runner import AS_CASES_SAY, FitSettings
@@ -38,7 +38,6 @@ from exfit.util.typed_reading import FormError, read
 
 POINTS = "points.csv"
 FIGURES_AT_REST = ("saturation.png", "v_curve.png")  # a test at rest has one of them
-KEY = "test"  # the label of the key among the inputs of a fit
 VERSION = 1  # of the file of a test that is no fit
 RESULTS: Mapping[str, type[SaturationResult] | type[VCurve]] = {
     "saturation": SaturationResult,
@@ -80,7 +79,7 @@ def result_kept(step: ProgrammeStep, key: str, folder: Path) -> StepResult | Non
         fit = load_result(file)
     except ExfitError:
         return None  # there is none, or it is not ours
-    return fit if fit.inputs.get(KEY) == key else None
+    return fit if fit.inputs.get(OF_PROGRAMME) == key else None
 
 
 def text_of(test: FinishedTest) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from exfit import estimate, workflows
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
-from exfit.features.programme.folder import KEY, RESULTS, Keep, keep, key_of, result_kept
+from exfit.features.programme.folder import RESULTS, Keep, keep, key_of, result_kept
 from exfit.features.programme.programme import Programme, load_programme, steps_of
 from exfit.features.programme.programme_schema import BUMP, SaturationTest, SteadyTest
 from exfit.features.programme.result import (
@@ -27,7 +27,7 @@ from exfit.plants import MACHINE
 from exfit.records.reading import file_hash
 from exfit.records.units import alike
 from exfit.results.description import UnitDescription
-from exfit.results.model import FitResult, FittedParameter, Iteration
+from exfit.results.model import OF_PROGRAMME, FitResult, FittedParameter, Iteration
 from exfit.runs.runner import AS_CASES_SAY, FitSettings, run_in_turn
 from exfit.util.vocabulary import FITTED, LEAST_CERTAIN_FIRST, NOT_STATED
 from exfit.workflows.case_description import parts_of
@@ -166,8 +166,8 @@ def finished_test(
             strategy, search = settings
             result = workflows.fit(case, strategy, watch, watch, search=search)
         if isinstance(result, FitResult) and not result.interrupted:
-            inputs = {**result.inputs, KEY: key}
-            files = {**result.files, KEY: "all its inputs"}
+            inputs = {**result.inputs, OF_PROGRAMME: key}
+            files = {**result.files, OF_PROGRAMME: "all its inputs"}
             result = replace(result, inputs=inputs, files=files)
     elif isinstance(result, FitResult):  # with what the file says now beside its tests
         inputs = dict(result.inputs)

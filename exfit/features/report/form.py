@@ -6,7 +6,6 @@ from shlex import join
 from typing import NamedTuple
 
 from exfit import __version__
-from exfit.features.programme.folder import KEY
 from exfit.features.programme.result import ProgrammeResult
 from exfit.features.report.behaviour import UsabilityCheck, no_usability, usability
 from exfit.features.report.words import DASH, INTERRUPTED, number
@@ -27,7 +26,7 @@ from exfit.results import facts
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import PartDescription, RecordedTest, values_of_part
 from exfit.results.facts import AskedFact, answer, stated
-from exfit.results.model import FitResult
+from exfit.results.model import OF_PROGRAMME, FitResult
 from exfit.results.validation_result import Reported, ValidationResult
 from exfit.util.text import rounded, show
 from exfit.util.vocabulary import NOT_STATED, by_source
@@ -338,11 +337,13 @@ def command_of(result: Reported, folder: Path | None = None) -> str:
     output = () if folder is None else ("-o", str(folder))
     if isinstance(result, ValidationResult):
         return join(("exfit", "validate", str(result.case), *output, *result.options))
-    if KEY in result.inputs:
+    if OF_PROGRAMME in result.inputs:
         return join(("exfit", "run", str(result.case), *output))
     options = ["--strategy", result.strategy] if result.strategy_given else []
     for name, given in result.given_values.items():  # each by itself: its file may be gone
         options += ["--set", f"{name}={given.value!r}"]
+    if result.freed:
+        options += ["--free", ",".join(result.freed)]
     return join(("exfit", "fit", str(result.case), *output, *options))
 
 

@@ -31,6 +31,7 @@ from exfit.output.fits import fitted_table
 from exfit.output.html import html as blocks_html
 from exfit.output.html import sentence
 from exfit.output.validations import in_a_line
+from exfit.results.causes_in_words import causes_in_words
 from exfit.results.comparisons import Comparison
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
@@ -157,7 +158,7 @@ def headline(result: Reported) -> Headline:
     """
     judged, causes = judged_by_criteria(result), tuple[str, ...]()
     if isinstance(result, FitResult):
-        word, causes = outcome_of(result), tuple(cause.sentence for cause in result.verdict.causes)
+        word, causes = outcome_of(result), tuple(causes_in_words(result))
         good = {GOOD: True, MATCHES: None}.get(word, False)
         explained = [*filter(None, [explanation_of(result)])]
     else:

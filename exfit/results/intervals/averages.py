@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 
 from exfit.case.case import Case
+from exfit.case.changes import changes_to_averages
 from exfit.errors import SimulationError
 from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.descents import descent_near
@@ -66,12 +67,25 @@ def recorder_averages(
                     given=own_values(residuals, theta),
                     values=values,
                     beyond=tuple(beyond),
+                    changes=_changes(case, residuals, numbers, window),
                 )
             )
     except SimulationError:
         return None
     likeliest = max(found, key=lambda each: each.chi_square, default=None)
     return None if likeliest is None or likeliest.chi_square < -STRONG else likeliest
+
+
+def _changes(
+    case: Case, residuals: Residuals, numbers: Sequence[int], window: float
+) -> Mapping[str, str]:
+    """Return the changes of a case by which some of its records hold averages."""
+    changes = dict[str, str]()
+    for number in numbers:
+        experiment = residuals.experiments[number]
+        late = None if finds_instant(experiment) else experiment.simulator.delay + 0.5 * window
+        changes |= changes_to_averages(case, number, experiment.signals, window, late)
+    return changes
 
 
 def _is_beyond(value: float, interval: Interval | None) -> bool:

@@ -13,7 +13,6 @@ from math import inf, isfinite
 from exfit.case.case import Case
 from exfit.registry import parts
 from exfit.results.cause import Cause
-from exfit.verdict.causes.channels import unsteady_record, wrong_levels, wrong_voltage
 from exfit.verdict.causes.evidence import (
     Evidence,
     FittedRecord,
@@ -22,6 +21,7 @@ from exfit.verdict.causes.evidence import (
     Recogniser,
     Suspicion,
 )
+from exfit.verdict.causes.levels import unsteady_record, wrong_levels, wrong_voltage
 from exfit.verdict.causes.unit import with_model
 
 __all__ = ["Evidence", "FittedRecord", "Pace", "Recogniser", "Suspicion", "causes_of"]

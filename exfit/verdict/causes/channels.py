@@ -1,22 +1,19 @@
-"""Channels that are not what the case takes them for, and records that do not rest as it says.
-
-Base, polarity, offset, start, clipping; levels and drift before the step.
-"""
+"""Channels that are not what the case takes them for: base, polarity, offset, start, clipping."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from exfit.case.changes import between, number_text, within
+from exfit.case.schema import PhasesSection
 from exfit.dsp.filtering import Filtering
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.plants import VT0
-from exfit.results.cause import Cause
+from exfit.results.cause import Cause, Remedy
 from exfit.util.arrays import Array, Mask
 from exfit.verdict.causes.evidence import (
-    CERTAIN,
-    LAST,
     Evidence,
     FittedRecord,
     Suspicion,
@@ -25,25 +22,22 @@ from exfit.verdict.causes.evidence import (
 )
 from exfit.verdict.causes.trials import (
     Opened,
-    between,
     refitted,
     tried,
     with_experiment,
     with_opened,
 )
-from exfit.verdict.run_quality import levels_at_rest, other_levels, unsteady_signals
+from exfit.verdict.run_quality import levels_at_rest
 
 LEAST_CHANGE = 5e-3  # of vt's scale: the error of an instrument transformer of class 0.5
 LEAST_ERROR_OF_BASE = 1e-3  # of another channel: less is no base, and no instrument's error
 LARGEST_FACTOR = 3.0  # of a scale, about what the levels at rest say
 FARTHEST_VOLTAGE = 0.2  # pu: how far vt0 may be from the case's
-FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 FEWEST_CLIPPED = 5  # samples at one extreme value: white noise has one, rounded noise a few
 CLIPPED_RATIO = 4.0  # times as many as have the next value: rounded noise has fewer at its extreme
 FARTHEST_OFFSET = 1.0  # pu
-TESTED_AT = 0.02  # pu: how far from rated voltage units are tested, for the most part
 CHECK_BASE = "check its base, unit and, of phases, connection"
-LEAVE_VT0_OUT = "leave vt0 out: it is then the mean of the record before the step"
+TESTED_AT = 0.02  # pu: how far from rated voltage units are tested, for the most part
 RARE = 5.0  # log-likelihood: vt has a wrong base less often than other things are wrong
 
 
@@ -79,10 +73,11 @@ def _other_scale(
         before, after = ((vt - 1.0) / TESTED_AT for vt in (levels[0], trial.values["cause.vt0"]))
         prior = 0.5 * (before**2 - after**2) - RARE
     if found < 0.0:
-        cause = Cause(f"{place} is inverted{starts}", "check the polarity; scale: -1 turns it")
+        turned = rescaled(evidence, number, channel, found).changes
+        cause = Cause(f"{place} is inverted{starts}", "check the polarity", "polarity", turned)
     elif is_wrong_base(signal, found) and (not with_voltage or nearer_to_rated(levels, trial)):
         text = f"the base of {place}{starts}; values {found:.4g} times as large would match"
-        cause = Cause(text, CHECK_BASE)
+        cause = Cause(text, *rescaled(evidence, number, channel, found))
     else:
         return
     yield from suspected(evidence, trial, len(opened), cause, prior)
@@ -130,18 +125,50 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
             more = trial.values["cause.offset"] - channel.offset
             place = f"{channel.signal}{evidence.name_of(number)}"
             text = f"an offset of {place}: {more:+.3g} pu more would match"
-            cause = Cause(text, check_zero(channel, more))
+            cause = Cause(text, *check_zero(evidence, number, channel, more))
             yield from suspected(evidence, trial, 1, cause)
 
 
-def check_zero(channel: Channel, more: float = 0.0) -> str:
-    """Word the remedy for the offset of a channel, which ``more`` of it would match."""
+def check_zero(evidence: Evidence, number: int, channel: Channel, more: float = 0.0) -> Remedy:
+    """Return the remedy for the offset of a channel, which ``more`` of it would match."""
     offset = channel.offset + more
-    line = between(offset, offset - FARTHEST_OFFSET, offset + FARTHEST_OFFSET)
-    return (
-        "check the zero of the recorder, or let the fit find it: under "
-        f"record.channels.{channel.signal}, beside its column: `offset: {line}`"
-    )
+    found = between(offset, offset - FARTHEST_OFFSET, offset + FARTHEST_OFFSET)
+    changes = {evidence.place(number, f"record.channels.{channel.signal}.offset"): found}
+    return Remedy("check the zero of the recorder, or let the fit find it", "zero", changes)
+
+
+def rescaled(evidence: Evidence, number: int, channel: Channel, factor: float = 1.0) -> Remedy:
+    """Return the remedy for the base of a channel, whose values are to be ``factor`` times it."""
+    place = evidence.place(number, f"record.channels.{channel.signal}")
+    section = evidence.case.recordings[number].record.channels[channel.signal]
+    with_level = channel.signal == "vt" and evidence.records[number].given_vt0 is None
+    if isinstance(section, PhasesSection):
+        changes = {f"{place}.base": number_text(section.base / factor)}
+    elif with_level and factor != 1.0:  # the record shows its level with a base alone
+        changes = {f"{place}.scale": number_text(channel.scale * factor)}
+    else:
+        changes = {f"{place}.scale": within(channel.scale * factor, LARGEST_FACTOR)}
+        if with_level:
+            level = _voltage(evidence, number)
+            found = between(level.start, level.low, level.high)
+            changes[evidence.place(number, "test.vt0")] = found
+    return Remedy(CHECK_BASE, "base", changes)
+
+
+def other_level(
+    evidence: Evidence, number: int, experiment: Experiment, signal: str, ratio: float, text: str
+) -> Cause:
+    """Return the cause of a channel whose level is ``ratio`` times what it should be."""
+    channel = next((each for each in experiment.channels if each.signal == signal), None)
+    if channel is None:  # it drives the unit
+        return Cause(text, CHECK_BASE)
+    return Cause(text, *rescaled(evidence, number, channel, 1.0 / ratio))
+
+
+def measured_vt0(evidence: Evidence, number: int) -> Remedy:
+    """Return the remedy for a voltage before the step that is not that of the record."""
+    changes = {evidence.place(number, "test.vt0"): ""}
+    return Remedy("leave it out: it is then the mean of the record", "vt0", changes)
 
 
 def is_found(experiment: Experiment, channel: Channel, kind: str) -> bool:
@@ -164,7 +191,7 @@ def wrong_start(evidence: Evidence) -> Iterator[Suspicion]:
                 f"vt0 is {given:.5g} pu, but the record{evidence.name_of(number)} starts from "
                 f"{trial.values['cause.vt0']:.5g} pu"
             )
-            yield from suspected(evidence, trial, 1, Cause(text, LEAVE_VT0_OUT))
+            yield from suspected(evidence, trial, 1, Cause(text, *measured_vt0(evidence, number)))
 
 
 def clipped_channel(evidence: Evidence) -> Iterator[Suspicion]:
@@ -174,12 +201,14 @@ def clipped_channel(evidence: Evidence) -> Iterator[Suspicion]:
         if flat is None:
             continue
         time = record.setup.record.time
+        masks = len(evidence.case.recordings[number].record.mask)
         value, first, last = float(channel.measured[flat][0]), time[flat][0], time[flat][-1]
         cause = Cause(
             f"{channel.signal}{evidence.name_of(number)} is clipped: flat at {value:.4g} pu, "
             f"{first:.4g} ... {last:.4g} s",
-            f"leave that part out: mask: [[{first:.4g}, {last:.4g}]]; widen the range of the "
-            "recorder",
+            "leave that part out; widen the range of the recorder",
+            "clipped",
+            {evidence.place(number, f"record.mask[{masks}]"): f"[{first:.6g}, {last:.6g}]"},
         )
         kept = channel.kept & ~flat
         own = channel.filtering
@@ -200,33 +229,3 @@ def clipped_samples(measured: Array, kept: Mask) -> Mask | None:
         if counts[end] >= max(FEWEST_CLIPPED, CLIPPED_RATIO * counts[next_one]):
             return np.asarray(kept & (measured == values[end]))
     return None
-
-
-def wrong_voltage(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield a voltage that no machine is tested at, yet some might rest with."""
-    for record in evidence.records if evidence.case.kind.per_unit else ():
-        measured = record.comparison.features.measured
-        if measured is not None and abs(measured.initial_value - 1.0) > FAR_FROM_RATED:
-            cause = Cause(
-                f"vt starts from {measured.initial_value:.4g} pu",
-                "check its unit, its base and, of phases, their connection",
-            )
-            yield Suspicion(cause, CERTAIN)
-
-
-def unsteady_record(evidence: Evidence) -> Iterator[Suspicion]:
-    """Suspect signals that drift while the case calls the unit steady."""
-    for record in evidence.records:
-        if record.steady_until is not None:
-            setup = record.setup
-            for cause in unsteady_signals(setup.record, record.steady_until, setup.channels):
-                yield Suspicion(cause, LAST)
-
-
-def wrong_levels(evidence: Evidence) -> Iterator[Suspicion]:
-    """Suspect signals that start elsewhere than their record."""
-    for record in evidence.records:
-        if record.steady_until is not None:
-            match = record.comparison
-            for cause in other_levels(match.time, match.overlays, record.steady_until):
-                yield Suspicion(cause, LAST)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from exfit import estimate
 from exfit.case.case import Case
+from exfit.case.changes import place_in_record
 from exfit.case.schema import BumpTest, Unknown
 from exfit.estimate import Progress
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
@@ -176,6 +177,10 @@ class Evidence:
         for number, record, experiment in self.tests:
             for channel in experiment.channels:
                 yield number, record, experiment, channel
+
+    def place(self, number: int, key: str) -> str:
+        """Return the place of a key of a record or its test in the file of the case."""
+        return place_in_record(self.case, number, key)
 
     def name_of(self, number: int) -> str:
         """Name a record of several as a sentence does; "" where there is only one."""

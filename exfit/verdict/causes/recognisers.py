@@ -4,13 +4,12 @@ from collections.abc import Mapping
 
 from exfit.verdict.causes.channels import (
     clipped_channel,
-    unsteady_record,
     wrong_offset,
     wrong_scale,
     wrong_start,
-    wrong_voltage,
 )
 from exfit.verdict.causes.evidence import Recogniser
+from exfit.verdict.causes.levels import unsteady_record, wrong_voltage
 from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
 from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
 from exfit.verdict.causes.unit import (

@@ -1,11 +1,13 @@
 """What a recorder adds to a record: ripple, drift, spikes, averages, another clock."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from exfit.case.changes import changes_to_averages, number_text
+from exfit.case.schema.values import TimeColumn
 from exfit.dsp.lines import MAINS, Ripple
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.quality import SPIKE_LIMIT
@@ -13,6 +15,7 @@ from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.uncertainty import slices
+from exfit.records.units import SECONDS
 from exfit.results.cause import Cause
 from exfit.util.arrays import Array, median, median_step
 from exfit.verdict.causes.evidence import (
@@ -23,7 +26,6 @@ from exfit.verdict.causes.evidence import (
     Suspicion,
     suspected,
 )
-from exfit.verdict.causes.steps import delay_found
 from exfit.verdict.causes.trials import (
     Opened,
     linear_fit,
@@ -38,7 +40,7 @@ FINER = 8  # points of the spectrum for each of a transform without padding
 FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
-CLOCKS = {1e3: "ms", 1e6: "microseconds", 60.0: "minutes", 50.0: "cycles of 50 Hz"}
+CYCLES = {1.0 / mains: f"cycles of {mains:g} Hz" for mains in MAINS}  # by their lengths, s
 ENOUGH_SAMPLES = 30_000  # to tell windows of averages apart
 WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
 LATE = Nuisance("cause.delay", "delay")
@@ -85,12 +87,27 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
         columns = own.columns(len(linear.errors), np.column_stack([np.cos(phase), np.sin(phase)]))
         explained = linear.with_columns(columns)
         height = float(np.hypot(*explained.coefficients))
+        folded = Ripple(frequency, height, 1.0 / median_step(own.time)).folded_from
         cause = Cause(
             f"a ripple of {frequency:.1f} Hz, {height:.1e} pu, in "
             f"{own.channel.signal}{evidence.name_of(own.number)}",
-            Ripple(frequency, height, 1.0 / median_step(own.time)).remedy,
+            "look for its source" if folded is None else "record it faster",
+            "ripple",
+            {
+                evidence.place(own.number, f"record.channels.{own.channel.signal}.sine"): (
+                    f"{{frequency: {_near(frequency, own.time)}}}"
+                )
+            },
         )
         yield from suspected(evidence, explained.cost, 3, cause)
+
+
+def _near(frequency: float, time: Array) -> str:
+    """Write the entry of a frequency (Hz) that is fitted as closely as a record shows it."""
+    away = 1.0 / float(np.ptp(time))
+    least, most = max(frequency - away, 0.0), min(frequency + away, 0.5 / median_step(time))
+    numbers = (float(f"{number:.6g}") for number in (frequency, least, most))
+    return "{{start: {}, min: {}, max: {}}}".format(*numbers)
 
 
 def _line(own: ChannelErrors, errors: Array) -> float | None:
@@ -129,9 +146,20 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
             f"{own.channel.signal}{evidence.name_of(own.number)}: {change:+.1e} pu from start to "
             "end",
             MOVED_IN_EVENT if of_event else UNSTEADY,
+            "shorter",
+            _shorter_window(evidence, own.number),
         )
         shown = _shows_at_rest(evidence, own, linear.errors[own.rows], change)
         yield from suspected(evidence, explained.cost, 2, cause, 0.0 if shown else LAST)
+
+
+def _shorter_window(evidence: Evidence, number: int) -> Mapping[str, str]:
+    """Return the change by which a record ends half as long after its last step."""
+    record = evidence.records[number].setup
+    begin, end = float(record.record.time[0]), float(record.record.time[-1])
+    last = max((at for at in record.test.instants if at < end), default=begin)
+    ends = f"[{begin:.6g}, {0.5 * (last + end):.6g}]"
+    return {evidence.place(number, "record.window"): ends}
 
 
 def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change: float) -> bool:
@@ -169,7 +197,13 @@ def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} are spikes, "
             f"at {at}",
-            f"outliers: {SPIKE_LIMIT:g} on the channel leaves them out",
+            "leave them out",
+            "spikes",
+            {
+                evidence.place(number, f"record.channels.{channel.signal}.outliers"): number_text(
+                    SPIKE_LIMIT
+                )
+            },
         )
         cost = max(evidence.cost - 0.5 * square, 0.0)
         yield from suspected(evidence, cost, len(places), cause)
@@ -186,21 +220,21 @@ def averaging(evidence: Evidence) -> Iterator[Suspicion]:
         window = _likeliest_window(evidence, record, experiment)
         if window is None:
             continue
-        averaged = with_averages(experiment, window)
-        residuals = with_experiment(evidence.residuals, number, averaged)
+        of_means = with_averages(experiment, window)
+        residuals = with_experiment(evidence.residuals, number, of_means)
         delay = experiment.simulator.delay
-        late = Opened(LATE, delay + 0.5 * window, delay - window, delay + window)
-        opened = [] if finds_instant(experiment) else [late]
+        opened_late = Opened(LATE, delay + 0.5 * window, delay - window, delay + window)
+        opened = [] if finds_instant(experiment) else [opened_late]
         if trial := refitted(evidence, with_opened(residuals, number, opened)):
-            after, found = "", ""
-            if opened:
-                delay = trial.values[LATE.name]
-                after = f", and is {1e3 * delay:.0f} ms late"
-                found = f", {delay_found(delay, window)}"
+            late, after = trial.values.get(LATE.name), ""
+            if late is not None:
+                after = f", and is {1e3 * late:.0f} ms late"
             cause = Cause(
                 f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
                 f"{after}",
-                f"averaged: {window:.3g} on its channels{found}",
+                "ask for its setting",
+                "averaged",
+                changes_to_averages(evidence.case, number, experiment.signals, window, late),
             )
             yield from suspected(evidence, trial, 1 + len(opened), cause)
 
@@ -246,11 +280,18 @@ def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
         detected = first_step(record.comparison.time, overlay.measured)
         if detected is None:
             continue
-        for factor, unit in CLOCKS.items():
-            if abs(detected.at / (factor * instants[0]) - 1.0) < NEAREST_RATIO:
+        given = evidence.case.recordings[number].record.time
+        own = SECONDS[given.unit] if isinstance(given, TimeColumn) else 1.0
+        units = {seconds: unit for unit, seconds in SECONDS.items()} | CYCLES
+        for seconds, unit in units.items():
+            near = abs(detected.at * seconds / (own * instants[0]) - 1.0) < NEAREST_RATIO
+            if near and seconds != own:
+                named = unit in SECONDS and isinstance(given, str | TimeColumn)
                 cause = Cause(
                     f"the time column{evidence.name_of(number)} may be in {unit}: it shows the "
-                    f"step at {detected.at:.4g}, the case has it at {instants[0]:g} s",
-                    f"time: {{column: ..., unit: {unit}}}",
+                    f"step at {detected.at:.4g} s, the case has it at {instants[0]:g} s",
+                    "check its unit",
+                    "clock",
+                    {evidence.place(number, "record.time.unit"): unit} if named else {},
                 )
                 yield Suspicion(cause, CERTAIN)

@@ -1,26 +1,27 @@
 """Steps that were not made as the case says: sign, size, instant, number."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from exfit.case.changes import between, number_text, within
+from exfit.case.schema import Unknown
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
-from exfit.results.cause import Cause
+from exfit.plants import REFERENCES
+from exfit.results.cause import Cause, Remedy
 from exfit.simulation.inputs import InputStep
 from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, suspected
 from exfit.verdict.causes.trials import (
     LinearFit,
     Opened,
-    between,
     linear_fit,
     refitted,
     tried,
     with_experiment,
     with_opened,
-    within,
 )
 
 LARGEST_FACTOR = 5.0  # of the size of a step
@@ -47,7 +48,9 @@ def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"the record{evidence.name_of(number)} goes the other way ({way:+.2g} pu) than the "
             "response",
-            "reverse the sign of the step, or check the polarity of vt",
+            "check the sign of the step, and the polarity of vt",
+            "sign",
+            _turned(evidence, number),
         )
         yield from tried(evidence, with_experiment(evidence.residuals, number, turned), cause)
 
@@ -55,48 +58,75 @@ def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
 def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the size of the steps of a record."""
     for number, _, experiment in evidence.tests:
-        free = {nuisance.step for nuisance in experiment.nuisances if nuisance.kind == "step"}
-        opened = [
-            Opened.within(Nuisance(f"cause.step{k}", "step", k), step.step, LARGEST_FACTOR)
-            for k, step in enumerate(experiment.simulator.inputs.steps)
-            if k not in free and step.step
-        ]
-        if not opened:
+        opened = [*_open_sizes(experiment)]
+        trial = opened and refitted(evidence, with_opened(evidence.residuals, number, opened))
+        if not trial:
             continue
-        trial = refitted(evidence, with_opened(evidence.residuals, number, opened))
-        if trial is None:
-            continue
-        found = [trial.values[each.nuisance.name] for each in opened]
-        pairs = zip(found, opened, strict=True)
-        change = max(abs(size / each.start - 1.0) for size, each in pairs)
+        found = {each.nuisance.step: trial.values[each.nuisance.name] for each in opened}
+        change = max(abs(found[each.nuisance.step] / each.start - 1.0) for each in opened)
         if change < LEAST_CHANGE:
             continue
-        sizes = ", ".join(f"{size:+.4g}" for size in found)
+        sizes = ", ".join(f"{size:+.4g}" for size in found.values())
         given = ", ".join(f"{each.start:+.4g}" for each in opened)
         cause = Cause(
             f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
             f"has {given} pu",
-            correct_step(found),
+            *correct_step(evidence, number, found),
         )
         prior = -RARE if change < USUAL_CHANGE else 0.0
         yield from suspected(evidence, trial, len(opened), cause, prior)
 
 
-def correct_step(sizes: Sequence[float]) -> str:
-    """Word the remedy for steps of other sizes, those that would match."""
-    lines = (f"under vref: `step: {within(size, LARGEST_FACTOR)}`" for size in sizes)
-    return f"correct step, or let the fit find it, {', '.join(lines)}"
+def _open_sizes(experiment: Experiment) -> Iterator[Opened]:
+    """Leave open the sizes of the steps that the case gives."""
+    free = {nuisance.step for nuisance in experiment.nuisances if nuisance.kind == "step"}
+    for k, step in enumerate(experiment.simulator.inputs.steps):
+        if k not in free and step.step:
+            yield Opened.within(Nuisance(f"cause.step{k}", "step", k), step.step, LARGEST_FACTOR)
 
 
-def correct_instant(delay: float) -> str:
-    """Word the remedy for a record that is late, by a delay (s) that would match."""
-    line = delay_found(delay, FARTHEST_DELAY)
-    return f"correct at, or let the fit find it, under vref: `at: {{start: auto}}`; or {line}"
+def _listed(evidence: Evidence, number: int) -> Iterator[tuple[str, float | Unknown]]:
+    """Yield the steps of a test in the order of its inputs, with their places in the file.
+
+    Steps of a table have none.
+    """
+    test = evidence.records[number].test
+    for signal in REFERENCES:
+        listed = isinstance(test.reference(signal), tuple)
+        for k, event in enumerate(test.events(signal)):
+            place = evidence.place(number, f"test.{signal}[{k}].step")
+            yield place if listed else "", event.step
 
 
-def delay_found(delay: float, farthest: float) -> str:
-    """Write the line that leaves the delay of a recorder (s) to the fit."""
-    return f"under record: `delay: {between(delay, delay - farthest, delay + farthest)}`"
+def _turned(evidence: Evidence, number: int) -> Mapping[str, str]:
+    """Return the changes that reverse the steps of a test."""
+    changes = {}
+    for place, step in _listed(evidence, number):
+        if isinstance(step, Unknown):
+            start, low, high = step.start, step.min, step.max
+            if start != "auto" and low is not None and high is not None:
+                changes[place] = between(-start, -high, -low)
+        elif place:
+            changes[place] = repr(-step)
+    return changes
+
+
+def correct_step(evidence: Evidence, number: int, sizes: Mapping[int, float]) -> Remedy:
+    """Return the remedy for steps of other sizes, by their places in the inputs."""
+    places = [place for place, _ in _listed(evidence, number)]
+    changes = {
+        places[k]: within(size, LARGEST_FACTOR)
+        for k, size in sizes.items()
+        if k < len(places) and places[k]
+    }
+    return Remedy("correct the step, or let the fit find it", "step", changes)
+
+
+def correct_instant(evidence: Evidence, number: int, delay: float) -> Remedy:
+    """Return the remedy for a record that is late, by a delay (s) that would match."""
+    found = between(delay, delay - FARTHEST_DELAY, delay + FARTHEST_DELAY)
+    changes = {evidence.place(number, "record.delay"): found}
+    return Remedy("correct the time, or let the fit find the delay", "delay", changes)
 
 
 def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
@@ -115,14 +145,14 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"the time of the step{of_record}, or a delay of the recorder: the record is {size} "
             "than the case",
-            correct_instant(delay + late),
+            *correct_instant(evidence, number, delay + late),
         )
         if evidence.case.kind.finds_rest:
-            cause = Cause(
-                f"the clocks: the compared channels{of_record} are {size} than the driving ones",
-                "put all channels on one clock, or let the fit find it: "
-                f"{delay_found(delay + late, FARTHEST_DELAY)}; phasors and powers may be "
-                "filtered differently",
+            cause = cause._replace(
+                cause="the clocks: the compared channels"
+                f"{of_record} are {size} than the driving ones",
+                remedy="put all channels on one clock, which may be filtered differently, or let "
+                "the fit find the delay",
             )
         yield from suspected(evidence, trial, 1, cause)
 
@@ -168,9 +198,21 @@ def further_step(evidence: Evidence) -> Iterator[Suspicion]:
             cause = Cause(
                 f"a further step{evidence.name_of(number)} that the case does not have: "
                 f"{trial.values['cause.step']:+.2g} pu at {trial.values['cause.at']:.4g} s",
-                "add it under vref, or end the record before it: window",
+                "add it, or end the record before it: window",
+                "further-step",
+                _added(evidence, number, trial.values),
             )
             yield from suspected(evidence, trial, 2, cause)
+
+
+def _added(evidence: Evidence, number: int, found: Mapping[str, float]) -> Mapping[str, str]:
+    """Return the changes that add a further step to the reference; none to a table or a file."""
+    given, at = evidence.records[number].test.vref, found["cause.at"]
+    if not isinstance(given, tuple):
+        return {}
+    step = within(found["cause.step"], LARGEST_FACTOR)
+    place = evidence.place(number, f"test.vref[{len(given)}]")
+    return {place: f"{{at: {number_text(at)}, step: {step}}}"}
 
 
 def _likeliest_instant(

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -17,13 +16,11 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.results.cause import Cause
 from exfit.util.arrays import Array, Mask
-from exfit.util.text import yaml_number
 from exfit.verdict.causes.evidence import Evidence, Suspicion, Trial, suspected
 
 MOST_ITERATIONS = 25  # of each phase: to compare causes, not to print digits
 AT_NOISE = 1.2  # times the cost of the noise: a descent that ends so low needs no other
 TOLERANCE = 1e-3  # of a step and of the gradient, in the units of the search
-DIGITS = 3  # of a number in a line for the case
 DEPENDENT = 1e-9  # of the longest column: a column that is shorter without the others is none
 
 
@@ -173,15 +170,3 @@ def linear_model(errors: Array, slopes: Array) -> LinearFit:
     basis, triangle = np.linalg.qr(slopes)
     sizes = np.abs(np.diag(triangle))
     return LinearFit(errors, basis[:, sizes > DEPENDENT * np.max(sizes, initial=0.0)])
-
-
-def within(start: float, factor: float, limits: tuple[float, float] = (-inf, inf)) -> str:
-    """Write the entry in a case of a value that is fitted within a factor of its start."""
-    low, high = sorted((start / factor, start * factor))
-    return between(start, max(low, limits[0]), min(high, limits[1]))
-
-
-def between(start: float, low: float, high: float) -> str:
-    """Write the entry in a case of a value that is fitted between bounds."""
-    numbers = (yaml_number(float(f"{number:.{DIGITS}g}")) for number in (start, low, high))
-    return "{{start: {}, min: {}, max: {}}}".format(*numbers)

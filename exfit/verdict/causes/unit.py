@@ -7,11 +7,12 @@ from math import inf, isfinite, log, sqrt
 import numpy as np
 
 from exfit.case.case import Case
+from exfit.case.changes import freed, number_text, part_of
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import MACHINE
-from exfit.results.cause import Cause
+from exfit.results.cause import Cause, Remedy
 from exfit.simulation.limits import Extreme, extremes
 from exfit.util.text import dotted, listed
 from exfit.verdict.causes.evidence import (
@@ -27,11 +28,10 @@ from exfit.verdict.causes.trials import (
     linear_fit,
     refitted,
     with_freed,
-    within,
 )
 
 LARGEST_FACTOR = 4.0  # of a fixed value
-FACTOR = 4.0  # from the start of a freed value to its bounds
+MORE_ITERATIONS = 20  # times
 WIDER = 10.0  # times: how much farther a bound is put
 MOST_FIXED = 2  # values that are tried, those that would explain most
 MOST_LIMITS = 4  # that are tried, those that were met first
@@ -99,7 +99,7 @@ def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> It
     part = "machine data" if of_machine(names) else "fixed values"
     starts = {name: trial.values[name] for name in names}
     pairs = [f"{name} {start:.3g} (given {fixed[name]:g})" for name, start in starts.items()]
-    cause = Cause(f"the {part}: {listed(pairs)} would match", remedy_of(evidence.case, starts))
+    cause = Cause(f"the {part}: {listed(pairs)} would match", *remedy_of(evidence.case, starts))
     ratios = [log(start / fixed[name]) for name, start in starts.items()]
     prior = -0.5 * sum((ratio / USUAL_ERROR) ** 2 for ratio in ratios) - rare
     yield from suspected(evidence, trial, len(names), cause, prior)
@@ -110,32 +110,24 @@ def of_machine(names: Sequence[str]) -> bool:
     return names[0].startswith(MACHINE)
 
 
-def remedy_of(case: Case, starts: Mapping[str, float]) -> str:
-    """Word the remedy for values that may be wrong; a fit of them begins with ``starts``.
+def remedy_of(case: Case, starts: Mapping[str, float], check: str = "") -> Remedy:
+    """Return the remedy for values that may be wrong; a fit of them begins with ``starts``.
 
-    Where their part may have free values it gives the lines that free them.
+    ``check`` is what to look at, by default where such values are from.
     """
-    names = [*starts]
-    check = f"check {'nameplate and test reports' if of_machine(names) else 'the data sheet'}"
-    part = next(
-        part
-        for part in reversed(case.parts.all)
-        if names[0].startswith(part.prefix) and names[0].removeprefix(part.prefix) in part.symbols
-    )
-    if part.free is None:
-        return check
-    values = case.values()
-    given = {symbol: values[part.prefix + symbol] for symbol in part.symbols}
-    freed = {name.removeprefix(part.prefix): start for name, start in starts.items()}
-    if any(part.check(given | freed)):  # what matches best may be no machine's
-        freed = {symbol: given[symbol] for symbol in freed}
-    ranges, lines = {row.symbol: row.domain for row in part.sheet}, list[str]()
-    for symbol, start in freed.items():
-        found = within(start, FACTOR, ranges[symbol])
-        # below 0 there is no log scale
-        lines.append(f"`{symbol}: {found if start > 0.0 else f'{found[:-1]}, scale: linear}}'}`")
-    places = f"under {dotted(part.free)}, in place of {dotted(part.fixed)}"
-    return f"{check}, or free {listed(names)}: {places}, {', '.join(lines)}"
+    names, values = [*starts], case.values()
+    source = "nameplate and test reports" if of_machine(names) else "the data sheet"
+    part = part_of(case, names[0])
+    if part is not None:
+        given = {symbol: values[part.prefix + symbol] for symbol in part.symbols}
+        if any(
+            part.check(given | {name.removeprefix(part.prefix): starts[name] for name in names})
+        ):
+            starts = {name: values[name] for name in names}  # what matches best may be no machine's
+    found = part is not None and part.free is not None
+    words = check or f"check {source}{', or fit' if found else ''}"
+    freed_names = tuple(names) if found else ()
+    return Remedy(words, "-".join(names), freed(case, starts), freed_names)
 
 
 def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:
@@ -170,7 +162,8 @@ def _other_limit(evidence: Evidence, extreme: Extreme) -> Iterator[Suspicion]:
         if abs(value) < abs(given):
             text = f"a limit that the case does not have: {name} {value:.3g} would match"
             text += f" (given {given:g})"
-        cause = Cause(text, f"check {name} in the data sheet and the settings")
+        check = f"check {name} in the data sheet and the settings"
+        cause = Cause(text, *remedy_of(evidence.case, {name: value}, check))
         yield from suspected(evidence, trial, 1, cause)
 
 
@@ -195,15 +188,40 @@ def narrow_bound(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"the bounds: {listed(held)}; beyond, {listed(values)} would match",
             "widen the bounds where the data sheet allows it",
+            "bounds",
+            _wider_bounds(evidence.case, {each.name: each for each in wider}, sides),
         )
         yield from suspected(evidence, trial, len(sides), cause)
+
+
+def _wider_bounds(
+    case: Case, wider: Mapping[str, FreeParameter], sides: Mapping[str, str]
+) -> Mapping[str, str]:
+    """Return the changes that widen bounds, as far as the equations allow."""
+    changes, free = {}, case.free()
+    for name, side in sides.items():
+        part = part_of(case, name)
+        if part is None or part.free is None or getattr(free.get(name), side, None) is None:
+            continue
+        symbol = name.removeprefix(part.prefix)
+        low, high = next(row.domain for row in part.sheet if row.symbol == symbol)
+        bound = max(wider[name].low, low) if side == "min" else min(wider[name].high, high)
+        changes[dotted((*part.free, symbol, side))] = number_text(bound)
+    return changes
 
 
 def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the iterations of a case of being too few."""
     if evidence.solution.stop in (Stop.ITERATIONS, Stop.EVALUATIONS):
-        remedy = "increase estimate.iterations, or use the default search"
-        yield Suspicion(Cause("the search had too few iterations", remedy), CERTAIN)
+        given = evidence.case.estimate.most_iterations
+        most = "" if isinstance(given, Mapping) else str(MORE_ITERATIONS * given)
+        cause = Cause(
+            "the search had too few iterations",
+            "increase them, or use the default search",
+            "iterations",
+            {"estimate.iterations": most},
+        )
+        yield Suspicion(cause, CERTAIN)
 
 
 def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
