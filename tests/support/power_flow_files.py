@@ -10,12 +10,23 @@ OF_THREE_WINDINGS = (
 
 
 def power_flow(
-    version=33, buses=(1, 9), cz=1, kv=KV, mva=MVA, named=True, own_x=0.0, ra=0.0, units=None
+    version=33,
+    buses=(1, 9),
+    cz=1,
+    kv=KV,
+    mva=MVA,
+    named=True,
+    own_x=0.0,
+    ra=0.0,
+    units=None,
+    cw=1,
+    taps=("1.0,0.0", "1.0,0.0"),
 ):
     """Return the text of a file: a machine 1 at each bus behind a transformer to bus 900.
 
     With ``own_x`` the machines have their transformer in their own rows, and there is no other.
-    ``units`` are kV, MVA, R and X on its base by bus, in place of the same of all ``buses``.
+    ``taps`` are WINDV and NOMV of the transformers, high side first. ``units`` are kV, MVA, R and X
+    on its base by bus, in place of the same of all ``buses``.
     """
     base = SBASE if cz == 1 else 50.0
     units = units or dict.fromkeys(buses, (kv, mva, 0.002 * mva / base, X))
@@ -34,8 +45,8 @@ def power_flow(
         "BRANCH": ["900,901,'1 ',0.01,0.1,0.0"],
         "TRANSFORMER": [OF_THREE_WINDINGS] if own_x else [
             OF_THREE_WINDINGS,
-            *(f"900, {bus},   0,'1 ',1,{cz},1,0.0,0.0,2,'T{bus}          ',1,   1,1.0\n"
-              f" {r * base / mva:.6f}, {x * base / mva:.6f}, {50.0}\n1.0,0.0,0.0\n1.0, 0.0"
+            *(f"900, {bus},   0,'1 ',{cw},{cz},1,0.0,0.0,2,'T{bus}          ',1,   1,1.0\n"
+              f" {r * base / mva:.6f}, {x * base / mva:.6f}, {50.0}\n{taps[0]},0.0\n{taps[1]}"
               for bus, (_, mva, r, x) in units.items()),
         ],
     }  # fmt: skip

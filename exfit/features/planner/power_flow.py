@@ -29,7 +29,8 @@ MBASE, ZR, RT, XT = (
     12,
 )  # of a generator; one later in version 35, which has NREG before them
 WITH_NREG = 35
-THIRD_BUS, CZ, STAT = 2, 5, 11  # of a transformer
+THIRD_BUS, CW, CZ, STAT = 2, 4, 5, 11  # of a transformer
+IN_KV, OF_NOMINAL = 2.0, 3.0  # CW: of its taps, else per unit of the bus
 ON_SYSTEM_BASE, ON_OWN_BASE = 1.0, 2.0  # CZ: of its impedance
 
 
@@ -178,9 +179,12 @@ class _Transformer(NamedTuple):
 def _step_ups(
     rows: Sequence[_Row], base: float, buses: Mapping[str, _Bus], faults: list[DynamicsFault]
 ) -> dict[str, list[_Transformer]]:
-    """Return the transformers of two windings in service that a bus is the lower side of."""
+    """Return the transformers of two windings in service that a bus is the lower side of.
+
+    With taps t of the sides, low = t_low^2 (R + jX) i + (t_low / t_high) high.
+    """
     found: dict[str, list[_Transformer]] = {}
-    for first, second in _of_two_windings(rows):
+    for first, second, *windings in _of_two_windings(rows):
         ends = [buses.get(field.text) for field in first.fields[:2]]
         code = _number(first, CZ, "CZ", faults)
         resistance = _number(second, 0, "R1-2", faults)
@@ -194,20 +198,39 @@ def _step_ups(
         power = base if code == ON_SYSTEM_BASE else _number(second, 2, "SBASE1-2", faults)
         kv = [bus.kv for bus in ends if bus is not None]
         if power > 0.0 and kv[0] != kv[1]:
-            low = first.fields[kv.index(min(kv))].text
-            own = _Transformer(resistance / power, reactance / power, max(kv))
-            found.setdefault(low, []).append(own)
+            at = kv.index(min(kv))
+            taps = [_tap(*own, first, faults) for own in zip(windings, kv, strict=True)]
+            low, high, share = taps[at], taps[1 - at], taps[at] ** 2 / power
+            behind = max(kv) * high / low if min(taps) > 0.0 else max(kv)
+            own = _Transformer(share * resistance, share * reactance, float(f"{behind:.6g}"))
+            found.setdefault(first.fields[at].text, []).append(own)
     return found
 
 
-def _of_two_windings(rows: Sequence[_Row]) -> Iterator[tuple[_Row, _Row]]:
-    """Yield the first two lines of each transformer of two windings, which has four, not five."""
+def _tap(winding: _Row, kv: float, first: _Row, faults: list[DynamicsFault]) -> float:
+    """Return the tap of a winding, pu of the kV of its bus; add its fault."""
+    if not winding.fields or not winding.fields[0].text:
+        return 1.0  # its default
+    code, tap = _number(first, CW, "CW", faults), _number(winding, 0, "WINDV", faults)
+    nominal = _number(winding, 1, "NOMV", faults)
+    in_kv = tap if code == IN_KV else tap * nominal if code == OF_NOMINAL else 0.0
+    if in_kv > 0.0 >= kv:
+        faults.append(DynamicsFault(winding.line, f"WINDV: {show(in_kv)} kV: its bus has no kV"))
+        return 0.0
+    pu = in_kv / kv if in_kv > 0.0 else tap
+    if pu <= 0.0:
+        faults.append(DynamicsFault(winding.line, f"WINDV: {show(tap)} is not above 0"))
+    return pu
+
+
+def _of_two_windings(rows: Sequence[_Row]) -> Iterator[Sequence[_Row]]:
+    """Yield the four lines of each transformer of two windings; one of three has five."""
     at = 0
-    while at + 1 < len(rows):
+    while at + 3 < len(rows):
         first = rows[at]
         two = len(first.fields) > STAT and first.fields[THIRD_BUS].text in ("0", "")
         if two:
-            yield first, rows[at + 1]
+            yield rows[at : at + 4]
         at += 4 if two else 5
 
 

@@ -140,6 +140,32 @@ def test_a_voltage_that_was_recorded_behind_the_transformer_has_its_reactance_an
     assert not {"R", "X"} & case.plant.sources.keys()
 
 
+@pytest.mark.parametrize(
+    ("cw", "taps"),
+    [
+        (1, ("1.05,0.0", "0.98,0.0")),
+        (2, (f"{1.05 * HIGH_KV},0.0", f"{0.98 * KV},0.0")),
+        (3, (f"1.0,{1.05 * HIGH_KV}", f"1.0,{0.98 * KV}")),
+    ],
+)
+def test_taps_of_the_transformer_change_its_reactance_and_the_kv_behind_it(run, cw, taps):
+    """V_low = t_low^2 Z I + (t_low / t_high) V_high, for taps per unit of each side."""
+    event(HIGH_KV)
+    Path("net.raw").write_text(power_flow(cw=cw, taps=taps))
+    case = load_case(imported(run, "--raw", "net.raw"))
+    kV = case.recordings[0].record.phasors.kV
+    assert kV == pytest.approx(HIGH_KV * 1.05 / 0.98, rel=1e-5)
+    assert case.plant.network["X"] == pytest.approx(0.98**2 * X, rel=1e-5)
+
+
+def test_a_tap_of_zero_is_a_fault_with_its_line(run):
+    event(HIGH_KV)
+    Path("net.raw").write_text(power_flow(taps=("0.0,0.0", "1.0,0.0")))
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--raw", "net.raw")
+    assert ran.code == 1
+    assert "WINDV: 0 is not above 0" in ran.err
+
+
 @pytest.mark.parametrize("version", [33, 35])
 def test_the_resistance_of_the_stator_is_that_of_the_power_flow_file(run, version):
     event()
