@@ -11,7 +11,13 @@ from exfit.verdict.causes.channels import (
 from exfit.verdict.causes.evidence import Recogniser
 from exfit.verdict.causes.levels import unsteady_record, wrong_voltage
 from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
-from exfit.verdict.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
+from exfit.verdict.causes.steps import (
+    further_step,
+    ramped_step,
+    wrong_instant,
+    wrong_sign,
+    wrong_size,
+)
 from exfit.verdict.causes.unit import (
     fixed_values,
     machine_data,
@@ -41,6 +47,7 @@ BY_TRIAL: Mapping[str, Recogniser] = {
     "machine data": machine_data,
     "other fixed values": fixed_values,
     "limits": wrong_limit,
+    "ramp of the step": ramped_step,
     "further step": further_step,
 }
 AFTER_TRIALS: Mapping[str, Recogniser] = {"recorder that averages": averaging}

@@ -1,6 +1,6 @@
 """Steps that were not made as the case says: sign, size, instant, number."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +10,11 @@ from exfit.case.schema import Unknown
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
+from exfit.fitting.residuals import Residuals
 from exfit.plants import REFERENCES
 from exfit.results.cause import Cause, Remedy
 from exfit.simulation.inputs import InputStep
-from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, suspected
+from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, Trial, suspected
 from exfit.verdict.causes.trials import (
     LinearFit,
     Opened,
@@ -29,6 +30,8 @@ LEAST_CHANGE = 5e-3  # of the size of a step
 USUAL_CHANGE = 0.05  # errors of a step's size are rarely less
 RARE = 5.0  # log-likelihood of what is rare
 FARTHEST_DELAY = 2.0  # s
+RAMP_FACTOR, MOST_RAMPS = 1.5, 3
+RAMPS = tuple(0.02 * RAMP_FACTOR**k for k in range(13))  # s, of the durations that are tried
 INSTANTS = 60  # at which a further step is looked for
 LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
@@ -167,6 +170,95 @@ def _detected_delay(record: FittedRecord) -> float:
     measured = first_step(time[kept], overlay.measured[kept])
     simulated = first_step(time[kept], overlay.simulated[kept])
     return 0.0 if measured is None or simulated is None else measured.at - simulated.at
+
+
+def ramped_step(evidence: Evidence) -> Iterator[Suspicion]:
+    """Suspect steps of the reference of being ramps, of the duration that matches best.
+
+    Of a linear unit a ramp cannot be told from averages that are half of it late.
+    """
+    for number, _, experiment in evidence.tests:
+        own = experiment.simulator
+        steps = own.inputs.steps
+        places = [k for k, each in enumerate(steps) if each.signal == "vref" and not each.ramp]
+        if not places or evidence.case.kind.finds_rest:
+            continue
+        if ramp := _fitted_ramp(evidence, number, experiment, places):
+            best, duration = ramp
+            listed = [place for place, _ in _listed(evidence, number)]
+            cause = Cause(
+                f"the step{evidence.name_of(number)} is a ramp of {1e3 * duration:.3g} ms, or the "
+                "recorder averages over as long before each sample",
+                "look how the regulator makes it",
+                "ramp",
+                {
+                    listed[k].replace(".step", ".ramp"): number_text(duration)
+                    for k in places
+                    if k < len(listed) and listed[k]
+                },
+            )
+            yield from suspected(evidence, best, 1, cause)
+
+
+def _fitted_ramp(
+    evidence: Evidence, number: int, experiment: Experiment, places: Sequence[int]
+) -> tuple[Trial, float] | None:
+    """Return the trial with ramps in place of steps, and their duration (s); None without one."""
+    best, values = None, evidence.values
+    for _ in range(MOST_RAMPS):  # linear theory is nearer to the best one each time
+        duration = _likeliest_ramp(evidence.residuals, values, experiment, places)
+        if duration is None:
+            break
+        changed = _ramped(experiment, places, duration)
+        trial = refitted(evidence, with_experiment(evidence.residuals, number, changed))
+        if trial is None or (best is not None and trial.cost >= best[0].cost):
+            break
+        best, values = (trial, duration), trial.values
+    return best
+
+
+def _ramped(experiment: Experiment, places: Sequence[int], duration: float) -> Experiment:
+    """Return an experiment whose steps at some places are ramps (s)."""
+    own = experiment.simulator
+    steps = tuple(
+        step._replace(ramp=duration) if k in places else step
+        for k, step in enumerate(own.inputs.steps)
+    )
+    return replace(experiment, simulator=own.remade(inputs=replace(own.inputs, steps=steps)))
+
+
+def _likeliest_ramp(
+    residuals: Residuals, values: Mapping[str, float], experiment: Experiment, places: Sequence[int]
+) -> float | None:
+    """Find the duration (s) of ramps that matches best by linear theory, among factors of 1.5."""
+    instants = [experiment.simulator.inputs.steps[k].at for k in places]
+    longest = 0.5 * min(np.diff([*instants, experiment.simulator.times[-1]]), default=0.0)
+    theta = np.array([free.scaled(values[free.name]) for free in residuals.free])
+    moves = [*residuals.moves(theta)]
+
+    def left_with(duration: float) -> float:
+        errors, slopes = _ramped(experiment, places, duration).tangents(values, moves)
+        if not np.isfinite(slopes).all():
+            return np.inf
+        coefficients, *_ = np.linalg.lstsq(slopes, errors, rcond=None)
+        left = errors - slopes @ coefficients
+        return float(left @ left)
+
+    durations = [each for each in RAMPS if each < longest]
+    try:
+        costs = [left_with(each) for each in durations]
+        if not costs or not np.isfinite(costs).any():
+            return None
+        k = int(np.argmin(costs))
+        if not 0 < k < len(costs) - 1:
+            return durations[k]
+        # of the parabola through the lowest and its neighbours
+        before, lowest, after = costs[k - 1 : k + 2]
+        way = 0.5 * (before - after) / (before - 2.0 * lowest + after)
+        between_them = durations[k] * RAMP_FACTOR**way
+        return between_them if left_with(between_them) < lowest else durations[k]
+    except SimulationError:
+        return None
 
 
 def further_step(evidence: Evidence) -> Iterator[Suspicion]:

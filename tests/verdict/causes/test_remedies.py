@@ -65,6 +65,17 @@ def spoilt(spoil, folder, step=0.01, until=8.0, **sections):
     return case_file(folder, content | sections, *spoil(time, signals))
 
 
+def ramped(folder):
+    """Write the case of the AC8B whose reference was ramped, not stepped."""
+    unit, rng = UNITS["AC8B"], np.random.default_rng(1)
+    content, time = content_of(unit, {"vt": 1.0}, 0.05), np.arange(0.0, 8.0, 0.01)
+    own = deepcopy(content)
+    own["test"]["vref"][0]["ramp"] = 0.2
+    signals = {"vt": recorded(own, time)["vt"] + 1e-4 * rng.standard_normal(len(time))}
+    content["parameters"] = {"fixed": dict(unit.fixed), "free": free_near(unit.free, rng)}
+    return case_file(folder, content, time, signals)
+
+
 def unsteady(time, signals):
     away = 2e-3 * np.clip(1.0 - time / (0.8 * AT), 0.0, 1.0)
     return time, {"vt": signals["vt"] + away}
@@ -113,6 +124,7 @@ PLANTED = {
     "machine data": partial(drawn, "Tpd0", STATIC),
     "other fixed values": partial(drawn, "Tpd0", STATIC),
     "limits": partial(drawn, "limit not of the unit", COARSE),
+    "ramp of the step": ramped,
     "further step": partial(drawn, "second step", COARSE),
     "recorder that averages": partial(drawn, "averaging recorder", COARSE),
     "record of the event": inverted_power,
