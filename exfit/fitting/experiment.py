@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from exfit.case.schema import BumpTest
 from exfit.errors import SimulationError
 from exfit.fitting.nuisances import OF_SYSTEM, Nuisance
-from exfit.fitting.parameters import FreeParameter
 from exfit.records.record import Record
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import LARGEST_STEP, Response, Simulator
@@ -20,6 +19,7 @@ from exfit.util.arrays import Array
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Averages, Filtering
+    from exfit.fitting.parameters import FreeParameter
     from exfit.fitting.sines import Sine
     from exfit.inference.whitening import Whitening
 
@@ -443,7 +443,7 @@ class ExperimentSetup:
     test: BumpTest
     record: Record
     experiment: Experiment
-    free: tuple[FreeParameter, ...]
+    free: "tuple[FreeParameter, ...]"
     references: Mapping[str, Record] = field(default_factory=dict)
     driving: tuple[str, ...] = ()
     automatic_sines: Mapping[str, tuple[float, float]] = field(default_factory=dict)

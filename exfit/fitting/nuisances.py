@@ -3,13 +3,15 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
-from exfit.fitting.parameters import FreeParameter
 from exfit.plants import BREAKER, DRIVING_SCALE, REFERENCES, VT0
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
+
+if TYPE_CHECKING:
+    from exfit.fitting.parameters import FreeParameter
 
 NuisanceKind = Literal[
     "at", "shift", "step", "drift", "switching", "vt0", "delay", "scale", "offset", "driving",
@@ -69,7 +71,7 @@ class Nuisance:
         return self.signal == signal and self.kind in ("scale", "offset")
 
 
-Found = tuple[Nuisance, FreeParameter]
+Found: TypeAlias = "tuple[Nuisance, FreeParameter]"
 TURN = 2.0 * pi
 COSINE, SINE, FREQUENCY = "cosine", "sine", "frequency"
 OPENING = "breaker.opens"  # the name of the instant, as its place in a test
@@ -135,6 +137,8 @@ def nuisances_of(
     for nuisance, value in (*of_steps, *_of_record(prefix, test, file, scaled)):
         if value.start == "auto" or value.min is None or value.max is None:
             raise TypeError(f"{nuisance.name} has no start or bounds")
+        from exfit.fitting.parameters import FreeParameter  # most simulations find nothing
+
         free = FreeParameter(nuisance.name, value.start, value.min, value.max, logarithmic=False)
         nuisances.append((nuisance, free))
     return nuisances

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Container, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from exfit.signals import OF_STEP
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
 from exfit.simulation.located_test import LocatedTest, SamplePlaces, exact
+from exfit.simulation.responder import Counts, Kept, Responder, Values
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
     groups,
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from exfit.simulation.directions import Moves
 
 ComplexArray = NDArray[np.complex128]
-Counts = NDArray[np.int64]
-Values = Mapping[str, float]
 Answer = TypeVar("Answer")
 
 POINTS_ALONG = 100  # of a response, where its sub-steps are checked
@@ -69,44 +68,6 @@ class Response(NamedTuple):
     time: Array
     signals: Mapping[str, Array]
     substeps: int
-
-
-class Kept(NamedTuple):
-    """Outputs (M, ny) of one parameter set, and their derivatives (M, ny, N) by directions."""
-
-    asked: tuple[tuple[str, ...], tuple[float, ...]]
-    directions: tuple[Direction, ...]
-    samples: Array
-    slopes: Array
-
-
-class Responder(Protocol):
-    """What gives the response of a simulator in place of the equations of its system."""
-
-    def outputs(self, simulator: "Simulator") -> tuple[str, ...]:
-        """Name the outputs of a response for which no others are asked."""
-
-    def confirm(self, simulator: "Simulator", values: Values) -> None:
-        """Raise SimulationError where there is no response though the start is at rest."""
-
-    def samples_of_many(
-        self,
-        simulator: "Simulator",
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        tests: "Sequence[Simulator] | None",
-    ) -> tuple[Array, Counts]:
-        """Simulate as `Simulator.samples_of_many`."""
-
-    def tangents_of_many(
-        self,
-        simulator: "Simulator",
-        sets: Sequence[Values],
-        outputs: tuple[str, ...],
-        directions: Sequence[Sequence[Direction]],
-        tests: "Sequence[Simulator] | None",
-    ) -> tuple[Array, Array, Counts]:
-        """Simulate as `Simulator.tangents_of_many`."""
 
 
 class Simulator:
