@@ -96,7 +96,7 @@ ROWS = (
     ),
     SignalRow(
         "frequency", "frequency", "Hz", quantity="frequency", turn=11,
-        words=("frequency", "freq", "frequenz", "frequence", "frecuencia", "frequencia"),
+        words=("frequency", "f"),
     ),
     SignalRow(
         "pref", "load reference", turn=12, words=("pref", "load reference", "load setpoint"),

@@ -48,6 +48,7 @@ FITTED_VALUES = 4  # level, size, instant and lag
 CHI_SQUARE = 3.84  # of one degree of freedom: exceeded by chance in 5 of 100
 FIT_QUANTILE = 1.0  # standard deviations of chi-square: a misfit beyond is one of the shape
 SHAPE_ERROR = 0.15  # of the rise: by so much no shape is that of the response
+SLOW_ERROR = 0.03  # of the whole rise: its first part, which fits, may be that of what is filtered
 CLOCK_ERROR = 0.25  # of a sample
 NOISELESS = 1e-9  # of the rise: the least noise, as numbers are rounded
 
@@ -355,8 +356,10 @@ def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) 
         peak: the sample at which the first move ends.
         scatter: the standard deviation of the noise.
     """
+    whole = 0.0
     for rest_end, end in _rises(np.abs(samples[: peak + 1] - level), scatter):
         rise = float(time[end] - time[rest_end])
+        whole = max(whole, rise)
         first = int(np.searchsorted(time, time[rest_end] - COMPARED_REST * rise))
         window = slice(max(min(first, rest_end - FEWEST_RESTING), 0), end + 1)
         block = -(-(window.stop - window.start) // MOST_SAMPLES)
@@ -367,7 +370,7 @@ def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) 
         least, freedom = float(np.min(costs)), max(len(y) - FITTED_VALUES, 1)
         left, known = least / freedom, max(scatter / sqrt(block), NOISELESS * float(np.ptp(y))) ** 2
         interval = interval_below(instants, costs, least + CHI_SQUARE * max(known, left))
-        margin = SHAPE_ERROR * rise + CLOCK_ERROR * median_step(t)
+        margin = SHAPE_ERROR * rise + SLOW_ERROR * whole + CLOCK_ERROR * median_step(t)
         result = Onset(interval.earliest - margin, interval.latest + margin)
         if left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom)):
             break

@@ -9,6 +9,7 @@ from exfit.records.inspection import Inspection
 from exfit.records.pmu_recognition import PmuContent
 
 NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
+GUESSED = ("name", "level")  # where a unit may be from that the file does not state
 MOST_ROWS = 40  # channels, steps or notes of a file that someone reads through
 MOST_NAMES = 12  # of channels in one line
 MORE = "... and {:,} more in inspect.json"
@@ -29,13 +30,9 @@ def inspection(result: Inspection, record: Sequence[str]) -> Iterator[Block]:
         yield paragraph(line)
     if result.pmu is not None:
         yield paragraph(_of_pmu(result.pmu))
-    elif result.plays_in:
-        yield paragraph("a play-in file: voltage and frequency, for a plant grid-playback")
-    elif result.is_event:
-        yield paragraph("a grid event: voltage, angle and power, no reference")
-    elif not result.steps:
-        yield paragraph("no step in any channel")
-    else:
+    kind = result.kind
+    yield paragraph(f"a {kind.name}{'' if kind.sure else '?'}: {kind.why}")
+    if result.steps and not result.is_event:
         yield _steps(result)
         yield from _more(len(result.steps) - MOST_ROWS)
     yield from notes(result.findings[:MOST_ROWS])
@@ -91,7 +88,7 @@ def _channels(result: Inspection) -> Table:
         rows.append(
             row(
                 name,
-                (channel.unit or "") + ("?" if channel.unit_from == "name" else ""),
+                (channel.unit or "") + ("?" if channel.unit_from in GUESSED else ""),
                 "" if channel.signal is None else channel.signal + ("" if channel.sure else "?"),
                 number(channel.level),
                 number(channel.low),

@@ -14,10 +14,17 @@ from exfit.dsp.noise import UNIFORM_SPREAD, drift_at_rest
 from exfit.dsp.quality import SPIKE_LIMIT, quantum, spikes, stuck
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import DetectedStep
-from exfit.records.channel_names import CONTROL_ERROR, Clarity, Guess, guess_signals, read_name
+from exfit.records.channel_names import (
+    CONTROL_ERROR,
+    OF_SHUNT,
+    Clarity,
+    Guess,
+    NameReading,
+    guess_signals,
+)
 from exfit.records.steps import ChannelSteps, RecordedStep
 from exfit.records.units import quantity_of
-from exfit.signals import OF_BUMP_TEST, POSITIVE_AT_REST, SIGNALS
+from exfit.signals import FIELDS, OF_BUMP_TEST, OF_CURRENT_PHASOR, POSITIVE_AT_REST, SIGNALS
 from exfit.util.arrays import Array
 
 PLACES_LISTED = 5  # of spikes and of other faults, the first ones
@@ -26,8 +33,11 @@ OWN_NOISE = 1.01  # times what rounding leaves: the noise of a channel that is n
 NEGATIVE = 5.0  # times the noise below zero: what is positive is inverted
 LEAST_DRIFT = 0.01  # of all that a channel changes: with less it is at rest
 LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
+LARGEST_LOAD = 5.0  # what power or current in per unit stays below, in a fault too
 AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a step
 PERCENT = 100.0
+MOVES = 10.0  # times the noise: what is no noise
+ASKED_FOR = (*OF_BUMP_TEST, "p", "q")  # what an open column may be
 RESPONDING = (*OF_BUMP_TEST, "vref")  # signals that move for good with a step of the reference
 LARGEST_DEVIATION = 0.5  # pu: where a speed rests nearer to zero, it is a deviation
 LARGEST_ERROR = 0.5  # of all that a control error moves: how far from zero it rests
@@ -45,7 +55,8 @@ class InspectedChannel:
     is the source of the unit: file or name. The ``signal`` that it seems to be is ``sure`` or a
     guess, by what is said under ``why``; ``question`` is what must be asked about it. With
     ``system_base`` 1 pu is that of the grid. With ``rejected_load`` the unit is on load until its
-    breaker opens in the record.
+    breaker opens in the record. With ``absolute`` its numbers are no per unit: others without a
+    unit beside it are none.
     """
 
     name: str
@@ -71,6 +82,7 @@ class InspectedChannel:
     question: str = ""
     system_base: bool = False
     rejected_load: bool = False
+    absolute: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """Give the figures as plain data."""
@@ -84,6 +96,16 @@ class InspectedChannel:
     def constant(self) -> bool:
         """Whether it never changes."""
         return self.low == self.high
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves beyond its noise."""
+        return self.high - self.low > MOVES * self.noise
+
+    @property
+    def may_be_load(self) -> bool:
+        """Whether it is open and may be active or reactive power."""
+        return self.signal is None and " p " in self.question.replace("?", " ")
 
     @property
     def missing_samples(self) -> str:
@@ -134,9 +156,12 @@ class InspectedChannel:
         """Whether it seems to be in per unit: it says so, or nothing, and looks so."""
         if self.unit is not None:
             return self.unit == "pu"
+        if self.absolute:
+            return False
         if self.signal in ("vt", "vref"):
             return abs(self.level) <= AT_REST_PU[1]
-        return max(abs(self.low), abs(self.high)) <= LARGEST_PU
+        of_load = self.signal in OF_CURRENT_PHASOR
+        return max(abs(self.low), abs(self.high)) <= (LARGEST_LOAD if of_load else LARGEST_PU)
 
     @property
     def inverted(self) -> bool:
@@ -236,41 +261,61 @@ def _level_at_rest(time: Array, samples: Array, steps: Sequence[RecordedStep]) -
 def identified(
     channels: Sequence[InspectedChannel],
     steps: Sequence[RecordedStep],
-    groups: Sequence[InspectedPhases] = (),
-    of_pmu: Collection[str] = (),
+    groups: Sequence[InspectedPhases],
+    of_pmu: Collection[str],
+    readings: Mapping[str, NameReading],
 ) -> tuple[InspectedChannel, ...]:
-    """Return the channels with the signals that they are by name, unit, level and steps.
+    """Return the channels with the signals that they are by ``readings``, level and steps.
 
     Those of ``groups`` are phases, and no signal by themselves; nor are those ``of_pmu``, the
     phasors of a measurement unit.
     """
     phases = {name for group in groups for name in group.columns}
-    candidates = _candidates(channels, phases.union(of_pmu))
-    units = {name: channel.unit for name, channel in candidates.items() if channel.unit}
+    candidates = _candidates(channels, phases.union(of_pmu), readings)
     moving = {name for step in steps for name in step.sizes}
-    guesses = guess_signals([*candidates], units, moving)
-    taken = {guess.signal for guess in guesses.values()}
-    if groups or of_pmu:
-        taken.add("vt")
+    guesses = guess_signals([*candidates], {}, moving, readings)
+    taken = {guess.signal for guess in guesses.values()} | ({"vt"} if groups or of_pmu else set())
     known = {}
     for name, channel in candidates.items():
         if name in guesses:
             known[name] = _as_guessed(channel, guesses[name], name in moving, bool(steps))
-        elif name in moving or not steps:
-            question = _open_question(channel, taken, candidates)
+        elif name in moving or channel.moves or not (moving & guesses.keys() and "vt" in taken):
+            question = _open_question(channel, taken, candidates, readings, name in moving)
             known[name] = replace(channel, question=question)
     return tuple(known.get(channel.name, channel) for channel in channels)
 
 
+def without_false_per_unit(
+    channels: Sequence[InspectedChannel],
+) -> tuple[InspectedChannel, ...]:
+    """Return channels of which none without a unit is per unit where another certainly is not.
+
+    So it is with those of load, and those of the field: q of 12 Mvar beside p of 150 MW.
+    """
+    plain = {each.signal: each for each in channels if each.unit is None and each.signal}
+    voltage, absolute = plain.get("vt"), set[str | None]()
+    for group in (OF_CURRENT_PHASOR, FIELDS):
+        beside = [plain[signal] for signal in group if signal in plain]
+        if any(not each.seems_per_unit for each in (voltage, *beside) if each is not None):
+            absolute |= {*group}
+    return tuple(
+        replace(each, absolute=True) if each.unit is None and each.signal in absolute else each
+        for each in channels
+    )
+
+
 def _candidates(
-    channels: Sequence[InspectedChannel], excluded: Collection[str]
+    channels: Sequence[InspectedChannel],
+    excluded: Collection[str],
+    readings: Mapping[str, NameReading],
 ) -> dict[str, InspectedChannel]:
     """Return the channels that may be a signal, by name; a control error rests at zero."""
     candidates = {}
     for channel in channels:
         at_zero = abs(channel.level) < LARGEST_ERROR * (channel.high - channel.low)
-        error = at_zero and CONTROL_ERROR in read_name(channel.name, channel.unit).others
-        if not (channel.name in excluded or channel.constant or error):
+        if channel.name in excluded or channel.constant:
+            continue
+        if not (at_zero and CONTROL_ERROR in readings[channel.name].others):
             candidates[channel.name] = channel
     return candidates
 
@@ -291,8 +336,11 @@ def _as_guessed(
         reasons.append(f"its level: {channel.level:.4g} pu at rest")
     if moves:
         reasons.append("its shape: it moves with the step")
+    unit = (reading.unit, "level") if channel.unit is None else (channel.unit, channel.unit_from)
     return replace(
         channel,
+        unit=unit[0],
+        unit_from=unit[1] if unit[0] else "",
         signal=signal,
         sure=reading.clarity <= Clarity.WORDS and not (reading.others or guess.rivals or still),
         why="; ".join(filter(None, reasons)),
@@ -315,6 +363,8 @@ def _questions(channel: InspectedChannel, guess: Guess, still: bool) -> Iterator
         yield f"is it the {what}? It does not move with the step"
     if signal == "speed" and abs(channel.level) < LARGEST_DEVIATION:
         yield f"is it the speed's deviation? It rests at {channel.level:.2g}: then offset: 1"
+    if reading.question:
+        yield reading.question
     if reading.system_base:
         yield (
             f"1 pu of {reading.why} is that of the grid, mostly 100 MVA: its base is the rated MVA "
@@ -330,10 +380,14 @@ def _looks_terminal(channel: InspectedChannel) -> bool:
 
 
 def _open_question(
-    channel: InspectedChannel, taken: Collection[str], candidates: Mapping[str, InspectedChannel]
+    channel: InspectedChannel,
+    taken: Collection[str],
+    candidates: Mapping[str, InspectedChannel],
+    readings: Mapping[str, NameReading],
+    steps: bool,
 ) -> str:
     """Question about a channel that is taken for no signal, "" for none."""
-    reading = read_name(channel.name, channel.unit)
+    reading = readings[channel.name]
     if reading.others and not {*reading.others} & {*taken}:
         return f"is it {' or '.join(reading.others)}? {reading.why} fits either"
     signal = reading.signal
@@ -341,15 +395,15 @@ def _open_question(
         rivals = [
             name
             for name, other in candidates.items()
-            if other is not channel and read_name(name, other.unit).signal == signal
+            if other is not channel and readings[name].signal == signal
         ]
         return f"is it {signal}, the {SIGNALS[signal].name}, or is {' or '.join(rivals)}?"
-    quantity = quantity_of(channel.unit)
+    quantity = "current" if channel.unit == OF_SHUNT else quantity_of(channel.unit)
     missing = [
         signal
-        for signal in OF_BUMP_TEST
+        for signal in ASKED_FOR
         if signal not in taken and quantity in (None, SIGNALS[signal].quantity)
     ]
     if reading.why or not missing:
         return ""
-    return f"is it {' or '.join(missing)}? It moves with the step"
+    return f"is it {' or '.join(missing)}?" + " It moves with the step" * steps

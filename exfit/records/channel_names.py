@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 from exfit.records.units import OTHER_UNITS, bare, quantity_of
 from exfit.signals import ROWS, SIGNALS, SignalRow
@@ -20,39 +20,41 @@ from exfit.signals import ROWS, SIGNALS, SignalRow
 WORDS: Mapping[str, str] = {
     "filler": """
         rel relative avg average mean mittel mittelwert rms eff meas measured ist istwert actual pv
-        filt main active real activa ativa wirk blind mag magnitude dc elec electrical el""",
+        filt main active real activa ativa attiva wirk blind mag magnitude dc elec electrical el""",
     "voltage": """
         voltage volt volts vlt v u kv vdc vac vcc vll spannung spg tension tensao voltaje
-        voltagem""",
+        voltagem tensione""",
     "current": """
         current curr cur amp amps ampere amperes i ka adc strom courant corriente corrente intensite
         intensidad""",
-    "power": "power load watt watts mw kw leistung wirkleistung puissance potencia",
-    "reactive": "reactive var vars mvar mvars kvar blindleistung reactiva reativa",
+    "power": "power load watt watts mw kw leistung wirkleistung puissance potencia potenza",
+    "reactive": "reactive var vars mvar mvars kvar blindleistung reactiva reativa reattiva",
     "stator": """
         gen generator generatoren generador gerador generateur alternateur alternador alternator
         stator estator statorique estatorica stander anker armature machine maschine maschinen
-        maquina terminal terminals term bornes klemmen klemme klemm trm""",
+        maquina terminal terminals term bornes klemmen klemme klemm trm generatore statore""",
     "field": """
-        field fld feld rotor rot rotors rotorique rotorica laufer polrad champ campo fd slip
+        field fld feld rotor rot rotors rotorique rotorica rotore laufer polrad champ campo fd slip
         schleifring bridge""",
-    "excitation": "excitation exc excit erreger erregung err excitacion excitacao",
-    "exciter": "exciter exciters excitatrice excitatriz excitadora pilot erregermaschine",
+    "excitation": "excitation exc excit erreger erregung err excitacion excitacao eccitazione",
+    "exciter": """
+        exciter exciters excitatrice excitatriz excitadora eccitatrice pilot erregermaschine""",
     "grid": """
-        bus busbar grid network netz reseau red rede barra barras hv ehv sammelschiene system mains
-        infinite""",
+        bus busbar grid network netz reseau red rede rete barra barras sbarra hv ehv
+        sammelschiene system mains infinite""",
     "reference": """
         ref reference referenz referencia setpoint setpt setval sp soll sollwert set consigne
-        consigna""",
-    "speed": "speed spd drehzahl vitesse velocidad velocidade rpm",
+        consigna riferimento""",
+    "speed": "speed spd drehzahl vitesse velocidad velocidade velocita rpm",
+    "frequency": "freq frequency frequenz frequence frecuencia frequencia frequenza",
+    "angle": "angle winkel angulo angolo",
     "output": "output out ausgang salida saida sortie",
     "otherwise": """
         temp temperature temperatur temperatura limit limits lim limite limiter uel oel max
-        min error deviation abweichung regelabweichung firing angle winkel freq frequency
-        frequenz frequence frecuencia frequencia hz hertz gate valve breaker position factor
-        pf cos trafo transformer transformador transformateur transformator neutral governor
-        turbine pressure vibration trigger status alarm control ctrl steuersatz apparent mva
-        scheinleistung spare""",
+        min error deviation abweichung regelabweichung firing hz hertz gate valve breaker
+        position factor pf cos trafo transformer transformador transformateur transformator
+        neutral governor turbine pressure vibration trigger status alarm control ctrl steuersatz
+        apparent mva scheinleistung spare""",
 }
 SHORT = frozenset("uvipq")  # letters that begin a word, as in ugen and ifeld
 LINKING = ("s", "n", "en")  # letters between the parts of a German word
@@ -63,9 +65,11 @@ EXCITER_FIELD = "that of the field of a brushless exciter"
 CONTROL_ERROR = "a control error"
 AMBIGUOUS_EXCITATION = ("err", "exc", "excit")  # exciter as well as excitation
 OF_SPEED = ("rpm", "r/min", "1/min", "min-1", "U/min", "rad/s")
+OF_SHUNT = "mV"  # of a current: the voltage of its shunt
 RATIOS = ("%", "-")  # units that a signal of any quantity may have
 DOUBTS: Mapping[str, tuple[str, ...]] = {"ue": (EXCITER_FIELD,), "ie": (EXCITER_FIELD,)}
 POWERS = ("power", "reactive")
+FEWEST_SHARING = 3  # columns whose names begin or end alike
 OF_FIELD = frozenset(("field", "excitation"))
 OF_OTHERS = OF_FIELD | {"speed"}  # references to others than the voltage
 # words of other columns -> with which others they are a signal after all, and what else it may be
@@ -111,7 +115,9 @@ class Clarity(IntEnum):
 class NameReading:
     """The signal that a name shows, ``others`` that it may be as well, and why.
 
-    ``system_base`` says that 1 pu is that of the grid, not of the machine.
+    ``system_base`` says that 1 pu is that of the grid, not of the machine. With ``elsewhere`` the
+    name is that of something else. What physics shows may come with its ``unit``, and a
+    ``question`` where it does not show it for sure.
     """
 
     signal: str | None
@@ -120,6 +126,9 @@ class NameReading:
     others: tuple[str, ...] = ()
     order: int = 0
     system_base: bool = False
+    elsewhere: bool = False
+    unit: str | None = None
+    question: str = ""
 
 
 def read_name(name: str, unit: str | None) -> NameReading:
@@ -137,6 +146,8 @@ def read_name(name: str, unit: str | None) -> NameReading:
         reading = NameReading(row.symbol, Clarity.OWN, _named(whole), doubts, order)
     else:
         reading = _by_words(_own(words), kinds, unit)
+    if unit == "kV" and reading == _none(""):  # no field has so much
+        return NameReading("vt", Clarity.UNIT, "")
     row = SIGNALS.get(reading.signal or "")
     if row is not None and not _fits(unit, row):
         return _none(f"{unit} is no unit of {row.symbol}")
@@ -150,7 +161,7 @@ def _of_program(text: str) -> NameReading | None:
         signal = PSSE_CHANNELS.get(channel["name"])
         why, system = f"PSS/E's {channel['name']}", channel["name"] in ON_SYSTEM_BASE
         clarity = Clarity.OWN if signal else Clarity.NONE
-        return NameReading(signal, clarity, why, system_base=system)
+        return NameReading(signal, clarity, why, system_base=system, elsewhere=signal is None)
     variable = POWER_FACTORY.match(text)
     signal = POWER_FACTORY_VARIABLES.get(variable["name"].lower()) if variable else None
     if variable is None or signal is None:
@@ -176,18 +187,31 @@ def _by_words(own: NameReading | None, kinds: Mapping[str, str], unit: str | Non
     if own is not None and own.signal == "vs":
         of_stator = "stator" in kinds and own.why == _named("vs")
         return _none(own.why, "vt", "vs") if of_stator else own
-    quantity = _quantity(kinds) or quantity_of(unit)
+    quantity = _quantity(kinds) or ("current" if unit == OF_SHUNT else quantity_of(unit))
     if "speed" in kinds and "reference" not in kinds:
         return NameReading("speed", Clarity.OWN, _named(kinds["speed"]))
-    if "otherwise" in kinds:
-        return _none(_named(kinds["otherwise"]))
-    if EXCEPTIONS.keys() & kinds.keys():
-        return _elsewhere(kinds, quantity)
+    reading = _beside_machine(kinds, quantity)
+    if reading is not None:
+        return reading
     if "reference" in kinds:
         return _reference(kinds, quantity)
     if "excitation" in kinds and quantity not in POWERS:
         return _excitation(kinds, quantity, own)
     return own or _by_place(kinds, quantity)
+
+
+def _beside_machine(kinds: Mapping[str, str], quantity: str | None) -> NameReading | None:
+    """Read words of what is no signal of the machine, of the frequency and of the angle."""
+    if "otherwise" in kinds:
+        return _of_another(kinds["otherwise"])
+    turning = next((kind for kind in ("frequency", "angle") if kind in kinds), None)
+    if turning is not None:
+        reading = NameReading(turning, Clarity.OWN, _named(kinds[turning]))
+        return _of_another(kinds["field"]) if "field" in kinds else reading
+    exceptions = EXCEPTIONS.keys() & kinds.keys()
+    if exceptions and not (quantity in POWERS and exceptions == {"output"}):
+        return _elsewhere(kinds, quantity)
+    return None
 
 
 def _elsewhere(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
@@ -199,7 +223,7 @@ def _elsewhere(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
     other, place, doubt = EXCEPTIONS[kind]
     row = _row(quantity, place) if other in kinds else None
     if row is None:
-        return _none(_named(kinds[kind]))
+        return _of_another(kinds[kind])
     return NameReading(row.symbol, Clarity.VAGUE, _named(kinds[kind], kinds[other]), (doubt,))
 
 
@@ -207,7 +231,7 @@ def _reference(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
     """Return the reference of the voltage; that of power or of a field current is no signal."""
     why = _named(kinds["reference"])
     of_others = quantity not in (None, "voltage") or OF_OTHERS & kinds.keys()
-    return _none(why) if of_others else NameReading("vref", Clarity.OWN, why)
+    return _of_another(kinds["reference"]) if of_others else NameReading("vref", Clarity.OWN, why)
 
 
 def _excitation(
@@ -228,7 +252,7 @@ def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
     """Read the words for a quantity and for a place together, or for one of them."""
     if quantity in POWERS:
         if OF_FIELD & kinds.keys():
-            return _none(_named(*kinds.values()))
+            return _of_another(*kinds.values())
         clarity = Clarity.WORDS if quantity in kinds else Clarity.UNIT
         why = _named(kinds[quantity]) if quantity in kinds else ""
         return NameReading("p" if quantity == "power" else "q", clarity, why)
@@ -243,6 +267,11 @@ def _by_place(kinds: Mapping[str, str], quantity: str | None) -> NameReading:
     if electric == {"voltage"}:
         return NameReading("vt", Clarity.QUANTITY, _named(kinds["voltage"]))
     return _none(_named(kinds["current"]), "ifd", "it") if electric == {"current"} else _none("")
+
+
+def _of_another(*words: str) -> NameReading:
+    """Read a name that is of none of the signals."""
+    return NameReading(None, Clarity.NONE, _named(*words), elsewhere=True)
 
 
 def _none(why: str, *others: str) -> NameReading:
@@ -268,7 +297,8 @@ def _fits(unit: str | None, row: SignalRow) -> bool:
     if quantity is None:
         turning = row.symbol == "speed" and unit in OF_SPEED
         return unit not in OTHER_UNITS or unit in RATIOS or turning
-    return quantity == row.quantity or not row.quantity
+    of_shunt = unit == OF_SHUNT and row.quantity == "current"
+    return quantity == row.quantity or of_shunt or not row.quantity
 
 
 def _named(*words: str) -> str:
@@ -343,15 +373,43 @@ class Guess:
         return str(self.reading.signal)
 
 
-def guess_signals(
-    names: Sequence[str], units: Mapping[str, str], moving: Collection[str] = ()
-) -> dict[str, Guess]:
-    """Return the signals that columns seem to be, each signal once, by the clearest name.
-
-    Of equally clear names the columns that are ``moving`` with the test come first. Where several
-    remain that have no more than a quantity in common, none of them is taken.
-    """
+def read_names(names: Sequence[str], units: Mapping[str, str]) -> dict[str, NameReading]:
+    """Read the names of the columns of a file; what all of them share says nothing: vA, fA, pA."""
     readings = {name: read_name(name, units.get(name)) for name in names}
+    plain = [bare(name) for name in names]
+    shortest = min(map(len, plain), default=1) - 1  # a letter of each remains
+    before = _shared([name[:shortest] for name in plain])
+    after = _shared([name[: -1 - shortest + before : -1] for name in plain])
+    if len(names) < FEWEST_SHARING or not before + after:
+        return readings
+    for name, text in zip(names, plain, strict=True):
+        short = text[before : len(text) - after]
+        own = read_name(short, units.get(name)) if short.isalpha() else readings[name]
+        if readings[name].clarity >= Clarity.QUANTITY > own.clarity:
+            readings[name] = own
+    return readings
+
+
+def _shared(texts: Sequence[str]) -> int:
+    """Return with how many letters all texts begin alike."""
+    return sum(
+        1 for _ in takewhile(lambda letters: len({*letters}) == 1, zip(*texts, strict=False))
+    )
+
+
+def guess_signals(
+    names: Sequence[str],
+    units: Mapping[str, str],
+    moving: Collection[str] = (),
+    known: Mapping[str, NameReading] | None = None,
+) -> dict[str, Guess]:
+    """Return the signals that columns seem to be, each signal once, by the clearest reading.
+
+    Of equally clear ones the columns that are ``moving`` with the test come first. Where several
+    remain that have no more than a quantity in common, none of them is taken. The readings that are
+    ``known`` count for their names.
+    """
+    readings = read_names(names, units) if known is None else {name: known[name] for name in names}
     guesses: dict[str, Guess] = {}
     for row in IN_TURN:
         ranked = [
@@ -374,7 +432,8 @@ def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[
     by_lower_case = {name.lower(): name for name in names}
     for name in names:
         for triple in triples(name, by_lower_case):
-            quantities = {quantity_of(units.get(column)) for column in triple}
+            stated = {units.get(column) for column in triple}
+            quantities = {quantity_of(unit) for unit in stated} if len(stated) == 1 else set()
             voltage = quantities == {"voltage"} or (
                 quantities == {None} and OF_VOLTAGE.match(bare(name).lower())
             )

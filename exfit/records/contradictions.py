@@ -5,6 +5,7 @@ in per unit, by where the machine rests with it.
 """
 
 from collections.abc import Iterator, Sequence
+from math import copysign
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from exfit.signals import SIGNALS
@@ -95,6 +96,16 @@ def sign_disputed_by(
     return tuple(disputed)
 
 
+def direction_by_others(channels: Channels, step: "RecordedStep") -> float:
+    """Sign of a step by the field and the reactive power; 0 where they show none, or both."""
+    signs = {
+        copysign(1.0, size)
+        for channel in filter(None, (_of(channels, signal) for signal in (*FIELD, "q")))
+        if not channel.inverted and _certain(channel, size := step.sizes.get(channel.name, 0.0))
+    }
+    return signs.pop() if len(signs) == 1 else 0.0
+
+
 def _opposite(
     voltage: "InspectedChannel", channels: Channels, step: "RecordedStep"
 ) -> Iterator[str]:
@@ -150,7 +161,7 @@ def scale_to_find(channel: "InspectedChannel", channels: Channels) -> ScaleRange
     if channel.signal not in FIELD or level is None or level == 0.0:
         return None
     low, high = _range(channels)
-    if low <= abs(level) <= high:
+    if low <= abs(level) <= high or any(each.may_be_load for each in channels):
         return None
     usual = _voltage(channels) * (USUAL_ON_LOAD if is_on_load(channels) else USUAL_WITHOUT_LOAD)
     limits = sorted((low / channel.level, high / channel.level))

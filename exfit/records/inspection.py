@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,17 @@ from exfit.records.channel_inspection import (
     InspectedPhases,
     identified,
     inspect_channel,
+    without_false_per_unit,
 )
-from exfit.records.channel_names import guess_signals, three_phases
+from exfit.records.channel_names import (
+    Clarity,
+    NameReading,
+    guess_signals,
+    read_names,
+    three_phases,
+)
 from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
-from exfit.records.contradictions import base_findings, contradictions
+from exfit.records.contradictions import base_findings, contradictions, is_on_load
 from exfit.records.formats import PLAY_IN
 from exfit.records.formats.table import (
     RecordTable,
@@ -29,20 +37,22 @@ from exfit.records.formats.table import (
     listed,
     refuse_uneven,
 )
+from exfit.records.kinds import EVENT, STEADY, KindOfTest, kind_of
 from exfit.records.phasors import Status, angle_findings, bad_rows, in_radians
+from exfit.records.physics import RATED_HZ, readings_by_physics, waveforms_apart
 from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
 from exfit.records.samples import Samples
 from exfit.records.steps import SAME_STEP, RecordedStep, steps_of_record
-from exfit.records.units import unit_in, usual
-from exfit.signals import OF_EVENT
-from exfit.util.arrays import Array, median_step
+from exfit.records.units import quantity_of, unit_in, usual
+from exfit.signals import FIELDS, OF_EVENT, TERMINALS
+from exfit.util.arrays import Array
 from exfit.util.text import LARGEST
 
 REFERENCE = "vref"
-BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
-ABOVE_NOISE = 5.0  # times the noise of p: then it moves
+NEARLY_RATED = 0.003  # of the rated frequency: so far off it vt is off by as much
+MOST_WAVEFORMS = 64  # columns among which three phases are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,44 +111,32 @@ class Inspection:
         """Whether it is a play-in file: what drives a unit, and nothing to compare."""
         return self.path.suffix.lower() == PLAY_IN
 
+    @cached_property
+    def kind(self) -> KindOfTest:
+        """The kind of test that it holds, and why."""
+        return kind_of(self)
+
     @property
     def is_event(self) -> bool:
-        """Whether it seems to be a grid event: phasors, or p and an angle without a reference.
-
-        A frequency does for an angle where the voltage is moved by the grid, not by a reference.
-        """
-        signals = {channel.signal for channel in self.channels}
-        driving = "angle" in signals or ("frequency" in signals and self._moved_by_grid)
-        plain = {"vt", "p"} <= signals and driving and REFERENCE not in signals
-        return self.pmu is not None or plain or self.plays_in
-
-    @property
-    def _moved_by_grid(self) -> bool:
-        """Whether q falls as vt rises, where a step of the reference would raise both.
-
-        Nor would such a step move p more than q, as the loss of a line does.
-        """
-        voltage, active, reactive = map(self.channel_of, ("vt", "p", "q"))
-        if voltage is None or active is None or reactive is None:
-            return False
-        apart = max(round(BETWEEN_CHANGES / median_step(self.time)), 1)
-        of_vt, of_p, of_q = (
-            samples[apart:] - samples[:-apart]
-            for samples in (self.samples[each.name] for each in (voltage, active, reactive))
-        )
-        of_one_scale = _scale(active) == _scale(reactive)
-        least = max(np.nansum(of_q**2), len(of_p) * (ABOVE_NOISE * active.noise) ** 2)
-        swings = of_one_scale and float(np.nansum(of_p**2)) > least
-        return swings or float(np.nansum(of_vt * of_q)) < 0.0
+        """Whether it seems to be a grid event."""
+        return self.kind.name == EVENT
 
     @property
     def findings(self) -> tuple[str, ...]:
         """What must be known before the record is used, in sentences."""
         if self.is_event:
-            lacking = (channel.missing_samples for channel in self.channels)
+            of_channels = (
+                text
+                for each in self.channels
+                for text in (
+                    each.missing_samples,
+                    each.question and f"{each.name}: {each.question}",
+                )
+            )
             return (
                 *_clock_findings(self),
-                *filter(None, (self.flagged, *lacking)),
+                *self._kind_findings(),
+                *filter(None, (self.flagged, *of_channels)),
                 *self._angle_findings(),
             )
         of_channels = (finding for channel in self.channels for finding in channel.findings)
@@ -146,11 +144,42 @@ class Inspection:
         of_reference = [step for step in self.steps if not (opening and opening.causes(step.at))]
         return (
             *_clock_findings(self),
+            *self._kind_findings(),
             *of_channels,
             *rejection_findings(opening),
             *contradictions(self.channels, of_reference),
             *base_findings(self.channels),
+            *self._speed_findings(),
         )
+
+    def _kind_findings(self) -> Iterator[str]:
+        """Ask for the kind of test where it is not sure; say what a steady point is good for."""
+        if not self.kind.sure and self.opening is None:  # which is told as such
+            yield f"a {self.kind.name}, by this: {self.kind.why}"
+        if self.kind.name == STEADY:
+            levels = (
+                f"{signal} {channel.level:.5g} {channel.unit or ''}".rstrip()
+                for signal in (*TERMINALS, *FIELDS)
+                if (channel := self.channel_of(signal)) is not None
+            )
+            yield (
+                "a steady point: it shows nothing of an exciter; on load it is a row of points "
+                f"at rest in a programme: {', '.join(levels)}"
+            )
+
+    def _speed_findings(self) -> Iterator[str]:
+        """Say that the voltage of a unit with its breaker open goes with its speed."""
+        channel = self.channel_of("frequency")
+        if channel is None or channel.unit != "Hz" or is_on_load(self.channels):
+            return
+        rated = min(RATED_HZ, key=lambda hertz: abs(channel.level - hertz))
+        share = channel.level / rated
+        if abs(share - 1.0) > NEARLY_RATED:
+            yield (
+                f"{channel.name}: rests at {channel.level:.5g} Hz, {share:.4g} of {rated:g}: with "
+                "the breaker open vt goes with the speed, and a gain fitted as of rated speed is "
+                f"{share:.4g} times what it is"
+            )
 
     def _angle_findings(self) -> Iterator[str]:
         """Find what speaks against the angle of a PMU: its turns, and the frequency beside it."""
@@ -196,11 +225,6 @@ class Inspection:
         }
 
 
-def _scale(power: InspectedChannel) -> str:
-    """The prefix of the unit of a power: M of MW and of Mvar; pu."""
-    return (power.unit or "").removesuffix("W").removesuffix("var")
-
-
 def inspect(
     table: RecordTable, clock: Sequence[str] | None = None, unit: str | None = None
 ) -> Inspection:
@@ -225,15 +249,16 @@ def inspect(
     of_pmu = frozenset() if pmu is None else pmu.columns.intersection(samples)
     plain = [name for name in samples if name not in of_pmu]
     groups = tuple(_phase_groups(time, samples, plain, stated))
-
     voltages = ((group.name, effective_value(samples, group.columns)) for group in groups)
     signals = samples.beside(Samples(voltages))
-    found = steps_of_record(time, signals, *_recognised(plain, groups, stated))
+    readings = _readings(time, signals, stated, plain, groups)
+    found = steps_of_record(time, signals, *_recognised(readings, plain, groups))
     inspected = [
         inspect_channel(name, units[name], time, column, found.channels[name], found.steps)
         for name, column in samples.items()
     ]
-    channels = identified(inspected, found.steps, groups, of_pmu)
+    channels = identified(inspected, found.steps, groups, of_pmu, readings)
+    channels = without_false_per_unit(channels)
     opening = breaker_opening(time, samples, channels)
     return Inspection(
         path=table.path,
@@ -322,12 +347,31 @@ def _unit(table: RecordTable, name: str) -> tuple[str | None, str]:
     return (None, "") if unit is None else (usual(unit), "name" if stated is None else "file")
 
 
-def _recognised(
-    names: Sequence[str], groups: Sequence[InspectedPhases], units: Mapping[str, str]
-) -> tuple[list[str], set[str]]:
-    """Find the channels of the reference, and all signals of a test, by their names."""
+def _readings(
+    time: Array,
+    signals: Mapping[str, Array],
+    units: Mapping[str, str],
+    names: Sequence[str],
+    groups: Sequence[InspectedPhases],
+) -> dict[str, NameReading]:
+    """Read columns by their names, and those that leave it open by their numbers."""
     phases = {name for group in groups for name in group.columns}
-    guesses = guess_signals([name for name in names if name not in phases], units)
+    readings = read_names([*signals], units)
+    readings |= {group.name: NameReading("vt", Clarity.WORDS, "phases") for group in groups}
+    own = {
+        name: readings[name]
+        for name in (*names, *(group.name for group in groups))
+        if name not in phases
+    }
+    return readings | readings_by_physics(time, signals, units, own)
+
+
+def _recognised(
+    readings: Mapping[str, NameReading], names: Sequence[str], groups: Sequence[InspectedPhases]
+) -> tuple[list[str], set[str]]:
+    """Find the channels of the reference, and all signals of a test."""
+    phases = {name for group in groups for name in group.columns}
+    guesses = guess_signals([name for name in names if name not in phases], {}, known=readings)
     references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
     of_test = {name for name, guess in guesses.items() if guess.signal not in OF_EVENT}
     return references, {*of_test, *(group.name for group in groups)}
@@ -336,7 +380,14 @@ def _recognised(
 def _phase_groups(
     time: Array, samples: Mapping[str, Array], names: Sequence[str], units: Mapping[str, str]
 ) -> Iterator[InspectedPhases]:
-    for group in three_phases(tuple(names), units):
+    """Yield three phases of a voltage, by their names or by their waveforms."""
+    groups = three_phases(tuple(names), units)
+    named = {name for group in groups for name in group}
+    others = [name for name in names if name not in named]
+    voltages = [name for name in others if quantity_of(units.get(name)) in (None, "voltage")]
+    if not groups and len(voltages) <= MOST_WAVEFORMS:
+        groups = tuple(waveforms_apart(time, samples, voltages))[:1]
+    for group in groups:
         waves = {mains_frequency(time, samples[name]) is not None for name in group}
         effective = effective_value(samples, group)
         measured = effective[np.isfinite(effective)]  # where a sample of no phase is missing

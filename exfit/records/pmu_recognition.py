@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.records.channel_names import KINDS, folded, triples, words_of
+from exfit.records.channel_names import KINDS, OF_SHUNT, folded, triples, words_of
 from exfit.records.phasors import unit_by_range, wraps
 from exfit.records.units import WORDS, bare, quantity_of, usual
 from exfit.util.arrays import Array
@@ -129,7 +129,7 @@ def _found(names: Sequence[str], units: Mapping[str, str]) -> Iterator[tuple[str
 
     After these an angle, by its unit, right behind a voltage or a current.
     """
-    electric = [name for name in names if quantity_of(units.get(name)) in QUANTITIES]
+    electric = _electric(names, units)
     plain = {folded(bare(name)).strip(): name for name in electric}
     magnitudes = {key: name for name in names if (key := _key(name, MAGNITUDE, units))}
     angles = {key: name for name in names if (key := _key(name, ANGLE, units))}
@@ -139,6 +139,13 @@ def _found(names: Sequence[str], units: Mapping[str, str]) -> Iterator[tuple[str
     for before, name in pairwise(names):
         if usual(units.get(name, "")) in ANGLE_UNITS and before in electric:
             yield folded(bare(before)), before, name, False
+
+
+def _electric(names: Sequence[str], units: Mapping[str, str]) -> list[str]:
+    """Return the columns of a voltage or a current by their units; mV are those of a shunt."""
+    return [
+        n for n in names if units.get(n) != OF_SHUNT and quantity_of(units.get(n)) in QUANTITIES
+    ]
 
 
 def _quantity(name: str, unit: str | None, numbered: bool) -> str | None:

@@ -47,19 +47,24 @@ class BreakerOpening:
     jump: float | None = None
 
     @property
-    def in_words(self) -> str:
+    def shown(self) -> str:
         """What the record shows of it."""
         columns = " and ".join(self.seen_in)
         if self.jump is not None:
             return (
                 f"{columns} jumps by {100.0 * self.jump:+.2g} % at {self.at:.4g} s, between two "
-                "samples, faster than any exciter: the breaker seems to open (a load rejection)"
+                "samples, faster than any exciter"
             )
         falls = "falls" if len(self.seen_in) == 1 else "fall"
-        return (
-            f"{columns} {falls} permanently to zero at {self.at:.4g} s: the breaker opens (a load "
-            "rejection), which is no step of the reference"
-        )
+        return f"{columns} {falls} permanently to zero at {self.at:.4g} s"
+
+    @property
+    def in_words(self) -> str:
+        """What the record shows, and what it is."""
+        opens = "seems to open (a load rejection), or is it the grid?"
+        if self.jump is None:
+            opens = "opens (a load rejection), which is no step of the reference"
+        return f"{self.shown}: the breaker {opens}"
 
     def causes(self, at: float) -> bool:
         """Check whether a step (s) that a channel seems to show is the response to the opening."""
@@ -77,6 +82,9 @@ def breaker_opening(
     by_signal = {channel.signal: channel for channel in channels if not channel.frequency}
     voltage = by_signal.get("vt")
     loads = {signal: by_signal[signal] for signal in (*POWERS, CURRENT) if signal in by_signal}
+    unnamed = {each.name: each for each in channels if each.may_be_load and not each.frequency}
+    if not loads and len(unnamed) > 1:
+        loads = _falling(time, samples, unnamed)
     if not loads:
         return None if voltage is None else _jump(time, samples[voltage.name], voltage)
     opening = _fall(time, samples, loads)
@@ -88,6 +96,23 @@ def breaker_opening(
         if not abs(after) > STILL_EXCITED * abs(before):
             return None
     return opening
+
+
+def _falling(
+    time: Array, samples: Mapping[str, Array], channels: Mapping[str, InspectedChannel]
+) -> dict[str, InspectedChannel]:
+    """Find two open channels or more that fall to zero for good, as only a load does."""
+    falling = {}
+    for name, channel in channels.items():
+        t, y = present_samples(time, samples[name])
+        if len(y) < 4 * FEWEST_BESIDE:
+            continue
+        smooth = running_median(y)
+        zero = max(NEAR_ZERO * float(np.max(np.abs(smooth))), NOISE_OF_ZERO * channel.noise)
+        fall = _fall_of(t, smooth, zero)
+        if abs(fall.level) > CERTAIN_FALL * zero and not fall.remains:
+            falling[name] = channel
+    return falling if len(falling) > 1 else {}
 
 
 def _fall(
@@ -103,7 +128,7 @@ def _fall(
     power = max((largest[signal] for signal in POWERS if signal in largest), default=0.0)
     zeros = {  # what counts as zero; powers have one scale
         signal: max(
-            NEAR_ZERO * (largest[signal] if signal == CURRENT else power),
+            NEAR_ZERO * (power if signal in POWERS else largest[signal]),
             NOISE_OF_ZERO * channel.noise,
         )
         for signal, channel in loads.items()
@@ -119,7 +144,7 @@ def _fall(
         0.5 * (first.start + first.end),
         0.5 * (first.end - first.start),
         tuple(loads[signal].name for signal in certain),
-        {signal: falls[signal].level for signal in loads},
+        {signal: falls[signal].level for signal in sorted(loads.keys() & {*POWERS, CURRENT})},
     )
 
 

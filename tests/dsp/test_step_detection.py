@@ -336,3 +336,16 @@ def test_whatever_is_recorded_gives_an_onset_within_it_or_a_sentence(samples, re
     assert time[9] <= detected.at <= time[-1]
     assert detected.size != 0.0
     assert 0.0 < detected.error <= time[-1]
+
+
+@pytest.mark.parametrize("seed", few_of(range(12), 4))
+def test_the_error_of_a_slow_and_filtered_rise_holds_its_instant(seed):
+    rng, step = np.random.default_rng([seed, 34]), 0.005
+    time, at = np.arange(0.0, 30.0, step), 12.5
+    lags = (rng.uniform(0.5, 2.0), rng.uniform(0.3, 1.0), *(2 * [rng.uniform(0.05, 0.3)]))
+    response = (time >= at).astype(float)
+    for lag in lags:  # of a machine, an exciter, a transducer and a filter
+        kept = np.exp(-step / lag)
+        response = lfilter([1.0 - kept], [1.0, -kept], response)
+    found = find_step(time, 1.0 + 0.05 * response + rng.normal(0.0, 1e-5, time.size))
+    assert abs(found.at - at) <= found.error + step

@@ -54,7 +54,7 @@ def test_a_column_that_is_no_signal_moves_no_step(seed):
     kind = ("walk", "sway", "creep")[seed % 3]
     alone, beside = inspected(own), inspected({**own, "f": drift(rng, kind)})
     assert beside.channel_of("vt").name == "vt"
-    assert all(channel.signal is None for channel in beside.channels if channel.name == "f")
+    assert beside.channel_of("frequency").name == "f"
     for step, other in zip(alone.steps, beside.steps, strict=True):
         assert (step.at, step.error, step.seen_in) == (other.at, other.error, other.seen_in)
 
@@ -87,3 +87,9 @@ def test_a_field_current_that_always_moves_against_the_voltage_leaves_the_sign_t
     inverted = inspected(channels(np.random.default_rng(3), ifd=(-60.0, 88.0)))
     assert sizes(inverted, 0.05) == [(0.05,), (-0.05,)]
     assert all("the channel is inverted" in finding for finding in inverted.findings)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_where_the_voltage_stays_the_field_shows_the_sign_of_a_step(way):
+    own = channels(np.random.default_rng(4), vt=(0.0, 0.0), ifd=(60.0 * way, -60.0 * way))
+    assert sizes(inspected(own), 0.02) == [(0.02 * way,), (-0.02 * way,)]

@@ -358,9 +358,9 @@ NAMES = {
     "q": ["Mvar", "Q", "Qgen [Mvar]", "Reactive power", "Blindleistung"],
     "vref": ["vref", "Vref", "U_ref", "Reference", "Sollwert", "Usoll (%)"],
     "speed": ["Speed", "Drehzahl", "rotor speed (pu)"],
+    "frequency": ["f (Hz)", "Frequency", "Netzfrequenz", "Frecuencia [Hz]", "frequenza"],
     None: [
         "Temp",
-        "f (Hz)",
         "Exciter field current (A)",
         "If (kV)",
         "Ia",

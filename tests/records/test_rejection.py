@@ -104,12 +104,14 @@ def test_the_suggested_sections_are_those_of_a_rejection():
     assert sections["test"] == {"breaker": {"opens": {"start": "auto"}}}
 
 
-def test_new_refuses_a_rejection_and_shows_what_a_case_of_it_has():
+def test_a_rejection_is_a_case_of_its_own_and_beside_other_records_it_is_refused():
     inspection = rejection(LOADS[0], p=(0.8, 0.0), q=(0.2, 0.0))
+    (test,) = starting_tests([inspection])
+    assert test.steps == ()
     with pytest.raises(
         ExfitError, match=r"p and q fall permanently to zero .* test: \{breaker: \{opens:"
     ):
-        starting_tests([inspection])
+        starting_tests([inspection, inspection])
     row = TableRow("tests.csv:2", inspection.path, inspection.steps[0].at, 0.05, None, None)
     with pytest.raises(ExfitError, match=r"tests.csv:2: .* machine-on-load"):
         named_tests([row], {inspection.path: inspection}, {})

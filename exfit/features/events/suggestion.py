@@ -25,8 +25,10 @@ def event_sections(inspection: Inspection, file: str, bases: Mapping[str, Base])
     """
     if not inspection.is_event:
         return {}
-    pmu = inspection.pmu
+    pmu, turning = inspection.pmu, inspection.channel_of("frequency")
     level = None if pmu is None else pmu.frequency_level
+    if turning is not None and turning.unit == "Hz":
+        level = turning.level
     near = (f0 for f0 in RATED_FREQUENCIES if level is not None and abs(level - f0) < NEAR_RATED)
     network = {
         "f0": Noted(next(near, QUESTION), "Hz, rated frequency"),
@@ -103,7 +105,8 @@ def _driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
     if inspection.pmu is not None:
         return _driving_phasors(inspection, inspection.pmu)
     voltage, angle, frequency = map(inspection.channel_of, ("vt", "angle", "frequency"))
-    section: Section = {}
+    which = Noted({"column": QUESTION}, "which column is it?")
+    section: Section = {"vt": which}
     if voltage is not None:
         section["vt"] = channel_entry(voltage, bases.get("vt"))
     if angle is not None:
@@ -112,6 +115,8 @@ def _driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
         section["angle"] = Noted({"column": angle.name, "unit": unit}, why)
     elif frequency is not None:
         section["frequency"] = {"column": frequency.name, "unit": frequency.unit or QUESTION}
+    else:
+        section["frequency"] = which
     return section
 
 

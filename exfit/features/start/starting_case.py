@@ -19,6 +19,7 @@ from exfit.case.other_model import ALONE, bounds_of, free_of
 from exfit.case.schema import SINGLE
 from exfit.case.suggestion import (
     Base,
+    bump_section,
     channels_section,
     record_of,
     relative,
@@ -251,6 +252,8 @@ def _bump_tests(
         elif exciter != ALONE and test.steps and not test.steps[0].from_start:
             level["vt0"] = Noted({"start": "auto"}, "the mean at rest, with its noise")
         steps = {**level, **steps_section(inspection, test.steps, test.sizes)}
+        if inspection.opening is not None and not test.steps:
+            steps = bump_section(inspection)["test"]
         own = channels_section(inspection, ("vt", *test.bases), test.bases)
         channels = known.setdefault(repr(own), own)  # with their comments
         shared = Noted(channels, "the records below have the same" if channels is own else "")
@@ -272,15 +275,13 @@ def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
         return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, "X": TYPICAL})
     if unit.exciter.model.name == ALONE:
         return {"type": "none"}
-    power = inspection.channel_of("p")
-    if power is None or not shows_power(power):
-        kind = Noted(OPEN_CIRCUIT.name, "the breaker is open, at rated speed")
-        plant = {"type": kind, **_machine(unit.machine)}
-        return with_sources(plant, unit.machine.sources)
+    power, opening = inspection.channel_of("p"), inspection.opening
+    if opening is None and (power is None or not shows_power(power)):
+        return _open_circuit(unit, inspection)
     levels: dict[str, float | str] = {"P": QUESTION, "Q": QUESTION}
     for signal in ("p", "q"):
         channel = inspection.channel_of(signal)
-        if channel is not None and channel.unit in (None, "pu"):
+        if channel is not None and channel.seems_per_unit:
             levels[signal.upper()] = float(f"{channel.level:.4g}")
     network = {
         "f0": Noted(QUESTION, "Hz, rated frequency"),
@@ -290,13 +291,22 @@ def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
         "Q": Noted(levels["Q"], "pu, before the step"),
     }
     measured = {name: "measured" for name, level in levels.items() if level != QUESTION}
+    why = f"{power.name} shows power" if power else "on load until its breaker opens"
     plant = {
-        "type": Noted(INFINITE_BUS.name, f"{power.name} shows power"),
+        "type": Noted(INFINITE_BUS.name, why),
         "network": network,
         **dialect,
         **_machine(unit.machine),
     }
     return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, **measured})
+
+
+def _open_circuit(unit: UnitData, inspection: Inspection) -> Section:
+    """Make the plant of a unit without load, with a question where a column may be its power."""
+    doubt = [each.name for each in inspection.channels if each.may_be_load]
+    on_load = f"; or is {' or '.join(doubt)} its power?" if doubt else ""
+    kind = Noted(OPEN_CIRCUIT.name, f"the breaker is open, at rated speed{on_load}")
+    return with_sources({"type": kind, **_machine(unit.machine)}, unit.machine.sources)
 
 
 def differs_in_psse(model: Model | Machine) -> bool:

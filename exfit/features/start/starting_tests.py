@@ -8,7 +8,12 @@ from types import MappingProxyType
 from exfit.case.schema import SINGLE
 from exfit.case.suggestion import Base
 from exfit.errors import ExfitError, FileError
-from exfit.records.contradictions import LARGEST_STEP, sign_disputed_by, size_in_words
+from exfit.records.contradictions import (
+    LARGEST_STEP,
+    direction_by_others,
+    sign_disputed_by,
+    size_in_words,
+)
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
 from exfit.records.rejection import REMEDY, BreakerOpening
@@ -45,11 +50,11 @@ def starting_tests(
 
     All tests of the ``validating`` records validate. ``sizes`` (pu) are by a word in the names of
     their tests, such as up, or all; they are amounts, or have the sign of the step. Of a single
-    record without steps it is one test.
+    record without steps, or of a load rejection, it is one test.
 
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
-    for a record in which the breaker opens, for one of several that shows no step, and for a
-    play-in file.
+    for a record in which the breaker opens beside other tests, for one of several that shows no
+    step, and for a play-in file.
     """
     every = [*inspections, *validating]
     given = bases or {}
@@ -61,10 +66,8 @@ def starting_tests(
             )
     if any(inspection.is_event for inspection in every):
         return _events(every, len(inspections), sizes, given)
-    for inspection in every:
-        if inspection.opening is not None:
-            raise _rejection(inspection, inspection.opening)
-    if len(every) == 1 and not tests_of(inspections[0]):
+    _refuse_rejections(every)
+    if len(every) == 1 and (every[0].opening or not tests_of(inspections[0])):
         _refuse_unused(sizes, [])
         return (StartingTest("fit", inspections[0], (), bases=given),)
     without = [inspection.path for inspection in every if not tests_of(inspection)]
@@ -228,10 +231,19 @@ def started(
     )
 
 
+def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
+    """Raise ExfitError for a breaker that opens beside other tests or in one of several records."""
+    for inspection in inspections:
+        opening = inspection.opening
+        alone = len(inspections) == 1
+        if opening and not (alone and all(opening.causes(step.at) for step in inspection.steps)):
+            raise _rejection(inspection, opening)
+
+
 def _rejection(inspection: Inspection, opening: BreakerOpening) -> ExfitError:
     return ExfitError(
-        f"{inspection.path}: {opening.in_words}; new makes cases of bump tests: {REMEDY}; if the "
-        "file has bump tests as well, --tests gives a table of them"
+        f"{inspection.path}: {opening.in_words}; beside other tests or records new makes no case "
+        f"of it: {REMEDY}; --tests gives a table of the bump tests of a file"
     )
 
 
@@ -248,8 +260,13 @@ def _sized(
     place = f"{inspection.path}: step {amount:g} at {test.steps[index].at:.4g} s"
     _refuse_impossible(place, amount)
     if change is None:
-        disputed = sign_disputed_by(inspection.channels, inspection.steps, test.steps[index])
-        return amount if index == 0 and (amount < 0.0 or not disputed) else None
+        if index == 0 and amount < 0.0:
+            return amount
+        step = test.steps[index]
+        if sign_disputed_by(inspection.channels, inspection.steps, step):
+            return None
+        way = direction_by_others(inspection.channels, step)
+        return copysign(amount, way) if way else amount if index == 0 else None
     if index == 0 and amount < 0.0 < change:
         raise ExfitError(f"{place}: vt rises there, by {100.0 * change:.2g} %")
     return copysign(amount, change)

@@ -1,0 +1,153 @@
+"""What kind of test a record holds, and by what it shows: bump test, event, rejection, rest."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from exfit.dsp.quality import noise_of
+from exfit.signals import COMPARED, FIELDS, OF_BUMP_TEST
+from exfit.util.arrays import Array, median, median_step
+
+if TYPE_CHECKING:
+    from exfit.records.channel_inspection import InspectedChannel
+    from exfit.records.inspection import Inspection
+
+BUMP, EVENT, REJECTION, STEADY = "bump test", "grid event", "load rejection", "steady point"
+BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
+ABOVE_NOISE = 5.0  # times the noise of p: then it moves
+CERTAINLY = 0.3  # correlation of the changes of q and vt: whose sign counts
+OF_GRID = 5e-4  # pu: what the frequency of a grid event moves by; less is a unit's swing
+MOVES = 10.0  # times the noise: what certainly moves
+SMALL = 2e-3  # of its level: what moves less is at rest
+AT_REST = (*COMPARED, "frequency")  # what a steady point holds
+BY_REFERENCE = "a step of the reference raises both"
+
+
+class KindOfTest(NamedTuple):
+    """The kind of a test and why it is this one; with a "?" it is to be confirmed."""
+
+    name: str
+    why: str
+
+    @property
+    def sure(self) -> bool:
+        """Whether nothing speaks for another kind."""
+        return "?" not in self.why
+
+
+def kind_of(record: "Inspection") -> KindOfTest:
+    """Find the kind of test that a record holds by what moves in it, and what moves first."""
+    if record.plays_in:
+        return KindOfTest(EVENT, "a play-in file holds what drives a unit")
+    if record.pmu is not None:
+        return KindOfTest(EVENT, "phasors of a measurement unit")
+    if record.opening is not None:
+        doubt = "" if record.opening.jump is None else "; or is it a grid event?"
+        return KindOfTest(REJECTION, record.opening.shown + doubt)
+    signals = {
+        str(each.signal): record.samples[each.name]
+        for each in record.channels
+        if each.signal is not None and not each.frequency
+    }
+    if record.reference is not None:
+        return KindOfTest(BUMP, f"{record.reference.name}, the reference, moves")
+    if not record.steps and not record.phases and _at_rest(record, signals):
+        return KindOfTest(STEADY, "nothing moves beyond its noise")
+    return _by_what_moves(record, signals)
+
+
+def _at_rest(record: "Inspection", signals: Mapping[str, Array]) -> bool:
+    watched = [signals[name] for name in AT_REST if name in signals]
+    return not any(map(moves, watched or (record.samples[each.name] for each in record.channels)))
+
+
+def moves(samples: Array) -> bool:
+    """Check whether a signal (M,) moves beyond its noise and beyond what any unit does at rest."""
+    y = samples[np.isfinite(samples)]
+    if len(y) < 4:
+        return False
+    size = float(np.ptp(y))
+    return size > MOVES * noise_of(y) and size > SMALL * abs(float(median(y)))
+
+
+def _by_what_moves(record: "Inspection", signals: Mapping[str, Array]) -> KindOfTest:
+    """Tell a step of the reference from a grid that moves, by vt beside q and the frequency."""
+    names = {str(each.signal): each.name for each in record.channels if each.signal}
+    together = _together(record.time, signals.get("vt"), signals.get("q"))
+    if together < -CERTAINLY:
+        why = f"{names['q']} falls where {names['vt']} rises: the grid moves, not the reference"
+        return KindOfTest(EVENT, why)
+    if _swings(record, signals):
+        return KindOfTest(EVENT, f"{names['p']} moves more than {names['q']}, as behind a loss")
+    lasts = any(names.get("vt") in step.sizes for step in record.steps)
+    if together > CERTAINLY and (lasts or "angle" not in signals):
+        return KindOfTest(BUMP, f"{names['q']} moves with {names['vt']}: {BY_REFERENCE}")
+    on_load = bool({"p", "q"} & signals.keys())
+    if record.steps and "vt" in signals and not on_load:
+        seen = " and ".join(filter(None, map(names.get, OF_BUMP_TEST)))
+        return KindOfTest(BUMP, f"{seen} move, and no channel is known for power")
+    return _by_frequency(names, signals, on_load) or KindOfTest(
+        BUMP,
+        f"{'a step' if record.steps else 'no step in any channel'}; or is it a grid event, or a "
+        f"steady point? {_lacking(names)}".strip(),
+    )
+
+
+def _swings(record: "Inspection", signals: Mapping[str, Array]) -> bool:
+    """Check whether p moves more than q, which a step of the reference does not do."""
+    active, reactive = record.channel_of("p"), record.channel_of("q")
+    if not {"vt", "frequency"} <= signals.keys():
+        return False
+    if active is None or reactive is None or _scale(active) != _scale(reactive):
+        return False
+    apart = max(round(BETWEEN_CHANGES / median_step(record.time)), 1)
+    of_p, of_q = (
+        samples[apart:] - samples[:-apart]
+        for samples in (record.samples[each.name] for each in (active, reactive))
+    )
+    least = max(np.nansum(of_q**2), len(of_p) * (ABOVE_NOISE * active.noise) ** 2)
+    return float(np.nansum(of_p**2)) > least
+
+
+def _scale(power: "InspectedChannel") -> str:
+    """The prefix of the unit of a power: M of MW and of Mvar; pu."""
+    return (power.unit or "").removesuffix("W").removesuffix("var")
+
+
+def _by_frequency(
+    names: Mapping[str, str], signals: Mapping[str, Array], on_load: bool
+) -> KindOfTest | None:
+    """Suppose a grid event where a frequency or an angle moves and nothing else is known."""
+    moved = _range_pu(signals["frequency"]) if "frequency" in signals else 0.0
+    if on_load and "vt" in signals and ("angle" in signals or moved > OF_GRID):
+        why = f"{names.get('angle') or names['frequency']} moves with the power"
+        return KindOfTest(EVENT, f"{why}; or is it a bump test? {_lacking(names)}".strip())
+    if moved > OF_GRID and not on_load and not {*FIELDS} & signals.keys():
+        why = f"{names['frequency']} moves by {moved:.2g} pu"
+        return KindOfTest(EVENT, f"{why}; or is it a bump test?")
+    return None
+
+
+def _lacking(names: Mapping[str, str]) -> str:
+    lacking = [signal for signal in ("vt", "q") if signal not in names]
+    return f"No channel is known for {' and '.join(lacking)}" if lacking else ""
+
+
+def _range_pu(frequency: Array) -> float:
+    """Range of a frequency (M,), pu of its median; 0 within its noise."""
+    y = frequency[np.isfinite(frequency)]
+    level = abs(float(median(y))) or 1.0
+    size = float(np.ptp(y))
+    return size / level if size > MOVES * noise_of(y) else 0.0
+
+
+def _together(time: Array, vt: Array | None, q: Array | None) -> float:
+    """Correlation of the changes of vt and q (M,); 0 without both, or where they rest."""
+    if vt is None or q is None:
+        return 0.0
+    apart = max(round(BETWEEN_CHANGES / median_step(time)), 1)
+    of_vt, of_q = (samples[apart:] - samples[:-apart] for samples in (vt, q))
+    both = np.isfinite(of_vt) & np.isfinite(of_q)
+    power = float(of_vt[both] @ of_vt[both]) * float(of_q[both] @ of_q[both])
+    return float(of_vt[both] @ of_q[both]) / power**0.5 if power > 0.0 else 0.0
