@@ -111,7 +111,9 @@ def _angle_alone(
     for name in names:
         wrapped = _wrapped(samples[name])
         if wrapped or name in units:
-            yield name, NameReading("angle", Clarity.UNIT, "its unit, or its turns", unit=wrapped)
+            question = "" if name in units else "is it the angle? It jumps by a turn"
+            why = "its unit" if name in units else "its turns"
+            yield name, NameReading("angle", Clarity.UNIT, why, unit=wrapped, question=question)
             return
 
 

@@ -84,7 +84,7 @@ def test_the_step_of_a_sample_record_is_found_within_three_samples(record):
 def test_on_load_the_instant_is_found_and_the_size_is_that_of_the_voltage():
     columns = read_columns(SAMPLES / "ac8b_on_line.csv", ["t", "vt"])
     detected = find_step(columns["t"], columns["vt"])
-    assert abs(detected.at - STEP_AT) <= detected.error <= 0.06
+    assert abs(detected.at - STEP_AT) <= detected.error <= 0.08
     assert detected.size == pytest.approx(0.018, rel=0.02)  # the reference stepped by 0.02 pu
 
 

@@ -53,7 +53,7 @@ def test_a_play_in_file_is_inspected_as_one_and_makes_no_new_case(run, empty_fol
     Path("event.plb").write_text("\n".join(rows))
     code, out, _ = run("inspect", "event.plb", "--no-plots")
     assert code == 0
-    assert "a play-in file: voltage and frequency" in out
+    assert "a play-in file holds what drives a unit" in out
     assert "type: grid-playback" in out
     assert "frequency: {column: frequency, unit: Hz}" in out
     assert "vref" not in out

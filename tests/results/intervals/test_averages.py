@@ -26,7 +26,8 @@ def test_averages_of_which_a_case_does_not_speak_are_never_called_good(
     record = recorded(rate, window, trailing, NOISE, seed)
     result = fit(unsaid(record, late=LATE[trailing] * window))
     assert result.verdict.verdict != GOOD
-    assert f"averaged: {window:g}" in said(result)
+    changes = {place: to for cause in result.verdict.causes for place, to in cause.changes.items()}
+    assert changes["record.channels.vt.averaged"] == f"{window:g}"
     intervals = {name: result.parameters[name].interval for name in TRUTH}
     held = [low <= TRUTH[name] <= high for name, (low, high) in intervals.items()]
     assert sum(held) >= len(held) - 1  # one of twenty may miss, all of five would without averages
