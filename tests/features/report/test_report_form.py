@@ -16,6 +16,7 @@ from exfit.features.report.page import html, result_page
 from exfit.output.blocks import Chart, Note, Table
 from exfit.results import facts
 
+EVENTS = ("grid_event", "two_units")  # their form has disturbances and their size
 QUICK = ("first_order", "machine_playback")  # the others are fitted in the long run
 SAMPLES = [
     pytest.param(path.stem, marks=() if path.stem in QUICK else pytest.mark.long)
@@ -59,7 +60,7 @@ def answers(result):
 def test_every_row_of_the_form_is_filled_or_not_stated(name, tmp_path):
     result = workflows.fit(case_of(config(name), tmp_path))
     rows = form(result)
-    assert len(rows) == 32 + (2 if name == "grid_event" else 0)  # disturbances and their size
+    assert len(rows) == 32 + (2 if name in EVENTS else 0)
     assert all(row.answer.strip() and "nan" not in row.answer for row in rows)
     sections = {section.key for section in result_page(result, tmp_path).sections}
     assert all(row.section in sections for row in rows if row.section)
