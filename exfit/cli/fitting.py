@@ -135,7 +135,7 @@ def fit(
     beside = Given(parameters, changes, given, freed)
     several = len(cases) > 1 or len(strategies) > 1
     alone = {"--verbose": verbose, "--watch": watch, "--apply": cause is not None}
-    refuse_mixed([name for name, given in alone.items() if given], several, output)
+    refuse_mixed([name for name, asked in alone.items() if asked], several, output)
     if several:
         fit_several(cases, beside, strategies, search, output)
         return

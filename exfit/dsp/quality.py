@@ -13,6 +13,7 @@ EXCERPT, EXCERPT_PARTS = 200_000, 20  # samples that are enough to estimate nois
 JUMP_SHARE = 0.75  # of a spike's least size: it begins or ends with such a jump
 FEW_SPIKES, SPIKE_SHARE = 3, 0.005  # samples, or of all: more are the signal's own
 LONGEST_SPIKE = 2  # samples
+MOVES = 10.0  # times the noise: what certainly moves
 SPIKE_LIMIT = 6.0  # times the noise: a sample farther off the line through its neighbours is one
 LEVEL_SAMPLES = 3  # on each side of a spike, whose median is the level: it stays
 NEARLY, MOST_NEARLY = 2.0 / 3.0, 0.5  # of the limit; of the spikes: so many come near it at most
@@ -23,6 +24,11 @@ WAVE_POWER = 0.9  # of the power of a waveform, near its mains frequency
 LARGEST_MEAN = 0.2  # of the standard deviation: the mean of a waveform is smaller
 WAVE_SAMPLES = 4096  # the first ones, from which the frequency is taken
 FEWEST_CYCLES = 3.0  # that a waveform must show
+
+
+def moves(samples: Array) -> bool:
+    """Check whether a channel (M,) without gaps certainly moves beyond its noise."""
+    return float(np.ptp(samples)) > MOVES * noise_of(samples)
 
 
 def noise_of(samples: Array) -> float:

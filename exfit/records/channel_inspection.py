@@ -11,7 +11,7 @@ import numpy as np
 
 from exfit.dsp.lines import Ripple, ripple_at_rest
 from exfit.dsp.noise import UNIFORM_SPREAD, drift_at_rest
-from exfit.dsp.quality import SPIKE_LIMIT, quantum, spikes, stuck
+from exfit.dsp.quality import MOVES, SPIKE_LIMIT, quantum, spikes, stuck
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import DetectedStep
 from exfit.records.channel_names import (
@@ -36,7 +36,6 @@ LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
 LARGEST_LOAD = 5.0  # what power or current in per unit stays below, in a fault too
 AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a step
 PERCENT = 100.0
-MOVES = 10.0  # times the noise: what is no noise
 ASKED_FOR = (*OF_BUMP_TEST, "p", "q")  # what an open column may be
 RESPONDING = (*OF_BUMP_TEST, "vref")  # signals that move for good with a step of the reference
 LARGEST_DEVIATION = 0.5  # pu: where a speed rests nearer to zero, it is a deviation

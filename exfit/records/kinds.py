@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from exfit.dsp.quality import noise_of
+from exfit.dsp.quality import moves
 from exfit.signals import COMPARED, FIELDS, OF_BUMP_TEST
 from exfit.util.arrays import Array, median, median_step
 
@@ -18,7 +18,6 @@ BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
 ABOVE_NOISE = 5.0  # times the noise of p: then it moves
 CERTAINLY = 0.3  # correlation of the changes of q and vt: whose sign counts
 OF_GRID = 5e-4  # pu: what the frequency of a grid event moves by; less is a unit's swing
-MOVES = 10.0  # times the noise: what certainly moves
 SMALL = 2e-3  # of its level: what moves less is at rest
 AT_REST = (*COMPARED, "frequency")  # what a steady point holds
 BY_REFERENCE = "a step of the reference raises both"
@@ -59,16 +58,17 @@ def kind_of(record: "Inspection") -> KindOfTest:
 
 def _at_rest(record: "Inspection", signals: Mapping[str, Array]) -> bool:
     watched = [signals[name] for name in AT_REST if name in signals]
-    return not any(map(moves, watched or (record.samples[each.name] for each in record.channels)))
+    return not any(
+        map(_leaves_rest, watched or (record.samples[each.name] for each in record.channels))
+    )
 
 
-def moves(samples: Array) -> bool:
+def _leaves_rest(samples: Array) -> bool:
     """Check whether a signal (M,) moves beyond its noise and beyond what any unit does at rest."""
     y = samples[np.isfinite(samples)]
     if len(y) < 4:
         return False
-    size = float(np.ptp(y))
-    return size > MOVES * noise_of(y) and size > SMALL * abs(float(median(y)))
+    return moves(y) and float(np.ptp(y)) > SMALL * abs(float(median(y)))
 
 
 def _by_what_moves(record: "Inspection", signals: Mapping[str, Array]) -> KindOfTest:
@@ -101,11 +101,7 @@ def _swings(record: "Inspection", signals: Mapping[str, Array]) -> bool:
         return False
     if active is None or reactive is None or _scale(active) != _scale(reactive):
         return False
-    apart = max(round(BETWEEN_CHANGES / median_step(record.time)), 1)
-    of_p, of_q = (
-        samples[apart:] - samples[:-apart]
-        for samples in (record.samples[each.name] for each in (active, reactive))
-    )
+    of_p, of_q = (_changes(record.time, record.samples[each.name]) for each in (active, reactive))
     least = max(np.nansum(of_q**2), len(of_p) * (ABOVE_NOISE * active.noise) ** 2)
     return float(np.nansum(of_p**2)) > least
 
@@ -138,16 +134,20 @@ def _range_pu(frequency: Array) -> float:
     """Range of a frequency (M,), pu of its median; 0 within its noise."""
     y = frequency[np.isfinite(frequency)]
     level = abs(float(median(y))) or 1.0
-    size = float(np.ptp(y))
-    return size / level if size > MOVES * noise_of(y) else 0.0
+    return float(np.ptp(y)) / level if moves(y) else 0.0
+
+
+def _changes(time: Array, samples: Array) -> Array:
+    """Changes of a signal (M,) over BETWEEN_CHANGES."""
+    apart = max(round(BETWEEN_CHANGES / median_step(time)), 1)
+    return np.asarray(samples[apart:] - samples[:-apart])
 
 
 def _together(time: Array, vt: Array | None, q: Array | None) -> float:
     """Correlation of the changes of vt and q (M,); 0 without both, or where they rest."""
     if vt is None or q is None:
         return 0.0
-    apart = max(round(BETWEEN_CHANGES / median_step(time)), 1)
-    of_vt, of_q = (samples[apart:] - samples[:-apart] for samples in (vt, q))
+    of_vt, of_q = (_changes(time, samples) for samples in (vt, q))
     both = np.isfinite(of_vt) & np.isfinite(of_q)
     power = float(of_vt[both] @ of_vt[both]) * float(of_q[both] @ of_q[both])
     return float(of_vt[both] @ of_q[both]) / power**0.5 if power > 0.0 else 0.0

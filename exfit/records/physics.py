@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 
-from exfit.dsp.quality import mains_frequency, noise_of
+from exfit.dsp.quality import MOVES, mains_frequency, moves, noise_of
 from exfit.records.channel_names import OF_SHUNT, Clarity, NameReading
 from exfit.records.contradictions import LARGEST_STEP
 from exfit.records.phasors import TURNS, unit_by_range
@@ -34,7 +34,6 @@ MOST_COLUMNS = 7  # of which three are tried as those of the field
 FIELD_RATE = (0.03, 1.5)  # 1/s: efd/efd0 - ifd/ifd0 moves vt/vt0 by this; 1/T'd0, more on load
 APART = 5.0  # times the noise: relative changes of vt and ifd that are certainly not the same
 JUMP = 0.5  # of all that it moves, between two samples: inertia allows no such move
-MOVES = 10.0  # times the noise: what certainly moves
 ALIKE = 4.0  # times what the best choice leaves unexplained: others that leave less may be meant
 BALANCED = 0.1  # of their amplitude: how far phases may be from a balanced system
 PHASES = 3
@@ -168,8 +167,8 @@ def _at_start(samples: Array) -> float:
 
 def _has_jumps(samples: Array) -> bool:
     """Check for moves between two samples that inertia does not allow."""
-    moves = np.abs(np.diff(samples))
-    return float(np.max(moves)) > JUMP * float(np.ptp(samples)) > MOVES * noise_of(samples)
+    changes = np.abs(np.diff(samples))
+    return float(np.max(changes)) > JUMP * float(np.ptp(samples)) > MOVES * noise_of(samples)
 
 
 def _rated(level: float) -> float:
@@ -188,9 +187,9 @@ def _wrapped(samples: Array) -> str | None:
     if unit is None:
         return None
     jumps = np.abs(np.diff(y)) > 0.5 * TURNS[unit]
-    moves = np.abs(np.diff(np.unwrap(y, period=TURNS[unit])))
-    beside = float(np.max(moves[~jumps], initial=0.0))
-    return unit if float(np.max(moves[jumps], initial=0.0)) <= 2.0 * beside else None
+    changes = np.abs(np.diff(np.unwrap(y, period=TURNS[unit])))
+    beside = float(np.max(changes[~jumps], initial=0.0))
+    return unit if float(np.max(changes[jumps], initial=0.0)) <= 2.0 * beside else None
 
 
 def _integrates(time: Array, angle: Array, frequency: Array, least: float) -> str | None:
@@ -206,8 +205,8 @@ def _integrates(time: Array, angle: Array, frequency: Array, least: float) -> st
     a = np.unwrap(a, period=TURNS[unit]) if unit else a
     hertz = f if _hertz(f) == "Hz" else f * 60.0
     turns = np.concatenate([[0.0], np.cumsum(0.5 * (hertz[1:] + hertz[:-1]) * np.diff(t))])
-    slope, explained, moves = _law(t, a, turns)
-    if explained < least or moves < MOVES * noise_of(a):
+    slope, explained, spread = _law(t, a, turns)
+    if explained < least or spread < MOVES * noise_of(a):
         return None
     for name, turn in TURNS.items():
         for scale in (1.0, RATED_HZ[0] / RATED_HZ[1]) if hertz is not f else (1.0,):
@@ -316,7 +315,7 @@ def _tied(time: Array, vt: Array, efd: Array, ifd: Array) -> float:
 
 def _moves(samples: Array) -> bool:
     y = _present(samples)
-    return len(y) >= FEWEST and float(np.ptp(y)) > MOVES * noise_of(y)
+    return len(y) >= FEWEST and moves(y)
 
 
 def _present(samples: Array) -> Array:
