@@ -4,6 +4,7 @@ from pathlib import Path
 
 from exfit.cli.options import Output
 from exfit.cli.streams import echo
+from exfit.util.files import within
 from exfit.workflows.applied_causes import write_applied
 
 
@@ -17,5 +18,6 @@ def applied(case: Path, cause: str, output: Output) -> tuple[Path, Output]:
     if output.shown:
         echo(f"written: {written.path}: {written.sentence}\n")
     if output.given is not None:
-        output = output._replace(given=folder.with_name(f"{folder.name}-{written.word}"))
+        own = within(folder.parent, f"{folder.name}-{written.word}")
+        output = output._replace(given=own)
     return written.path, output

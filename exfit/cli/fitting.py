@@ -357,11 +357,12 @@ def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, files: Seq
     ``files`` are those that are written beside the folders of the fits.
     """
     from exfit.output import run_folder
+    from exfit.util.files import within
 
     faults: dict[str, None] = {}
     for fit in plan:
         try:
-            run_folder.refuse_unwritable(folder / fit.name, run_folder.OF_FIT)
+            run_folder.refuse_unwritable(within(folder, fit.name), run_folder.OF_FIT)
             refuse_own_files(fit.case, folder / fit.name, run_folder.OF_FIT, True)
             refuse_own_files(fit.case, folder, files)
         except ExfitError as fault:

@@ -97,8 +97,9 @@ class Output(NamedTuple):
         Raises ExfitError where it cannot take them: before a run is spent on it.
         """
         from exfit.output import run_folder
+        from exfit.util.files import within
 
-        folder = self.given or Path("runs") / default
+        folder = self.given or within(Path("runs"), default)
         run_folder.refuse_unwritable(folder, files)
         if self.events is not None:
             self.events.folder = folder

@@ -29,6 +29,8 @@ LONGEST_INTEGER = 400  # digits; a longer one takes long to read, and no double 
 HALF_CHARACTER = re.compile(r"\\u[dD][89a-fA-F]")
 # of a file that is still to be renamed: computer, process, and which of its files
 TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
+# has links to what a program reads and writes
+STREAMS = None if sys.platform == "win32" else Path("/dev")
 ABANDONED = 86_400.0  # s: so old, a temporary file of any computer is of a run that was killed
 
 
@@ -172,6 +174,18 @@ def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number of JSON")
 
 
+def within(folder: Path, name: str) -> Path:
+    """Place a file or folder below the folder that a command writes to, which may be a link.
+
+    Raises ExfitError where a link leads out of it.
+    """
+    path = folder / name
+    target = os.path.realpath(path)  # of a circle of links, which Path.resolve refuses, too
+    if not Path(target).is_relative_to(os.path.realpath(folder)):
+        raise ExfitError(f"{path}: not written: a link leads out of {folder}, to {target}")
+    return path
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file beside its place and rename it, its folder made where it is missing.
 
@@ -187,15 +201,18 @@ def write_whole(path: Path, data: bytes) -> None:
 def write(path: Path, content: str | bytes) -> None:
     """Write a file, whole or not at all; raises ExfitError where the place cannot be written.
 
-    Where a link leads to a file, that is replaced, not the link; a device or a pipe is written to.
+    Where a link leads to a file of its folder, that is replaced, not the link; one that leads out
+    of it is refused. A device or a pipe is written to.
     """
     data = content.encode() if isinstance(content, str) else content
+    if path.parent != STREAMS:
+        within(path.parent, path.name)
     try:
         kind = path.stat().st_mode if path.exists() else stat.S_IFREG
         if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):  # as /dev/stdout
             path.write_bytes(data)
         else:
-            write_whole(path.resolve() if path.is_symlink() else path, data)
+            write_whole(Path(os.path.realpath(path)) if path.is_symlink() else path, data)
     except OSError as fault:
         raise ExfitError(_message(path, fault)) from fault
 
@@ -258,7 +275,7 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
             _make_folder(folder)
             remove_abandoned(folder)
             for name, content in contents.items():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                within(folder, str(Path(name).parent)).mkdir(parents=True, exist_ok=True)
                 beside[folder / name] = _temporary(folder)
                 _write_new(beside[folder / name], content.encode())
             for temporary in beside.values():

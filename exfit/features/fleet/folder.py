@@ -29,7 +29,7 @@ from exfit.runs.runner import distinct_names
 from exfit.runs.store import read_kept, text_of
 from exfit.util.arrays import Array
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
-from exfit.util.files import prepare, write, write_quickly, write_together
+from exfit.util.files import prepare, within, write, write_quickly, write_together
 from exfit.util.text import error_of_interval, rounded_value
 from exfit.util.typed import IN_FILE, plain
 
@@ -402,14 +402,14 @@ def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
     if outcome.summary is not None:
         summary = text_of(outcome.summary, version=VERSION)
         *others, result = outcome.files.items()
-        write_together(folder / key, dict([*others, (SUMMARY, summary), result]), [FAILED])
+        write_together(within(folder, key), dict([*others, (SUMMARY, summary), result]), [FAILED])
     elif outcome.failure is not None:
-        write(folder / key / FAILED, text_of(outcome.failure))
+        write(within(folder, key) / FAILED, text_of(outcome.failure))
 
 
 def prepare_folder(folder: Path) -> None:
     """Make the folder of a batch; raises ExfitError where it cannot be written."""
-    prepare(folder / INDEX)
+    prepare(within(folder, INDEX))
 
 
 def write_entry(folder: Path, entry: IndexEntry) -> None:

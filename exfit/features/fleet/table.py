@@ -15,7 +15,7 @@ from exfit.features.fleet.sisters import SisterGroup, missing_interval, sisters
 from exfit.results.model import FitResult
 from exfit.results.tables import DIGITS, csv_text
 from exfit.signals import SIGNALS
-from exfit.util.files import write_together
+from exfit.util.files import within, write_together
 from exfit.util.text import printable
 
 if TYPE_CHECKING:
@@ -154,5 +154,5 @@ def write_missing_reports(fleet: Fleet) -> bool:
     for folder in missing:
         from exfit.features.report.writing import write_report
 
-        write_report(folder)
+        write_report(within(fleet.folder, folder.name))
     return bool(missing)

@@ -31,7 +31,7 @@ from exfit.runs import store
 from exfit.runs.runner import AS_CASES_SAY, FitSettings
 from exfit.signals import TERMINALS
 from exfit.util.file_names import WHOLE_FIT, WHOLE_PROGRAMME
-from exfit.util.files import read_json, write, write_together
+from exfit.util.files import read_json, within, write, write_together
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import plain
 from exfit.util.typed_reading import FormError, read
@@ -153,7 +153,7 @@ def _missing_figures(test: FinishedTest, folder: Path) -> PlannedFigures:
 def refuse_inputs(files: Iterable[Path], names: Iterable[str], folder: Path) -> None:
     """Raise ExfitError where the tests of these names would write over a file of the programme."""
     for name in names:
-        run_folder.refuse_unwritable(folder / name, run_folder.OF_FIT)
+        run_folder.refuse_unwritable(within(folder, name), run_folder.OF_FIT)
         stems = [path.stem for path in files]
         run_folder.refuse_inputs(run_folder.OF_FIT, files, folder / name, stems)
 
