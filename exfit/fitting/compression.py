@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from exfit.fitting.experiment import Channel, Experiment
@@ -55,6 +54,8 @@ class Stretch(NamedTuple):
 
     def polynomials(self, times: Array, rows: Rows) -> Array:
         """Chebyshev polynomials of the stretch at some rows, (rows, NODES)."""
+        from numpy.polynomial.chebyshev import chebvander  # most records are short
+
         low, high = times[self.first], times[self.end - 1]
         return chebvander((2.0 * times[rows] - low - high) / (high - low), NODES - 1)
 

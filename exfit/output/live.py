@@ -73,6 +73,7 @@ class LiveIterations:
     ) -> None:
         self.console, self.title, self.most = console, title, most
         self.lines: list[Iteration] = []
+        self._titled = False
         self._sketch: LiveResponse | None = None
         self._live: Live | None = None
         self._starts: Progress | None = None
@@ -92,8 +93,8 @@ class LiveIterations:
             finally:
                 ended.set()
                 waiting.join()
-                if self._live is not None and self.lines:
-                    self._live.update(self.picture(), refresh=True)
+                if self._live is not None and self._titled:
+                    self._live.update(self.picture() if self.lines else "", refresh=True)
 
     def _wait(self, ended: Event) -> None:
         """Show how long the fit has taken whenever nothing else was shown for a while."""
@@ -101,11 +102,19 @@ class LiveIterations:
             while not ended.wait(max(self._shown + QUIET - time.monotonic(), 0.0)):
                 if time.monotonic() - self._shown < QUIET:
                     continue
+                self._entitle()
                 if self._live is None:
-                    self._print(self._progress().plain if self.lines else self.title)
-                elif self.lines:
-                    self._live.update(self.picture(), refresh=True)
+                    self._print(self._progress().plain)
+                else:
+                    shown = self.picture() if self.lines else self._progress()
+                    self._live.update(shown, refresh=True)
                 self._shown = time.monotonic()
+
+    def _entitle(self) -> None:
+        """Show the title, unless that was done."""
+        if not self._titled:
+            self._titled = True
+            paragraph(self.console, self.title)
 
     def _print(self, line: str) -> None:
         self._shown = time.monotonic()
@@ -123,8 +132,7 @@ class LiveIterations:
     def __call__(self, iteration: Iteration) -> None:
         """Show one more iteration."""
         self.lines.append(iteration)
-        if len(self.lines) == 1:
-            paragraph(self.console, self.title)
+        self._entitle()
         if self._live is not None:
             self._draw(self._live)
 
@@ -194,6 +202,9 @@ class LiveIterations:
         ]
 
     def _progress(self) -> Text:
+        seconds = time.monotonic() - self._began
+        if not self.lines:
+            return Text(f"before the first iteration, {seconds:.0f} s", style="dim")
         first, last, limit = self.lines[0], self.lines[-1], ""
         if isinstance(self.most, int):
             limit = f" (at most {self.most} a phase)"
@@ -204,7 +215,6 @@ class LiveIterations:
         cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
         text = f"iteration {last.number}{limit}: {cost}"
         text = text if self._starts is None else _of_search(self._starts)
-        seconds = time.monotonic() - self._began
         return Text(f"{text}, {seconds:.0f} s" if seconds >= QUIET else text, style="dim")
 
 

@@ -38,12 +38,14 @@ def compare_with_record(
     start: Values | None = None,
     of_record: Values | None = None,
     moves: Sequence[Values] | None = None,
+    measured: Features | None = None,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
     The setup has sub-steps enough for both; ``of_record`` is what was found about the record
     itself. ``moves`` are what was found by the record: which values each moves, and how fast; by
-    default what was found about it. The comparison is not judged.
+    default what was found about it. ``measured`` are the features of the record, where they have
+    been read already. The comparison is not judged.
     """
     at = setup.with_start_values(values)
     samples, substeps = setup.experiment.samples(at)
@@ -59,7 +61,7 @@ def compare_with_record(
         cost=0.5 * float(errors @ errors),
         accepted=True,
         channels=channels,
-        features=_step_features(setup, overlays, samples, at, moves),
+        features=_step_features(setup, overlays, samples, at, moves, measured),
         notes=setup.record.notes,
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
@@ -130,6 +132,7 @@ def _step_features(
     samples: Array,
     values: Values,
     moves: Sequence[Values],
+    read: Features | None,
 ) -> StepFeatures:
     """Return the features of vt without its periodic disturbances; ``samples`` (M, channels)."""
     vt = overlays.get("vt")
@@ -139,14 +142,13 @@ def _step_features(
     channel = setup.channels[k]
     alone = samples[:, k] - setup.experiment.disturbances(values)[:, k]
     simulated = compared(channel, alone)
-    measured = vt.measured - (vt.simulated - simulated)
     kept = np.isfinite(simulated)
     time = setup.record.time[kept]
     window = _first_move(setup, time, values)
-    return StepFeatures(
-        _measured_features(setup, channel, Overlay(measured, simulated), values, moves),
-        None if window is None else features(time, simulated[kept], *window),
-    )
+    if read is None:
+        undisturbed = Overlay(vt.measured - (vt.simulated - simulated), simulated)
+        read = _measured_features(setup, channel, undisturbed, values, moves)
+    return StepFeatures(read, None if window is None else features(time, simulated[kept], *window))
 
 
 def _measured_features(

@@ -306,13 +306,14 @@ def _analysed(
     interrupted = unfinished or best.stop is estimate.Stop.INTERRUPTED
     analysis = Analysis(uncertainty, interrupted, unfinished)
     try:
-        analysis.phase_ends.extend(phase_ends(case, fine, problem.residuals, history))
+        analysis.phase_ends.extend(phase_ends(case, fine, problem.residuals, history, fitted))
         validated = [aligned(case, setup, values) for setup in state.unseen]
         analysis.validation = [validation_of(case, fitted, *pair) for pair in validated]
         tests = [(setup, values) for setup in fine]
         if not case.has_no_equations:
             analysis.behaviour = behaviour_of(tests, validated)
-        analysis.as_found = as_found_of(case, [*tests, *validated], state.program)
+        every = [*tests, *validated], [*fitted, *analysis.validation]
+        analysis.as_found = as_found_of(case, *every, state.program)
         if uncertainty is not None:
             at = problem, best.x, names_of_records(fine)
             uncertainty = allowing_for_bias(uncertainty, *at)

@@ -200,6 +200,7 @@ def phase_ends(
     setups: Sequence[ExperimentSetup],
     residuals: Residuals,
     history: Sequence[Iteration],
+    fitted: Sequence[Comparison],
 ) -> Iterator[PhaseEnd]:
     """Yield the ends of the phases of the descent from the start of the case, but for the last one.
 
@@ -216,8 +217,13 @@ def phase_ends(
         values = residuals.completed(line.values)
         try:
             comparisons = tuple(
-                compare_with_record(setup.with_enough_substeps(values), values, start)
-                for setup in setups
+                compare_with_record(
+                    setup.with_enough_substeps(values),
+                    values,
+                    start,
+                    measured=match.features.measured,
+                )
+                for setup, match in zip(setups, fitted, strict=True)
             )
         except SimulationError:
             continue
@@ -269,11 +275,17 @@ def _small_signal(alike: Sequence[TestWithValues]) -> SmallSignalView:
         return SmallSignalView(names, None, str(fault))
 
 
-def as_found_of(case: Case, tests: Sequence[TestWithValues], program: Program | None) -> AsFound:
+def as_found_of(
+    case: Case,
+    tests: Sequence[TestWithValues],
+    matches: Sequence[Comparison],
+    program: Program | None,
+) -> AsFound:
     """Return the model before the test, which the case states or starts from, and its responses.
 
     ``tests`` are all tests with what was found about their records among the values: step
-    instants, levels. The responses of start values have no samples: those of the fit hold them.
+    instants, levels; ``matches`` are these. The responses of start values have no samples: those of
+    the fit hold them.
     """
     section = case.as_found or AsFoundSection()
     unit = AsFound(
@@ -290,14 +302,15 @@ def as_found_of(case: Case, tests: Sequence[TestWithValues], program: Program | 
         unit = replace(unit, model=before.subject, values=own)
         comparisons = []
         recordings = (*case.recordings, *case.validations)
-        for recording, (setup, fitted) in zip(recordings, tests, strict=True):
+        each = zip(recordings, tests, matches, strict=True)
+        for recording, (setup, fitted), now in each:
             of_record = {name: value for name, value in fitted.items() if name not in case.rows()}
             at = {**of_record, **values}
             test = setup if before is case else build_experiment(before, recording, at)
             if program is not None:
                 program.run(test, at)
-            match = compare_with_record(test.with_enough_substeps(at), at)
-            match = replace(match, name=setup.name)
+            fine, read = test.with_enough_substeps(at), now.features.measured
+            match = replace(compare_with_record(fine, at, measured=read), name=setup.name)
             empty = replace(match, time=np.zeros(0), overlays={})
             comparisons.append(match if unit.is_stated else empty)
     except (CaseError, SimulationError) as fault:

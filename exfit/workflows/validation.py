@@ -295,7 +295,9 @@ def validation_result(
     """
     case, values, tests, other_program = validation
     own = [(test.setup, test.values) for test in tests]
-    setups = [setup for setup, _ in own]
+    setups, found = [setup for setup, _ in own], None
+    if case.as_found is not None:
+        found = as_found_of(case, own, validation.comparisons, program)
     hashes, names = inputs_of(case, setups)
     return ValidationResult(
         case=case.path,
@@ -314,7 +316,7 @@ def validation_result(
         behaviour=None if case.has_no_equations else behaviour_of(own),
         files=names,
         case_text=text_of(case),
-        as_found=None if case.as_found is None else as_found_of(case, own, program),
+        as_found=found,
         criteria=Criteria(**dict(case.report.criteria)),
         other_program=other_program,
     )

@@ -154,18 +154,22 @@ def test_a_file_and_a_terminal_without_such_characters_ask_for_no_plot():
     assert live.LiveIterations(screen(80, 24), "case").live is not None
 
 
+@pytest.mark.parametrize("begun", [False, True])
 @pytest.mark.parametrize("is_terminal", [False, True])
-def test_a_fit_that_is_silent_says_how_far_it_is(monkeypatch, is_terminal):
-    """Whatever it is doing: nothing is announced between the lines."""
+def test_a_fit_that_is_silent_says_how_far_it_is(monkeypatch, is_terminal, begun):
+    """Whatever it is doing: nothing is announced between the lines, nor before the first."""
     monkeypatch.setattr(live, "QUIET", 0.01)
     console = Console(file=StringIO(), width=80, height=24, force_terminal=is_terminal)
     said = Event()
     monkeypatch.setattr(live.LiveIterations, "_progress", lambda _: said.set() or Text("here"))
     with live.LiveIterations(console, "title", 30).running() as shown:
-        shown(line(0))
+        if begun:
+            shown(line(0))
         said.clear()
         assert said.wait(60.0)
+        shown(line(1))
     assert "here" in console.file.getvalue()
+    assert console.file.getvalue().count("title") == 1
 
 
 def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
