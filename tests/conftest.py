@@ -4,6 +4,8 @@ import gc
 import os
 import signal
 import sys
+import tempfile
+from pathlib import Path
 
 import hypothesis
 import numpy as np
@@ -16,6 +18,7 @@ from exfit import cli
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import figures
+from exfit.util import trust
 from exfit.util.interrupts import ENDING
 
 CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
@@ -58,6 +61,10 @@ def pytest_configure(config):
     hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _keep_bytecode(str(config.cache.mkdir("bytecode")))
+    # the tests' own models and programs are trusted
+    os.environ["EXFIT_CONFIG"] = str(config.cache.mkdir("configuration"))
+    for place in (Path(__file__), Path(tempfile.gettempdir())):
+        trust.trust(trust.Code.of_folder(Path(place.anchor)))
     if "EXFIT_CACHE" not in os.environ:
         os.environ["EXFIT_CACHE"] = str(config.cache.mkdir("machine_code"))
 

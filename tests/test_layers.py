@@ -205,7 +205,11 @@ CHANGING = {
 
 
 # what a module may remember, and why stands there
-REMEMBERED = {"exfit.engine.kernel": {"_loaded"}, "exfit.engine.sampling": {"_scratch"}}
+REMEMBERED = {
+    "exfit.engine.kernel": {"_loaded"},
+    "exfit.engine.sampling": {"_scratch"},
+    "exfit.util.gate": {"_gates"},
+}
 
 
 def changes(function, names):

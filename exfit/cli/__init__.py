@@ -6,19 +6,23 @@ Everything but click is imported in the command that needs it, so that help appe
 import atexit
 import gc
 import os
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from exfit.cli.options import Interruption, Refusal
+from exfit.cli.options import Interruption, Refusal, with_trust_option
 from exfit.cli.streams import unfailing_output
 from exfit.errors import ExfitError
 from exfit.registry import LazyCommand, LazyPart
 from exfit.registry import commands as of_features
+from exfit.util.gate import guarded
 from exfit.util.interrupts import SIGNALLED, endings_as_interruptions
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
+
+    from exfit.util.trust import Code
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -55,6 +59,7 @@ OF_CORE = {
             "examining:profile",
         ),
         ("models", "reference", "List the models, or describe one.", "catalogue:models"),
+        ("trust", "reference", "Trust code that cases name, or withdraw it.", "trusting:trust"),
         ("schema", "reference", "Print the JSON Schema of a case file.", "catalogue:schema"),
     )
 }
@@ -62,6 +67,12 @@ OF_CORE = {
 
 def _commands() -> dict[str, LazyCommand]:
     return {**OF_CORE, **of_features()}
+
+
+def _permit(ctx: click.Context, code: "Code") -> None:
+    from exfit.cli.trusting import permit
+
+    permit(ctx, code)
 
 
 class Commands(click.Group):
@@ -76,7 +87,7 @@ class Commands(click.Group):
         """Import a command; None where there is none of that name."""
         known = OF_CORE.get(cmd_name) or of_features().get(cmd_name)
         command: click.Command | None = None if known is None else known.part.load()
-        return command
+        return None if command is None else with_trust_option(command)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
         """Complete the name of a command, without importing any, or an option."""
@@ -110,7 +121,8 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, and turn what is wrong with its input into a message."""
         try:
-            return super().invoke(ctx)
+            with guarded(partial(_permit, ctx)):
+                return super().invoke(ctx)
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault
         except OSError as fault:

@@ -236,7 +236,7 @@ def fit_again_and_again(
     Raises ExfitError where there is no such file, or no place for the results: a change of the
     case would not help.
     """
-    from exfit.case.peek import changed, stamps_of
+    from exfit.case.watching import changed, stamps_of
     from exfit.case.yaml import read_text
     from exfit.output import run_folder, terminal
 

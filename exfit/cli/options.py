@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from exfit.output.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
+TRUST = "exfit.trust"  # the option --trust, in what the contexts of a command share
+NAMING_CODE = {"case", "cases", "programme", "model", "name"}  # parameters that may name some
 LONGEST_LINE = 1000  # characters of a message: a longer one quotes what is no name of a file
 
 case_argument = click.argument("case", type=GivenFile(Kind.CASE))
@@ -66,6 +68,26 @@ output_option = partial(click.option, "-o", "--output", type=ANY_PATH, metavar="
 file_option = output_option(help="File to write; default: the terminal.")
 force_option = click.option("--force", is_flag=True, help="Overwrite an existing file.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+
+
+def _trusting(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[TRUST] = value
+
+
+trust_option = click.Option(
+    ["--trust"],
+    is_flag=True,
+    expose_value=False,
+    callback=_trusting,
+    help="Run the code that a case names, and trust it from now on: see exfit trust.",
+)
+
+
+def with_trust_option(command: click.Command) -> click.Command:
+    """Give a command the option --trust where its parameters may name code."""
+    if trust_option not in command.params and NAMING_CODE & {it.name for it in command.params}:
+        command.params.append(trust_option)
+    return command
 
 
 class Output(NamedTuple):

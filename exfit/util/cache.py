@@ -35,7 +35,7 @@ def read_private(path: Path) -> bytes | None:
 def keep_private(path: Path, data: bytes) -> None:
     """Keep a file that nobody else may write to; where that is not possible, keep nothing."""
     with suppress(OSError):
-        path.parent.mkdir(mode=FOLDER_MODE, exist_ok=True)
+        path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         write_whole(path, data)
         if sys.platform != "win32":
             path.chmod(FILE_MODE)

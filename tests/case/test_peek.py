@@ -15,7 +15,7 @@ import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
 from exfit import cli
-from exfit.case import peek
+from exfit.case import watching
 from exfit.case.peek import files_of, free_of, parameters_of
 
 PATIENCE = 60  # s, until a test gives up; a fit of this case takes tenths of a second
@@ -137,7 +137,7 @@ def test_given_values_hold_in_every_fit_and_their_file_is_watched(place, monkeyp
         return (Path("values.yaml"),)
 
     replace_by("values.yaml", "parameters: {k: 3.0, a: 2.0}\n")
-    monkeypatch.setattr(peek, "changed", change_once)
+    monkeypatch.setattr(watching, "changed", change_once)
     given = ["--parameters", "values.yaml", "--set", "a=1.5"]
     with pytest.raises(SystemExit) as ended:
         cli.main(
@@ -167,26 +167,26 @@ def test_a_case_that_is_not_there_is_not_waited_for(place, capsys):
 
 
 def test_a_change_before_the_waiting_begins_is_seen(place):
-    stamps = peek.stamps_of(Path("case.yaml"))
+    stamps = watching.stamps_of(Path("case.yaml"))
     write_record(0.5 * TRUTH)
-    assert peek.changed(stamps) == (Path("up.csv"),)
+    assert watching.changed(stamps) == (Path("up.csv"),)
 
 
 def test_a_file_that_comes_or_goes_is_a_change(place):
     case = Path("case.yaml")
     Path("up.csv").unlink()
-    stamps = peek.stamps_of(case)
+    stamps = watching.stamps_of(case)
     write_record(TRUTH)
-    assert peek.changed(stamps) == (Path("up.csv"),)
-    stamps = peek.stamps_of(case)
+    assert watching.changed(stamps) == (Path("up.csv"),)
+    stamps = watching.stamps_of(case)
     Path("up.csv").unlink()
-    assert peek.changed(stamps) == (Path("up.csv"),)
+    assert watching.changed(stamps) == (Path("up.csv"),)
 
 
 @pytest.mark.long
 def test_a_change_in_a_folder_that_is_not_there_yet_is_waited_for(place):
     write_case({**CASE, "record": {**CASE["record"], "file": "later/up.csv"}})
-    stamps = peek.stamps_of(Path("case.yaml"))
+    stamps = watching.stamps_of(Path("case.yaml"))
 
     def come():
         Path("later").mkdir()
@@ -194,7 +194,7 @@ def test_a_change_in_a_folder_that_is_not_there_yet_is_waited_for(place):
 
     late = threading.Timer(0.3, come)
     late.start()
-    assert peek.changed(stamps) == (Path("later/up.csv"),)
+    assert watching.changed(stamps) == (Path("later/up.csv"),)
     late.join()
 
 

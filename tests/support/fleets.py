@@ -34,7 +34,7 @@ FAILURES = (
     ("failed", "plant.machine_parameters.Tpd0: 0 must be above 0"),
     ("timed out", "not finished after 300 s"),
     ("crashed", "the process ended by signal 11"),
-    ("refused", "avr.py: code of a case runs in a batch only with --trust"),
+    ("refused", "avr.py: not run: you have not trusted it yet"),
     ("no record", "the case has no record: nothing to fit"),
     ("not run", ""),
 )

@@ -9,6 +9,7 @@ from math import inf
 import numpy as np
 
 from exfit.case.case import Case
+from exfit.case.named_code import program_code
 from exfit.case.parts import OF_RECORD
 from exfit.case.schema import ExternalPlant, FmuPlant
 from exfit.errors import CaseError, SimulationError
@@ -40,6 +41,7 @@ from exfit.fitting.search import jacobian_error
 from exfit.simulation.simulator import Simulator
 from exfit.util.arrays import Array
 from exfit.util.files import on_disk
+from exfit.util.gate import refuse_untrusted
 from exfit.util.text import near
 
 Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared
@@ -207,7 +209,7 @@ def descent_by_twin(
 def opened(case: Case) -> Iterator["CaseProgram | None"]:
     """Provide the program that simulates a case; end it afterwards.
 
-    Raises CaseError for an FMU that cannot be run.
+    Raises CaseError for an FMU that cannot be run, and for code that the user has not trusted.
     """
     section = case.external
     if isinstance(section, FmuPlant):
@@ -218,6 +220,7 @@ def opened(case: Case) -> Iterator["CaseProgram | None"]:
             text = f"{case.path}: plant.file: {section.simulator} {fault}"
             raise CaseError(text) from None
     elif section is not None:
+        refuse_untrusted(program_code(section.command, case.folder))
         folder = case.folder.absolute()
         program = ExternalProgram(section.command, folder, section.parallel, section.time_limit)
         with closing(program):
@@ -228,6 +231,8 @@ def opened(case: Case) -> Iterator["CaseProgram | None"]:
 def _opened_fmu(case: Case, section: FmuPlant) -> Iterator["CaseProgram"]:
     """Lay out the FMU of a case and provide the program that runs it."""
     file = on_disk(case.folder / section.file)
+    with suppress(OSError):  # of a file that cannot be read, which is said below
+        refuse_untrusted(program_code(section.file, case.folder))
     description = fmu_description(file)
     interface = section.interface or description.interfaces[0]
     if interface not in description.interfaces:

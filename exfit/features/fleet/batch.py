@@ -35,9 +35,11 @@ from exfit.features.fleet.plan import (
 )
 from exfit.features.fleet.task import FurtherFiles
 from exfit.runs.runner import FitSettings
+from exfit.util.gate import guarded
 from exfit.util.interrupts import endings_as_interruptions
 from exfit.util.processes import processors
 from exfit.util.text import near
+from exfit.util.trust import refuse_unknown
 from exfit.util.vocabulary import SEARCHES, STRATEGIES
 
 TIME_LIMIT = 3600.0  # s: of a case
@@ -102,7 +104,7 @@ def batch(
         part: (number, of): only this share of the cases, so that several computers that share the
             folder fit all of them, each once.
         retry_failed: fits again what failed, crashed, or took too long.
-        trust: runs the code of cases whose model is a file of Python or whose plant is a command.
+        trust: runs the code that cases name; else only what the user has trusted (exfit trust).
         time_limit: of a case, s; inf: none.
         strategy: of the local optimisation of each case; None: that of the case.
         search: "global" or "local"; None: that of the case.
@@ -128,7 +130,7 @@ def batch(
     existing = case_files(map(Path, given), place) if given or not made else ()
     each_once = {case_name(place, file): file for file in (*existing, *made)}
     files = share_of([*each_once.values()], part, place)
-    settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
+    settings = BatchSettings(FitSettings(strategy, search), retry_failed, tuple(further))
     run = BatchRun(files, place, settings, observer or BatchObserver(), made)
     count = min(workers or processors(), max(1, len(files)))
     if scheduler is not None:
@@ -138,7 +140,8 @@ def batch(
     elif workers == 0:
         compute, count = compute or in_this_process, 1
     try:
-        interrupted = run.fit_all(compute or local_workers(count, time_limit), count)
+        with guarded((lambda _: None) if trust else refuse_unknown):
+            interrupted = run.fit_all(compute or local_workers(count, time_limit), count)
     except ExfitError:
         with suppress(ExfitError):  # the first fault is reported
             tables_of(place, write_tables)

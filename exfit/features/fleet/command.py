@@ -71,9 +71,6 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     help="Fit again what failed, crashed or exceeded the time limit in an earlier run.",
 )
 @click.option(
-    "--trust", is_flag=True, help="Run the code that cases name: models in Python, commands."
-)
-@click.option(
     "--time-limit",
     type=ABOVE_ZERO,
     default=3600.0,
@@ -101,7 +98,6 @@ def batch(
     scheduler: str | None,
     part: tuple[int, int],
     retry: str | None,
-    trust: bool,
     time_limit: float,
     reports: bool,
     strategy: str | None,
@@ -122,8 +118,7 @@ def batch(
     change, the same command continues. Ctrl-C stops at once and keeps what is finished.
 
     A case that cannot be read, fails, crashes or does not end is a row with its reason, and the
-    others continue; --retry failed fits it again. A case whose model is a file of Python, or whose
-    plant is a command, runs only with --trust.
+    others continue; --retry failed fits it again. So is one that names code not trusted yet.
 
     With --scheduler the workers of a Dask cluster fit the cases: they need exfit in the versions of
     this computer, but none of its files. The package distributed comes with exfit[cluster].
@@ -148,7 +143,6 @@ def batch(
             scheduler=scheduler,
             part=part,
             retry_failed=retry is not None,
-            trust=trust,
             time_limit=time_limit,
             strategy=strategy,
             search=search,

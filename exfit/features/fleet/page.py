@@ -29,7 +29,7 @@ REMEDIES: Mapping[str, str] = {  # of what gave no verdict, or none with a cause
     "failed": "run `exfit check` with this case and correct what it names; then `--retry failed`",
     "timed out": "give a longer `--time-limit` with `--retry failed`",
     "crashed": "run `exfit fit` with this case alone; then `--retry failed`",
-    "refused": "correct what is named; `--trust` runs code that cases name",
+    "refused": "correct what is named",
     "not run": "run the same command again: it continues the batch",
     "no record": "add a record to the case",
     "interrupted": "run `exfit fit` with this case again",

@@ -8,13 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from exfit.case.peek import command_of, content_of, files_in, fmu_of
+from exfit.case.named_code import code_in
+from exfit.case.peek import content_of, files_in
 from exfit.case.yaml import decoded, open_places
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.features.fleet.folder import IndexEntry, case_name, facts_of
-from exfit.features.fleet.task import CODE, CaseTask, FurtherFiles, key_of
+from exfit.features.fleet.task import CaseTask, FurtherFiles, key_of
 from exfit.runs.runner import FitSettings
 from exfit.util.files import read_regular, refuse_bytes
+from exfit.util.gate import refuse_untrusted
 from exfit.util.text import dotted
 
 SUFFIXES = (".yaml", ".yml")
@@ -26,14 +28,13 @@ NO_RECORD = "nothing to fit: the case has no record"
 
 @dataclass(frozen=True)
 class BatchSettings:
-    """Settings of a batch: how it fits, what it runs, and what it tries again.
+    """Settings of a batch: how it fits, and what it tries again.
 
-    ``trust``: code that a case names is run. ``retry_failed``: cases that failed are fitted again.
+    ``retry_failed``: cases that failed are fitted again.
     ``further`` are functions that make files beside those of every fit.
     """
 
     fit: FitSettings = field(default_factory=FitSettings)
-    trust: bool = False
     retry_failed: bool = False
     further: tuple[FurtherFiles, ...] = ()
 
@@ -121,7 +122,7 @@ def planned_case(
         content = {}
     entry = replace(entry, facts=facts_of(content))
     files = (case, *(file for file in files_in(content, case.parent) if file != case))
-    reason = _why_refused(content, files, settings.trust)
+    reason = _why_refused(content, case)
     if reason:
         return replace(entry, status="refused", reason=reason)
     if content and not WITH_RECORD & content.keys():
@@ -131,16 +132,16 @@ def planned_case(
     return PlannedCase(replace(entry, key=key), task)
 
 
-def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool) -> str:
-    """Find a reason not to try a case, or "": open values, code without trust."""
+def _why_refused(content: Mapping[str, Any], case: Path) -> str:
+    """Find a reason not to try a case, or "": open values, code that is not trusted."""
     missing = [dotted(place) for place in open_places(content)]
     if missing:
-        return f"{files[0]}: to be filled in: {', '.join(missing)}"
-    code = [file.name for file in files if file.suffix == CODE]
-    code += [f"command {word}" for word in command_of(content)[:1]]
-    code += [f"FMU {file}" for file in fmu_of(content)]
-    if code and not trust:
-        return f"{', '.join(code)}: code named by the case: it runs only with --trust"
+        return f"{case}: to be filled in: {', '.join(missing)}"
+    try:
+        for code in code_in(content, case.parent):
+            refuse_untrusted(code)
+    except ExfitError as fault:
+        return str(fault)
     return ""
 
 

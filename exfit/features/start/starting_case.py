@@ -14,7 +14,7 @@ from exfit.case.case_draft import (
     parameter,
     with_sources,
 )
-from exfit.case.load import load_case
+from exfit.case.load import checked_case, faults_with_lines
 from exfit.case.other_model import ALONE, bounds_of, free_of
 from exfit.case.schema import SINGLE
 from exfit.case.suggestion import (
@@ -28,7 +28,7 @@ from exfit.case.suggestion import (
     suggested_event,
     weights_section,
 )
-from exfit.case.yaml import QUESTION
+from exfit.case.yaml import QUESTION, read_text, read_yaml
 from exfit.errors import CaseError, ExfitError
 from exfit.features.start.ratings import NO_RATINGS, Ratings, answered
 from exfit.features.start.starting_tests import (
@@ -50,6 +50,8 @@ from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import tests_of
 from exfit.util.text import first_texts
 from exfit.util.vocabulary import TYPICAL
+
+SOME_TEST = {"vref": [{"at": 0.1, "step": 0.01}], "duration": 1.0}  # in place of a record's
 
 VALIDATION_TO_COME = Remark("""\
 validate:               # a record that the fit does not see, as the step down
@@ -123,9 +125,18 @@ def unit_with(
 def machine_of_case(path: Path) -> PartData:
     """Return the machine of another case with its values, those that are fitted at their start.
 
-    Raises CaseError with all faults of that case, and where it has no machine.
+    An exciter in a file of Python is not run: then little but the plant is read. Raises CaseError
+    with all faults of what is read, and where it has no machine.
     """
-    case = load_case(path)
+    top, faults = read_yaml(read_text(path), path)
+    content = top.value
+    if str(content.get("model")).endswith(".py"):
+        first = next(iter(content.get("records") or [content]))
+        test = {**first.get("test", {}), **SOME_TEST}
+        content = {"model": "SEXS", "plant": content.get("plant"), "test": test}
+    case = checked_case(content, path, faults)
+    if case is None:
+        raise faults_with_lines(faults, top, path)
     machine = case.parts.machine
     if machine is None:
         raise CaseError(f"{path}: plant {case.plant.type} has no machine")

@@ -83,7 +83,9 @@ def test_equal_cases_are_fitted_once(cases):
     assert rows["twin"].parameters == rows["a"].parameters
 
 
-def test_bad_cases_are_rows_with_their_reasons_and_the_rest_goes_on(cases):
+def test_bad_cases_are_rows_with_their_reasons_and_the_rest_goes_on(cases, monkeypatch, tmp_path):
+    monkeypatch.setenv("EXFIT_CONFIG", str(tmp_path / "configuration"))  # nothing is trusted
+    Path("cases/own.py").touch()
     Path("cases/bad.yaml").write_text("model: SEXS\nplant: {type: open-circuit}\nrecord: 4\n")
     Path("cases/gone.yaml").write_text("model: SEXS\nrecord: {file: gone.csv}\n")
     Path("cases/no.yaml").write_text("model: SEXS\nplant: {type: open-circuit}\n")
@@ -101,7 +103,8 @@ def test_bad_cases_are_rows_with_their_reasons_and_the_rest_goes_on(cases):
     assert events.of("started") == events.of("failed") == ["bad.yaml", "gone.yaml"]
 
 
-def test_code_runs_only_in_a_batch_that_trusts_it(cases, tmp_path):
+def test_code_runs_only_in_a_batch_that_trusts_it(cases, monkeypatch, tmp_path):
+    monkeypatch.setenv("EXFIT_CONFIG", str(tmp_path / "configuration"))  # nothing is trusted
     Path("cases/own.py").write_text("from pathlib import Path\nPath('ran').touch()\n")
     case_file(Path("cases/own.yaml"), record_file(tmp_path / "r.csv"), model="own.py")
     fleet, _ = run("cases/own.yaml")

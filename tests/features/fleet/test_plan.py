@@ -10,6 +10,8 @@ from exfit.errors import ExfitError
 from exfit.features.fleet.folder import IndexEntry
 from exfit.features.fleet.plan import BatchSettings, case_files, planned_case, share_of
 from exfit.runs.runner import FitSettings
+from exfit.util.gate import guarded
+from exfit.util.trust import refuse_unknown
 
 SETTINGS = BatchSettings(FitSettings(search="local"))
 
@@ -74,13 +76,22 @@ def test_a_case_has_the_key_of_its_content_and_not_of_its_place(tmp_path, record
     ("content", "status", "reason"),
     [
         ("model: SEXS\nplant: {type: open-circuit}\n", "no record", "the case has no record"),
-        ("model: own.py\nrecord: {file: r.csv}\n", "refused", "own.py: code named by the case"),
+        ("model: own.py\nrecord: {file: r.csv}\n", "refused", "own.py: not run"),
+        (
+            "plant: {type: external, command: [python, own.py]}\nrecord: {file: r.csv}\n",
+            "refused",
+            "the command python own.py: not run",
+        ),
+        ("plant: {type: fmu, file: own.py}\nrecord: {file: r.csv}\n", "refused", "own.py: not run"),
     ],
 )
-def test_a_case_without_a_task_has_a_reason(tmp_path, content, status, reason):
+def test_a_case_without_a_task_has_a_reason(tmp_path, monkeypatch, content, status, reason):
+    monkeypatch.setenv("EXFIT_CONFIG", str(tmp_path / "configuration"))  # nothing is trusted
     case = tmp_path / "a.yaml"
     case.write_text(content)
-    planned = planned_case(case, tmp_path, SETTINGS)
+    (tmp_path / "own.py").touch()
+    with guarded(refuse_unknown):
+        planned = planned_case(case, tmp_path, SETTINGS)
     assert isinstance(planned, IndexEntry)
     assert planned.status == status
     assert reason in planned.reason
@@ -93,44 +104,36 @@ def test_a_faulty_case_has_a_key_so_that_it_fails_once(tmp_path, content):
     assert planned_case(case, tmp_path, SETTINGS).entry.key
 
 
-def test_code_is_run_where_it_is_trusted_and_part_of_the_key(tmp_path, record):
+def test_code_is_part_of_the_key(tmp_path, record):
     code = tmp_path / "own.py"
     code.write_text("")
     case = case_file(tmp_path / "a.yaml", record, model="own.py")
-    trusting = BatchSettings(trust=True)
-    first = planned_case(case, tmp_path, trusting).task
+    first = planned_case(case, tmp_path, SETTINGS).task
     assert first.files == (case, code, record)
     code.write_text("# other")
-    assert planned_case(case, tmp_path, trusting).task.key != first.key
+    assert planned_case(case, tmp_path, SETTINGS).task.key != first.key
 
 
-def test_a_command_is_run_where_it_is_trusted_and_its_script_is_part_of_the_key(tmp_path, record):
+def test_the_script_of_a_command_is_part_of_the_key(tmp_path, record):
     script = tmp_path / "simulator.py"
     script.write_text("")
     plant = {"type": "external", "twin": "open-circuit", "command": ["python", "simulator.py"]}
     case = case_file(tmp_path / "a.yaml", record, plant=plant)
-    refused = planned_case(case, tmp_path, SETTINGS)
-    assert isinstance(refused, IndexEntry)
-    assert "command python" in refused.reason
-    assert "--trust" in refused.reason
-    trusting = BatchSettings(trust=True)
-    first = planned_case(case, tmp_path, trusting).task
+    first = planned_case(case, tmp_path, SETTINGS).task
     assert script in first.files
     script.write_text("# other")
-    assert planned_case(case, tmp_path, trusting).task.key != first.key
+    assert planned_case(case, tmp_path, SETTINGS).task.key != first.key
 
 
-def test_an_fmu_is_run_where_it_is_trusted_and_part_of_the_key(tmp_path, record):
+def test_an_fmu_is_part_of_the_key(tmp_path, record):
     unit = tmp_path / "unit.fmu"
     unit.write_bytes(b"")
     plant = {"type": "fmu", "twin": "open-circuit", "file": "unit.fmu"}
     case = case_file(tmp_path / "a.yaml", record, plant=plant)
-    assert "FMU unit.fmu: code" in planned_case(case, tmp_path, SETTINGS).reason
-    trusting = BatchSettings(trust=True)
-    first = planned_case(case, tmp_path, trusting).task
+    first = planned_case(case, tmp_path, SETTINGS).task
     assert unit in first.files
     unit.write_bytes(b"other")
-    assert planned_case(case, tmp_path, trusting).task.key != first.key
+    assert planned_case(case, tmp_path, SETTINGS).task.key != first.key
 
 
 def test_a_case_that_cannot_be_read_is_a_row(tmp_path):
