@@ -61,11 +61,17 @@ SWITCH = sheet(
     ("PPSSOFF", 0.0, *WITHIN_10, "power at which it is switched off"),
 )
 
+COMPENSATED = sheet(
+    ("XCOMP", 0.0, *WITHIN_10, "reactance of the compensated frequency"),
+    ("TCOMP", 0.02, *TIME, "lag of the compensated frequency"),
+)
 
 # what flags of records say of the inputs, and the ramp tracking filter that the typical data have
 SPEED_AND_POWER = {"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0}
 POWER_AND_SPEED = {"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0}
 FILTERED_SPEED_AND_POWER = {**SPEED_AND_POWER, "M": 5, "N": 1}
+# the codes of inputs of stabilisers that have a compensated frequency
+WITH_FREQUENCY = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt", 7: "fc"}
 
 
 def limited_inputs(u: Signal, p: Signal) -> tuple[Signal, Signal]:

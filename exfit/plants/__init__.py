@@ -35,8 +35,9 @@ OF_EXCITER = ("vref", "vs")
 REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
 # what a test may change in any plant, those of features among them
 EVENTS = (*REFERENCES, "E", "angle", "network", "fault", BREAKER)
-# what a stabiliser may listen to; pa is the accelerating power, none an input that is not in use
-HEARD = ("speed", "p", "vt", "pa", "none")
+# what a stabiliser may listen to: pa is the accelerating power, fc the compensated frequency, none
+# an input that is not in use
+HEARD = ("speed", "p", "vt", "pa", "fc", "none")
 LIMITER_KINDS = ("oel", "uel", "scl")  # what limiters limit, as their names begin
 STATOR_CURRENT = "scl"  # of the two sides of excitation, with an output for each
 GATES = {"takeover": "", "takeover-output": "_out"}  # how the inputs of an exciter end

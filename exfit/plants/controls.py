@@ -46,6 +46,6 @@ def listening(stabiliser: Stabilised, heard: Names) -> Names:
 def rests_with_output(stabiliser: Stabilised, values: Mapping[str, float]) -> bool:
     """Test whether a stabiliser with these values has an output while its unit is at rest."""
     model, p, x = stabiliser.model, Names(**values), Names()
-    seen = listening(stabiliser, Names(speed=0.0, p=1.0, vt=1.0, pa=0.0, none=0.0))
+    seen = listening(stabiliser, Names(speed=0.0, p=1.0, vt=1.0, pa=0.0, fc=0.0, none=0.0))
     model.rest(0.0, seen, p, x)
     return bool(abs(model.equations(x, seen, p, Names())) > ROUNDING_AT_REST)

@@ -128,6 +128,11 @@ def compensated(v: Axes, i: Axes, n: Names) -> Signal:
     return modulus(v.d + n.Rc * i.d - n.Xc * i.q, v.q + n.Rc * i.q + n.Xc * i.d)
 
 
+def compensated_angle(v: Axes, i: Axes, X: Signal) -> Signal:
+    """Return the angle by which vt + jX it is ahead of the rotor's q axis, rad."""
+    return angle(v.q + X * i.d, X * i.q - v.d)
+
+
 def connected(
     machine: Machine,
     source: Callable[[], Source],

@@ -1,6 +1,7 @@
 """A unit on load: exciter, stabiliser and governor on a machine whose speed follows the power."""
 
 from collections.abc import Callable, Sequence
+from math import pi
 from typing import NamedTuple
 
 from exfit.engine.system import Rest, Signals
@@ -14,6 +15,7 @@ from exfit.plants.loaded_machine import (
     Flow,
     Terminals,
     compensated,
+    compensated_angle,
     connected,
     loaded_at_rest,
     losses,
@@ -34,6 +36,7 @@ from exfit.plants.parts import (
 REFERENCE = GOVERNOR + "pref"  # the setpoint of a governor that holds the power at the start
 # the rotor's angle to where the voltage behind R + jX is at the start (rad), its speed less 1 (pu)
 ROTOR = ("delta", "dw")
+ANGLE = STABILISER + "angle"  # the state behind the compensated frequency
 
 
 class UnitOnLoad(NamedTuple):
@@ -76,8 +79,13 @@ class UnitOnLoad(NamedTuple):
     def states(self) -> tuple[str, ...]:
         """All states by their names in the system."""
         added = (prefix + name for prefix, model in self.added for name in model.states)
-        limiting = states_of(self.limiters)
+        limiting = (*((ANGLE,) if self.hears_frequency else ()), *states_of(self.limiters))
         return (*self.machine.states, *ROTOR, *self.exciter.states, *added, *limiting)
+
+    @property
+    def hears_frequency(self) -> bool:
+        """Whether the stabiliser listens to the compensated frequency."""
+        return self.stabiliser is not None and "fc" in self.stabiliser.inputs
 
     @property
     def setpoints(self) -> tuple[str, ...]:
@@ -142,8 +150,11 @@ def unit_at_rest(
     states = {name: getattr(fluxes, name) for name in unit.machine.states}
     states |= {"delta": stator.delta, "dw": 0.0, **limiters_rest(unit.limiters, u, p)}
     if unit.stabiliser is not None:
-        heard = listening(unit.stabiliser, Names(speed=0.0, p=power, vt=vt, pa=0.0, none=0.0))
+        signals = Names(speed=0.0, p=power, vt=vt, pa=0.0, fc=0.0, none=0.0)
+        heard = listening(unit.stabiliser, signals)
         states |= states_at_rest(STABILISER, unit.stabiliser.model, 0.0, heard, p)[1]
+    if unit.hears_frequency:
+        states[ANGLE] = compensated_angle(stator.v, stator.i, p[STABILISER + "XCOMP"])
     mechanical = power + losses(stator.i, network.Ra)
     held = {"Pm": mechanical}
     if unit.governor is not None:
@@ -152,6 +163,21 @@ def unit_at_rest(
         held = {REFERENCE: pref, **{name: found.pop(name) for name in kept}}
         states |= found
     return Rest({**states, **exciter.states}, {**exciter.setpoints, **held})
+
+
+def compensated_frequency(
+    at: Terminals, p: Signals, state: Signals, network: Names
+) -> tuple[Signal, Signal]:
+    """Return fc, the frequency of vt + jXCOMP it behind a lag TCOMP, less 1, and a state's slope.
+
+    (1 + sTCOMP) fc is the change of speed and the slope of its angle to the rotor over 2 pi f0. Of
+    that PSS/E 36.7 shows the part of the compensation, to the rounding of its states; which lag it
+    gives the frequency of the bus, which its curves leave out, is not public.
+    """
+    rated = 2.0 * pi * network.f0
+    ahead = compensated_angle(at.v, at.i, p[STABILISER + "XCOMP"])
+    fc = (ahead - state[ANGLE]) / (rated * p[STABILISER + "TCOMP"])
+    return fc, rated * (fc - at.dw)
 
 
 def unit_motion(
@@ -181,6 +207,9 @@ def unit_motion(
         Pm = output_of(GOVERNOR, unit.governor, seen, p, state, d)
     if unit.stabiliser is not None:
         heard = Names(speed=at.dw, p=power, vt=vt, pa=Pm - braking, none=0.0)
+        if unit.hears_frequency:
+            heard.fc, slope = compensated_frequency(at, p, state, network)
+            setattr(d, ANGLE, slope)
         seen = listening(unit.stabiliser, heard)
         vs = vs + output_of(STABILISER, unit.stabiliser.model, seen, p, state, d)
     vc1 = compensated(at.v, at.i, network)

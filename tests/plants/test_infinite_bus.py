@@ -11,6 +11,7 @@ from oracle import vector
 from places import REFERENCE
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
+from scipy.signal import lsim
 from typed_on_load import Typed, TypedSaturatingOnLoad
 
 from exfit.engine.kernel import LinearKernel
@@ -408,7 +409,29 @@ def test_a_stabiliser_waits_at_rest(stabiliser):
 
 def test_all_parameters_of_a_stabiliser_reach_the_system(stabiliser):
     made, values = stabilised(stabiliser)
-    assert {name for name in values if name.startswith(STABILISER)} <= parameters_used(made)
+    used = parameters_used(made)
+    if STABILISER + "TCOMP" in values:
+        used |= parameters_used(stabilised(stabiliser, ("fc", "p"))[0])
+    assert {name for name in values if name.startswith(STABILISER)} <= used
+
+
+def test_the_compensated_frequency_is_that_of_the_voltage_behind_a_reactance():
+    """What PSS3C makes of it first, from the angle of vt + jXCOMP it to the source, by SciPy."""
+    made, values = stabilised(STABILISERS["PSS3C"], ("fc", "p"))
+    of = {"KS1": 20.0, "T1": 0.02, "TW1": 1.5, "XCOMP": 0.2, "TCOMP": 0.03, "VSTMAX": 0.001}
+    values |= {STABILISER + name: value for name, value in of.items()}
+    times = np.linspace(0.0, 1.0, 4001)
+    inputs = Inputs(0.0, 1.0, (InputStep(0.1, 0.01),))
+    shown = Simulator(made, inputs, times, 2.5e-4).response(values).signals
+    current = (shown["p"] - 1j * shown["q"]) / shown["vt"]
+    ahead = -np.angle(shown["vt"] - (values[NETWORK + "R"] + 1j * values[NETWORK + "X"]) * current)
+    angle = ahead + np.angle(shown["vt"] + 1j * of["XCOMP"] * current)
+    below = np.polymul((of["TCOMP"], 1.0), (of["T1"], 1.0))
+    rated = 2.0 * pi * values[NETWORK + "f0"]
+    expected = lsim(((of["KS1"] / rated, 0.0), below), angle - angle[0], times)[1]
+    got = shown[STABILISER + "V1"]
+    assert np.ptp(got) > 1e-3
+    np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-5 * np.ptp(got))
 
 
 def damping_of_the_swing(made, values):
@@ -448,7 +471,7 @@ def test_a_step_of_vs_is_one_of_the_reference(machine):
 def test_a_stabiliser_hears_the_inputs_it_is_given():
     """Each signal moves its states, and an input that is not in use does not."""
     for heard in HEARD:
-        made, values = stabilised(STABILISERS["PSS1A"], (heard,))
+        made, values = stabilised(STABILISERS["PSS2C"], (heard, "none"))
         inputs = Inputs(0.0, 1.0, (InputStep(0.1, 0.1, "X"),))
         response = Simulator(made, inputs, np.linspace(0.0, 1.0, 11), 1e-3).response(values)
         moved = [np.ptp(x) for name, x in response.signals.items() if STABILISER in name]

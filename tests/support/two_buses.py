@@ -9,6 +9,8 @@ has this network.
 
 import csv
 import json
+from contextlib import nullcontext
+from unittest.mock import patch
 
 import numpy as np
 from places import REFERENCE
@@ -17,6 +19,7 @@ from exfit.features.planner.units import read_unit
 from exfit.models import GOVERNORS
 from exfit.models.speed_multiplier import times_speed
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
+from exfit.plants import unit as loaded
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.unit import UnitOnLoad
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
@@ -47,6 +50,21 @@ def reference(name):
 def prefixed(prefix, values):
     """Return values under the names that they have in a system."""
     return {prefix + name: value for name, value in values.items()}
+
+
+def without_bus_frequency():
+    """Leave the frequency of the bus out of the compensated one, as the curves of PSS/E do."""
+    whole, ahead = loaded.compensated_frequency, loaded.compensated_angle
+
+    def of_compensation(at, *given):
+        return whole(at._replace(dw=0.0), *given)
+
+    def by_compensation(v, i, X):
+        return ahead(v, i, X) - ahead(v, i, 0.0)
+
+    return patch.multiple(
+        loaded, compensated_frequency=of_compensation, compensated_angle=by_compensation
+    )
 
 
 class TwoBuses:
@@ -104,7 +122,7 @@ class TwoBuses:
     def system(self):
         """The unit in its network."""
         unit = self.unit
-        return infinite_bus(
+        return infinite_bus.__wrapped__(
             unit.exciter,
             unit.machine,
             unit.saturation,
@@ -119,8 +137,9 @@ class TwoBuses:
     def shown(self, times):
         """Return what the unit shows at some instants."""
         inputs = self.inputs(max(times) + STEP)
-        simulator = Simulator(self.system, inputs, np.array(times, dtype=float), STEP)
-        signals = simulator.response(self.values).signals
+        with without_bus_frequency() if self.unit.hears_frequency else nullcontext():
+            simulator = Simulator(self.system, inputs, np.array(times, dtype=float), STEP)
+            signals = simulator.response(self.values).signals
         return [{name: x[k] for name, x in signals.items()} for k in range(len(times))]
 
 

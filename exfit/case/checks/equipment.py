@@ -63,6 +63,9 @@ def _stabiliser_faults(section: ContentNode, model: Model, on_load: bool) -> Ite
     heard = tuple(entry.text or "" for entry in inputs.entries) or model.inputs
     if not on_load or values is None or not {*heard} <= {*HEARD}:
         return
+    if "fc" in heard and values.get("TCOMP", 0.0) <= 0.0:
+        text = f"{model.name} has no TCOMP above 0, without which there is no input fc"
+        yield section.at("parameters").fault(text)
     if rests_with_output(Stabilised(model, heard), values):
         rest = f"{model.name} does not rest at 0 with inputs {', '.join(heard)}"
         yield section.at("parameters").fault(f"{rest}: its washout is left out")

@@ -308,8 +308,8 @@ class Stabiliser(AddedModel):
     inputs: tuple[Heard, ...] | None = Field(
         default=None,
         min_length=1,
-        description="Input signals, one or two of speed, p, vt, pa (accelerating power) and none; "
-        "default: those of the model.",
+        description="Input signals, one or two of speed, p, vt, pa (accelerating power), fc "
+        "(compensated frequency) and none; default: those of the model.",
     )
 
 

@@ -15,10 +15,12 @@ from exfit.models.sheet import (
 )
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
+    COMPENSATED,
     FILTERED_SPEED_AND_POWER,
     INPUT_LIMITS,
     POWER_AND_SPEED,
     SWITCH,
+    WITH_FREQUENCY,
     accelerating,
     accelerating_rest,
     limited_inputs,
@@ -82,7 +84,8 @@ def pss6c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     at the start where p is PPSSON or more (as in InterPSS; Dynawo: more than
     PPSSOFF). PPSSON = 0 leaves it out. The switching makes vs jump: derivatives of
     a response do not include the shift of the jumps. T1, T2 or T3 = 0 bypasses its
-    block. Typical data are the standard's, as GridKit has them.
+    block. XCOMP and TCOMP make the compensated frequency of an input fc. Typical
+    data are the standard's, as GridKit has them.
     """
     vsi1, vsi2 = limited_inputs(u, p)
     v1, d.V1 = lag(vsi1, s.V1, 1.0, p.T1)
@@ -125,6 +128,7 @@ PSS6C = documented(
         ),
         *INPUT_LIMITS,
         *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
+        *COMPENSATED,
     ),
     "V1 V3 V2 W4 WD X1 X2 X3 X4 ON",
     inputs="p speed",
@@ -133,7 +137,7 @@ PSS6C = documented(
         "T1 KS2 T2 KS1 T3 MACC T4 TD K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 KS VSI1MAX VSI1MIN "
         "VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
         icons=POWER_AND_SPEED,
-        ignored="XCOMP TCOMP",
+        signals=WITH_FREQUENCY,
     ),
 )
 
@@ -169,9 +173,9 @@ def pss7c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     where it rises to PPSSON; it goes over 5 ms after the power has passed. It is on
     at the start where p is PPSSON or more. PPSSON = 0 leaves it out (as in PSS/E).
     The switching makes vs jump: derivatives of a response do not include the shift
-    of the jumps. Not modelled: XCOMP and TCOMP, which make a compensated frequency
-    of an input of PSS/E. Typical data are the standard's, as GridKit has them, but
-    for KS2, which is that of H = 5.05 s as in PSS2C (there 0.7052).
+    of the jumps. XCOMP and TCOMP make the compensated frequency of an input fc.
+    Typical data are the standard's, as GridKit has them, but for KS2, which is that
+    of H = 5.05 s as in PSS2C (there 0.7052).
     """
     v = accelerating(s, u, p, d, MOST_LAGS, p.N)
     y = canonical(p.KS1 * v, s, p, d)
@@ -198,6 +202,7 @@ PSS7C = documented(
         ),
         *INPUT_LIMITS,
         *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
+        *COMPENSATED,
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 X1 X2 X3 X4 ON",
     inputs="speed p",
@@ -206,6 +211,6 @@ PSS7C = documented(
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 K0 K1 K2 K3 K4 TI1 TI2 KI3 TI3 KI4 TI4 VSI1MAX "
         "VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP",
         icons=FILTERED_SPEED_AND_POWER,
-        ignored="XCOMP TCOMP",
+        signals=WITH_FREQUENCY,
     ),
 )

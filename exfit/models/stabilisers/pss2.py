@@ -4,9 +4,11 @@ from exfit.models.blocks import Signal, clip, lead_lag, where
 from exfit.models.sheet import MOST_LAGS, TIME, documented, limits, record, sheet
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
+    COMPENSATED,
     FILTERED_SPEED_AND_POWER,
     INPUT_LIMITS,
     SWITCH,
+    WITH_FREQUENCY,
     accelerating,
     accelerating_rest,
     of_stabiliser,
@@ -142,9 +144,9 @@ def pss2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     at the start where p is PPSSON or more (as in InterPSS; Dynawo: more than
     PPSSOFF). PPSSON = 0 leaves it out (as in PSS/E). The switching makes vs jump:
     derivatives of a response do not include the shift of the jumps. Not modelled:
-    a lag of the power before the switch (PowerWorld), and XCOMP and TCOMP, which
-    make a compensated frequency of an input of PSS/E. Typical data are a sample of
-    the standard, as GridKit has them, with KS2 for H = 5.05 s.
+    a lag of the power before the switch (PowerWorld). XCOMP and TCOMP make the
+    compensated frequency of an input fc. Typical data are a sample of the standard,
+    as GridKit has them, with KS2 for H = 5.05 s.
     """
     v10 = shaped(accelerating(s, u, p, d, MOST_LAGS, p.N), s, p, d)
     v12, d.V12 = lead_lag(v10, s.V12, p.T12, p.T13)
@@ -169,6 +171,7 @@ PSS2C = documented(
         *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
         *INPUT_LIMITS,
         *SWITCH,
+        *COMPENSATED,
     ),
     "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 V1 V3 V10 V12 ON",
     inputs="speed p",
@@ -177,7 +180,7 @@ PSS2C = documented(
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 VSI1MAX VSI1MIN VSI2MAX "
         "VSI2MIN VSTMAX VSTMIN T12 T13 PPSSON PPSSOFF XCOMP TCOMP",
         icons=FILTERED_SPEED_AND_POWER,
-        ignored="XCOMP TCOMP",
+        signals=WITH_FREQUENCY,
     ),
 )
 

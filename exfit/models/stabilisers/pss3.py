@@ -11,8 +11,10 @@ from exfit.models.sheet import (
     sheet,
 )
 from exfit.models.stabiliser_parts import (
+    COMPENSATED,
     POWER_AND_SPEED,
     SWITCH,
+    WITH_FREQUENCY,
     of_stabiliser,
     switch_rest,
     switched,
@@ -106,8 +108,9 @@ def pss3c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     at the start where p is PPSSON or more (as in InterPSS; Dynawo: more than
     PPSSOFF). PPSSON = 0 leaves it out (as in PSS/E). The switching makes vs jump:
     derivatives of a response do not include the shift of the jumps. Not modelled:
-    TPGFILT, a lag of the power before the switch, and XCOMP and TCOMP, which make a
-    compensated frequency of an input of PSS/E. Typical data are PSS3B's.
+    TPGFILT, a lag of the power before the switch. XCOMP and TCOMP make the
+    compensated frequency of an input fc. With it vt is that of PSS/E 36.7 over a
+    fault. Typical data are PSS3B's.
     """
     return switched(pss3b(s, u, p, d), s, u, p, d)
 
@@ -121,7 +124,7 @@ def pss3c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
 PSS3C = documented(
     pss3c,
     pss3c_rest,
-    (*PSS3B.sheet, *SWITCH),
+    (*PSS3B.sheet, *SWITCH, *COMPENSATED),
     "V1 W1 V2 W2 W3 V3 DV3 V4 DV4 ON",
     inputs="p speed",
     records=record(
@@ -130,6 +133,6 @@ PSS3C = documented(
         "TCOMP TPGFILT",
         icons=POWER_AND_SPEED,
         absent={"TPGFILT": 0.0},
-        ignored="XCOMP TCOMP",
+        signals={**WITH_FREQUENCY, 6: "fc"},
     ),
 )
