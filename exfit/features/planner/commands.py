@@ -23,11 +23,10 @@ from exfit.cli.records import bases_option, sheet_option, steps_option, time_opt
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
 from exfit.util.text import first_texts
-from exfit.util.vocabulary import FITTED
 
 if TYPE_CHECKING:
     from exfit.features.fleet.folder import Fleet
-    from exfit.features.planner.fitted_file import ChangedValue, FittedUnit, LeftUnit
+    from exfit.features.planner.fitted_file import FittedUnit, LeftUnit
     from exfit.features.planner.import_all import ImportedUnits
 
 MOST_BUSES = 999_999
@@ -230,6 +229,11 @@ def _machine_id(_context: object, _option: object, value: str | None) -> str | N
     help="With --all: the planner's file to change (default: that of the cases).",
 )
 @click.option(
+    "--undetermined",
+    is_flag=True,
+    help="With --all: write fitted values that the records do not determine, too.",
+)
+@click.option(
     "--format",
     "form",
     type=click.Choice(["dyr", "dyd"]),
@@ -258,6 +262,7 @@ def export(
     result: Path,
     every: bool,
     dyr: Path | None,
+    undetermined: bool,
     form: str | None,
     bus: int | None,
     machine_id: str | None,
@@ -289,9 +294,9 @@ def export(
             raise click.UsageError("--format: not allowed with --all, which keeps the format.")
         if output is None:
             raise click.UsageError("Missing option '-o': the file to write.")
-        _export_every_unit(result, dyr, output, force)
-    elif dyr is not None:
-        raise click.UsageError("--dyr: only with --all.")
+        _export_every_unit(result, dyr, undetermined, output, force)
+    elif dyr is not None or undetermined:
+        raise click.UsageError("--dyr and --undetermined: only with --all.")
     else:
         _export_one(result, form, bus, machine_id, model, output, force)
 
@@ -325,7 +330,9 @@ def _export_one(
         echo(f"written to {output}")
 
 
-def _export_every_unit(fleet: Path, dyr: Path | None, output: Path, force: bool) -> None:
+def _export_every_unit(
+    fleet: Path, dyr: Path | None, undetermined: bool, output: Path, force: bool
+) -> None:
     """Write a planner's file with the values of all verified units of a batch."""
     from exfit.features.fleet.folder import read_fleet
     from exfit.features.planner.fitted_file import changes_table, fitted_file
@@ -346,14 +353,30 @@ def _export_every_unit(fleet: Path, dyr: Path | None, output: Path, force: bool)
     suffix = format_of(original).suffix
     if format_of(output).suffix != suffix:
         raise ExfitError(f"{output}: must end with {suffix}, as {original} does")
-    fitted = fitted_file(read_file(original), str(original), fits)
+    fitted = fitted_file(read_file(original), str(original), fits, undetermined)
     left = [*fitted.left, *others]
+    told = "" if undetermined else ", as found (--undetermined writes them)"
+    open_ended = first_texts(
+        [
+            f"{case}: no closed interval{told}: {', '.join(own)}"
+            for case, own in fitted.undetermined.items()
+        ]
+    )
     if not fitted.changes:
+        warn(open_ended)
         reasons = first_texts([f"{unit.name}: {unit.reason}" for unit in left])
         raise ExfitError("\n".join([*reasons, f"{original}: no unit to change"]))
     write(output, fitted.data)
     write(table, changes_table(fitted.changes))
-    _report_export(output, table, fitted.changes, left)
+    units = {(change.bus, change.id.upper()) for change in fitted.changes}
+    echo(f"written to {output}; units changed: {len(units)}, values: {len(fitted.changes)}")
+    echo(f"changes: {table}")
+    warn(open_ended)
+    for line in first_texts([f"{own.name}: {own.reason}" for own in left if not own.verified]):
+        echo(f"not changed: {line}", err=True)
+    refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
+    if refused:
+        raise FileError(refused)
 
 
 def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
@@ -393,23 +416,3 @@ def _original(fits: "list[FittedUnit]") -> Path:
         named = ", ".join(first_texts([*files]))
         raise ExfitError(f"--dyr: required: the cases were made of several files: {named}")
     return Path(next(iter(files)))
-
-
-def _report_export(
-    output: Path, table: Path, changes: "tuple[ChangedValue, ...]", left: "list[LeftUnit]"
-) -> None:
-    """Report what was changed and what not; raises ExfitError where a verified unit was left."""
-    units = {(change.bus, change.id.upper()) for change in changes}
-    echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
-    echo(f"changes: {table}")
-    undetermined: dict[str, list[str]] = {}
-    for change in changes:
-        if change.source == FITTED and None in (change.low, change.high):
-            undetermined.setdefault(change.case, []).append(change.parameter)
-    texts = [f"{case}: not determined: {', '.join(own)}" for case, own in undetermined.items()]
-    warn(first_texts(texts))
-    for line in first_texts([f"{own.name}: {own.reason}" for own in left if not own.verified]):
-        echo(f"not changed: {line}", err=True)
-    refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
-    if refused:
-        raise FileError(refused)

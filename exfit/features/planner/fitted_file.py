@@ -4,7 +4,7 @@ A unit is verified where its fit holds: it matches its records, and the records 
 are accepted.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
 from typing import NamedTuple
@@ -70,11 +70,15 @@ class LeftUnit(NamedTuple):
 
 @dataclass(frozen=True)
 class FittedFile:
-    """The content of a file with fitted values, what was changed, and what was left."""
+    """The content of a file with fitted values, what was changed, and what was left.
+
+    ``undetermined`` are fitted values of a case that its records do not determine.
+    """
 
     data: bytes
     changes: tuple[ChangedValue, ...]
     left: tuple[LeftUnit, ...]
+    undetermined: Mapping[str, Sequence[str]]
 
 
 class _Edit(NamedTuple):
@@ -84,11 +88,14 @@ class _Edit(NamedTuple):
     text: str
 
 
-def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFile:
+def fitted_file(
+    data: bytes, file: str, fits: Iterable[FittedUnit], whole: bool = False
+) -> FittedFile:
     """Return the content of a dynamics file with the values of those fits that hold.
 
-    Of the records of such a unit only those fields change whose values are others than as found.
-    Raises DynamicsError for a file that is none.
+    Of the records of such a unit only those fields change whose values are others than as found. A
+    value that the records do not determine stays as found where they do not exclude that, unless
+    values are written as a ``whole``. Raises DynamicsError for a file that is none.
     """
     text = text_of(data, file)
     units = read_units(text, file)
@@ -102,7 +109,7 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
         found = fit.result.as_found
         unit_of_fit = (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
         verified.setdefault(unit_of_fit, []).append(fit)
-    edits, changes = list[_Edit](), list[ChangedValue]()
+    edits, changes, undetermined = list[_Edit](), list[ChangedValue](), dict[str, list[str]]()
     for place, of_unit in verified.items():
         for fit in of_unit:
             try:
@@ -111,10 +118,16 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
                     raise ExfitError(f"several fits of the unit: {names}")
                 unit = _unit_of(place, units, file)
                 parts = [*_parts(fit.result, unit, file)]
-                own = [[*_edits(fit.result, part, prefix, file)] for part, prefix in parts]
+                kept = [_undetermined(fit.result, part, prefix) for part, prefix in parts]
+                own = [
+                    [*_edits(fit.result, part, prefix, file, () if whole else as_found)]
+                    for (part, prefix), as_found in zip(parts, kept, strict=True)
+                ]
             except ExfitError as fault:
                 left.append(LeftUnit(fit.name, str(fault), verified=True))
                 continue
+            if any(kept):
+                undetermined[fit.name] = [symbol for of_part in kept for symbol in of_part]
             for (part, prefix), of_part in zip(parts, own, strict=True):
                 edits += of_part
                 changes += _changes(fit, unit, part, prefix, of_part)
@@ -123,7 +136,7 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
         pieces += [text[end : field.start], new]
         end = field.end
     edited = "".join([*pieces, text[end:]])
-    return FittedFile(encoded(edited, data), tuple(changes), tuple(left))
+    return FittedFile(encoded(edited, data), tuple(changes), tuple(left), undetermined)
 
 
 def _why_not_verified(result: FitResult) -> str | None:
@@ -226,14 +239,30 @@ def _refuse_other_record(result: FitResult, part: Reading, prefix: str, place: s
         raise ExfitError(f"{place}: {text}")
 
 
-def _edits(result: FitResult, part: Reading, prefix: str, file: str) -> Iterator[_Edit]:
+def _undetermined(result: FitResult, part: Reading, prefix: str) -> list[str]:
+    """Fitted values without an interval, or with an open one that holds the value as found."""
+    symbols = list[str]()
+    for symbol in part.definition.symbols:
+        fitted = result.parameters.get(prefix + symbol)
+        if fitted is not None and not fitted.determined:
+            low, high = fitted.interval or (None, None)
+            found = part.values[symbol]
+            if (low is None or found >= low) and (high is None or found <= high):
+                symbols.append(symbol)
+    return symbols
+
+
+def _edits(
+    result: FitResult, part: Reading, prefix: str, file: str, kept: Container[str]
+) -> Iterator[_Edit]:
     """Yield the fields of a record that change; raises ExfitError where values cannot be written.
 
-    Typical values are not of the unit: their fields stay, and what no field holds is not missed.
+    Typical values are not of the unit: their fields stay, as those ``kept`` do, and what no field
+    holds is not missed.
     """
     definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
-    changed = _changed(result, part, prefix, values)
+    changed = _changed(result, part, prefix, values, kept)
     fields = fields_of(part)
     of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}
     if of_curve and result.saturation != "quadratic":
@@ -253,14 +282,19 @@ def _edits(result: FitResult, part: Reading, prefix: str, file: str) -> Iterator
 
 
 def _changed(
-    result: FitResult, part: Reading, prefix: str, values: Mapping[str, float]
+    result: FitResult,
+    part: Reading,
+    prefix: str,
+    values: Mapping[str, float],
+    kept: Container[str],
 ) -> set[str]:
     """The parameters of a record that change, with the fields that then say something again."""
     definition = part.definition
     changed = {
         symbol
         for symbol in definition.symbols
-        if result.sources.get(prefix + symbol) != TYPICAL
+        if symbol not in kept
+        and result.sources.get(prefix + symbol) != TYPICAL
         and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
     }
     # lags that a record may have as 0 as long as their gains are 0

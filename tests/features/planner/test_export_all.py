@@ -60,8 +60,17 @@ def fleet(fitted, empty_folder, run):
 
 @cache
 def fit_of(folder):
-    """Return the fit of the unit with a record, in a batch of the cases of a folder."""
-    return workflows.fit(load_case(Path("cases", "bus-102-1.yaml")), search="local")
+    """Return the fit of the unit with a record, in a batch of the cases of a folder.
+
+    A local search computes no intervals: KA, TE and TA get some, that of TA open above, which
+    excludes the value as found.
+    """
+    result = workflows.fit(load_case(Path("cases", "bus-102-1.yaml")), search="local")
+    known = dict(result.parameters)
+    for name in ("KA", "TE", "TA"):
+        ends = 0.9 * known[name].value, None if name == "TA" else 1.1 * known[name].value
+        known[name] = replace(known[name], interval=ends)
+    return replace(result, parameters=known)
 
 
 def keep(result, key="a" * 32, bus=102):
@@ -86,9 +95,13 @@ def test_what_a_fit_found_is_in_the_file_and_every_other_byte_as_it_was(run, fle
     assert after[:start] == before[:start]
     assert after.endswith(before[end:])
     rows = changes_of()
-    assert {row["parameter"] for row in rows} == {
-        name for name, each in result.parameters.items() if not each.of_record
-    }
+    free = {name for name, each in result.parameters.items() if not each.of_record}
+    undetermined = free - {"KA", "TE", "TA"}
+    assert {row["parameter"] for row in rows} == free - undetermined
+    (warning,) = ran.err.splitlines()
+    told, _, named = warning.rpartition(": ")
+    assert told == "Warning: bus-102-1: no closed interval, as found (--undetermined writes them)"
+    assert sorted(named.split(", ")) == sorted(undetermined)
     assert {(row["bus"], row["id"], row["model"], row["case"]) for row in rows} == {
         ("102", "1", "ESAC1A", "bus-102-1")
     }
@@ -100,9 +113,9 @@ def test_what_a_fit_found_is_in_the_file_and_every_other_byte_as_it_was(run, fle
             "" if end is None else str(end) for end in interval
         )
     assert f"units changed: 1, values: {len(rows)}" in ran.out
-    undetermined = [row["parameter"] for row in rows if not (row["low"] and row["high"])]
-    assert undetermined
-    assert ran.err == f"Warning: bus-102-1: not determined: {', '.join(undetermined)}\n"
+    whole = run("export", "--all", "--undetermined", fleet, "-o", "whole.dyr")
+    assert f"units changed: 1, values: {len(free)}" in whole.out
+    assert {row["parameter"] for row in changes_of("whole.csv")} == free
     again = run("import", "fitted.dyr", "--bus", "102")
     assert f"KA: {float(rows[0]['after'])}" in again.out or rows[0]["parameter"] != "KA"
 
