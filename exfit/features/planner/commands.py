@@ -26,7 +26,7 @@ from exfit.util.text import first_texts
 
 if TYPE_CHECKING:
     from exfit.features.fleet.folder import Fleet
-    from exfit.features.planner.fitted_file import FittedUnit, LeftUnit
+    from exfit.features.planner.fitted_file import ChangedValue, FittedUnit, LeftUnit
     from exfit.features.planner.import_all import ImportedUnits
 
 MOST_BUSES = 999_999
@@ -356,22 +356,27 @@ def _export_every_unit(
     fitted = fitted_file(read_file(original), str(original), fits, undetermined)
     left = [*fitted.left, *others]
     told = "" if undetermined else ", as found (--undetermined writes them)"
-    open_ended = first_texts(
-        [
-            f"{case}: no closed interval{told}: {', '.join(own)}"
-            for case, own in fitted.undetermined.items()
-        ]
-    )
+    named = [
+        f"{case}: no closed interval{told}: {', '.join(own)}"
+        for case, own in fitted.undetermined.items()
+        if own
+    ]
     if not fitted.changes:
-        warn(open_ended)
-        reasons = first_texts([f"{unit.name}: {unit.reason}" for unit in left])
+        reasons = first_texts([*named, *(f"{unit.name}: {unit.reason}" for unit in left)])
         raise ExfitError("\n".join([*reasons, f"{original}: no unit to change"]))
     write(output, fitted.data)
     write(table, changes_table(fitted.changes))
-    units = {(change.bus, change.id.upper()) for change in fitted.changes}
-    echo(f"written to {output}; units changed: {len(units)}, values: {len(fitted.changes)}")
+    warn(first_texts(named))
+    _report_export(output, table, fitted.changes, left)
+
+
+def _report_export(
+    output: Path, table: Path, changes: "tuple[ChangedValue, ...]", left: "list[LeftUnit]"
+) -> None:
+    """Report what was changed and what not; raises ExfitError where a verified unit was left."""
+    units = {(change.bus, change.id.upper()) for change in changes}
+    echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
     echo(f"changes: {table}")
-    warn(open_ended)
     for line in first_texts([f"{own.name}: {own.reason}" for own in left if not own.verified]):
         echo(f"not changed: {line}", err=True)
     refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]

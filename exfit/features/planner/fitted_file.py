@@ -99,16 +99,7 @@ def fitted_file(
     """
     text = text_of(data, file)
     units = read_units(text, file)
-    left = list[LeftUnit]()
-    verified: dict[tuple[int | None, str], list[FittedUnit]] = {}
-    for fit in fits:
-        why = _why_not_verified(fit.result)
-        if why is not None:
-            left.append(LeftUnit(fit.name, f"not verified: {why}", verified=False))
-            continue
-        found = fit.result.as_found
-        unit_of_fit = (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
-        verified.setdefault(unit_of_fit, []).append(fit)
+    verified, left = _by_place(fits)
     edits, changes, undetermined = list[_Edit](), list[ChangedValue](), dict[str, list[str]]()
     for place, of_unit in verified.items():
         for fit in of_unit:
@@ -118,17 +109,13 @@ def fitted_file(
                     raise ExfitError(f"several fits of the unit: {names}")
                 unit = _unit_of(place, units, file)
                 parts = [*_parts(fit.result, unit, file)]
-                kept = [_undetermined(fit.result, part, prefix) for part, prefix in parts]
-                own = [
-                    [*_edits(fit.result, part, prefix, file, () if whole else as_found)]
-                    for (part, prefix), as_found in zip(parts, kept, strict=True)
-                ]
+                own = [[*_edits(fit.result, part, prefix, file, whole)] for part, prefix in parts]
             except ExfitError as fault:
                 left.append(LeftUnit(fit.name, str(fault), verified=True))
                 continue
-            if any(kept):
-                undetermined[fit.name] = [symbol for of_part in kept for symbol in of_part]
+            undetermined[fit.name] = []
             for (part, prefix), of_part in zip(parts, own, strict=True):
+                undetermined[fit.name] += _undetermined(fit.result, part, prefix)
                 edits += of_part
                 changes += _changes(fit, unit, part, prefix, of_part)
     pieces, end = [], 0
@@ -137,6 +124,23 @@ def fitted_file(
         end = field.end
     edited = "".join([*pieces, text[end:]])
     return FittedFile(encoded(edited, data), tuple(changes), tuple(left), undetermined)
+
+
+def _by_place(
+    fits: Iterable[FittedUnit],
+) -> tuple[dict[tuple[int | None, str], list[FittedUnit]], list[LeftUnit]]:
+    """Fits that hold by bus and id of their units, and why the others do not."""
+    verified: dict[tuple[int | None, str], list[FittedUnit]] = {}
+    left = list[LeftUnit]()
+    for fit in fits:
+        why = _why_not_verified(fit.result)
+        if why is not None:
+            left.append(LeftUnit(fit.name, f"not verified: {why}", verified=False))
+            continue
+        found = fit.result.as_found
+        place = (None, "") if found is None else (found.bus, (found.machine_id or "").upper())
+        verified.setdefault(place, []).append(fit)
+    return verified, left
 
 
 def _why_not_verified(result: FitResult) -> str | None:
@@ -253,15 +257,16 @@ def _undetermined(result: FitResult, part: Reading, prefix: str) -> list[str]:
 
 
 def _edits(
-    result: FitResult, part: Reading, prefix: str, file: str, kept: Container[str]
+    result: FitResult, part: Reading, prefix: str, file: str, whole: bool
 ) -> Iterator[_Edit]:
     """Yield the fields of a record that change; raises ExfitError where values cannot be written.
 
-    Typical values are not of the unit: their fields stay, as those ``kept`` do, and what no field
-    holds is not missed.
+    Typical values are not of the unit: their fields stay, and what no field holds is not missed. So
+    do those that are not determined, unless values are written as a ``whole``.
     """
     definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
+    kept = () if whole else _undetermined(result, part, prefix)
     changed = _changed(result, part, prefix, values, kept)
     fields = fields_of(part)
     of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}
