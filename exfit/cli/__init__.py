@@ -28,9 +28,7 @@ if TYPE_CHECKING:
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # else pydantic searches all packages that are installed, and runs what they plug into it
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-# a look for circles of dead objects at every 700 new ones takes a twentieth of a short fit
-gc.set_threshold(100_000)
-# and at the end of the program, where all memory goes anyway, a sixth
+# a look for circles of dead objects, where all memory goes anyway, takes a sixth of a short fit
 atexit.register(gc.freeze)
 
 

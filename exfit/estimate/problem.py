@@ -273,6 +273,9 @@ class Stop(Enum):
     EVALUATIONS = "the limit of evaluations was reached"
     INTERRUPTED = "interrupted: this is the best point so far"
     JACOBIAN = "the Jacobian is not finite here"
+    HIGH = (
+        "ten iterations gained less than a hundredth of what is missing to a minimum found before"
+    )
     STALLED = "no trial lowers the cost visibly, although the linear model promises a lower one"
     FULL_STEP = (
         "the full Gauss-Newton step did not lower the cost: "
@@ -301,6 +304,7 @@ STATUS = {
     Stop.FLAT: 7,
     Stop.ITERATIONS: 0,
     Stop.EVALUATIONS: -9,
+    Stop.HIGH: -10,
     Stop.INTERRUPTED: -1,
     Stop.JACOBIAN: -2,
     Stop.STALLED: -3,

@@ -35,6 +35,8 @@ from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 LULL = 10  # iterations
 CREEP = 1e-6  # of the cost: less than the noise of any record leaves open
+# of what is missing to a lower minimum: at that pace a phase of fifty iterations comes no nearer
+FAR_ABOVE = 0.01
 ROUNDING = 10.0 * EPS  # of what the residuals are made of: what is left is no more than this
 ORTHOGONAL = 1e-6  # cosine of the residuals and a column of J: what rounding of f leaves open
 KINK = 1e-3  # of the cost: what a derivative from one side may promise at a minimum
@@ -51,7 +53,7 @@ class Rules:
     def __init__(self, descent: "Descent", start: LinearModel) -> None:
         self.gtol, self.ftol, self.xtol = descent.gtol, descent.ftol, descent.xtol
         self.gtol_absolute, self.matches = descent.gtol_absolute, descent.matches
-        self.scaled = descent.x_scale is not None
+        self.scaled, self.known = descent.x_scale is not None, descent.known
         self.first_cost = start.point.cost if self.scaled else 0.0
         self.first_gradient = start.gradient_norm
         self.seen = np.zeros(1, dtype=np.bool_) if self.scaled else seen(start)
@@ -95,11 +97,12 @@ class Rules:
 
         It is no minimum where the linear model still promises much: then the search has stalled.
         """
-        last = log[-LULL:]
-        if len(log) <= LULL or min(line.inner for line in last) == 0:
+        if len(log) <= LULL:
             return None
         gain, cost = log[-1 - LULL].cost - log[-1].cost, log[-1].cost
-        if gain > CREEP * cost:
+        if gain < FAR_ABOVE * (cost - self.known):
+            return Stop.HIGH
+        if gain > CREEP * cost or min(line.inner for line in log[-LULL:]) == 0:
             return None
         resting = linear.full.promise <= KINK * cost or self.orthogonal(linear)
         return Stop.CREEPING if resting else Stop.STALLED
@@ -326,7 +329,7 @@ def lm_then_dgn(run: SearchRun, start: LinearModel) -> Steps[Outcome]:
     """
     lm, dgn = run.searches.lm, run.searches.dgn
     first = yield from run.descend(lm.handing_over(), start)
-    if first.converged or first.stop is Stop.JACOBIAN:
+    if first.converged or first.stop in (Stop.JACOBIAN, Stop.HIGH):
         return first
     second = yield from run.descend(dgn, first.linear)
     costs = first.linear.point.cost, second.linear.point.cost
@@ -378,6 +381,7 @@ class Descent:
     """What is made small, within which bounds, by which method and how far.
 
     `least_squares` says what the settings mean; ``differences`` takes the Jacobian from residuals.
+    ``known`` is the cost of a minimum found before: who creeps far above it does so to no end.
     """
 
     functions: Functions
@@ -394,6 +398,7 @@ class Descent:
     jacobian_error: float | None = None
     good_enough: float | None = None
     matches: Callable[[Array], bool] | None = None
+    known: float = inf
     searches: Searches = USUAL
 
     def begin(

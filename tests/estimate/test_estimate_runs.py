@@ -11,8 +11,8 @@ from known_minima import CERTIFIED, KNOWN, TEXTBOOK, random_problem
 from more_garbow_hillstrom import beale, rosenbrock
 from tiers import few_of
 
-from exfit.estimate import STATUS, Stop, least_squares
-from exfit.estimate.problem import half_square
+from exfit.estimate import STATUS, Descent, Stop, least_squares
+from exfit.estimate.problem import OneByOne, half_square
 from exfit.estimate.solver import STRATEGIES
 
 EVERY_METHOD = list(STRATEGIES)
@@ -233,6 +233,8 @@ def ended(stop):
             return least_squares(kinked, [1.0], steeper, method="dgn")
         case Stop.CREEPING:
             return least_squares(walled, [1.0], lambda x: np.array([[0.0], [1.0]]), method="dgn")
+        case Stop.HIGH:  # of something else a minimum is known that is lower by far
+            return Descent(functions=OneByOne(rosenbrock, jac), known=-1e4).run(start)
         case Stop.STALLED:
             return least_squares(rosenbrock, start, lambda x: -jac(x), method="dgn")
         case Stop.FULL_STEP:
