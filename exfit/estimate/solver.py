@@ -35,8 +35,8 @@ from exfit.util.vocabulary import DEFAULT_STRATEGY
 
 LULL = 10  # iterations
 CREEP = 1e-6  # of the cost: less than the noise of any record leaves open
-# of what is missing to a lower minimum: at that pace a phase of fifty iterations comes no nearer
-FAR_ABOVE = 0.01
+HIGH = 2.0  # times the cost of another minimum: no record leaves both open
+PACE = 0.01  # of what is missing to it: fifty iterations at that pace come no nearer
 ROUNDING = 10.0 * EPS  # of what the residuals are made of: what is left is no more than this
 ORTHOGONAL = 1e-6  # cosine of the residuals and a column of J: what rounding of f leaves open
 KINK = 1e-3  # of the cost: what a derivative from one side may promise at a minimum
@@ -100,7 +100,7 @@ class Rules:
         if len(log) <= LULL:
             return None
         gain, cost = log[-1 - LULL].cost - log[-1].cost, log[-1].cost
-        if gain < FAR_ABOVE * (cost - self.known):
+        if cost > HIGH * self.known and gain < PACE * (cost - self.known):
             return Stop.HIGH
         if gain > CREEP * cost or min(line.inner for line in log[-LULL:]) == 0:
             return None

@@ -128,7 +128,7 @@ def multistart(
     watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
     earlier results of the last leg from other starts: their starts and ends count as the first;
-            a last leg ends where ten iterations hardly bring it nearer to the lowest of them
+            a last leg at twice the lowest of their costs that hardly comes nearer is given up
 
     Two ends are one minimum where half a standard error, in cost f / 4 (M - N), exceeds both the
     difference of their costs and what the linear model at the better one makes of their distance:
@@ -218,7 +218,9 @@ def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
             raise KeyboardInterrupt
     if result is not None and result.stop is Stop.INTERRUPTED:
         return RefinedStart(first_cost, cut_short=result)
-    return RefinedStart(first_cost, None if result is None else outcome_of(result))
+    if result is None or result.stop is Stop.HIGH:
+        return RefinedStart(first_cost)
+    return RefinedStart(first_cost, outcome_of(result))
 
 
 def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> MultistartResult:
