@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import count, islice
 from math import inf, nan
 from typing import NamedTuple
@@ -127,8 +126,7 @@ def multistart(
             from the best of them; by default each goes on by itself
     watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
-    earlier results of the last leg from other starts: their starts and ends count as the first;
-            a last leg at twice the lowest of their costs that hardly comes nearer is given up
+    earlier results of the last leg from other starts: their starts and ends count as the first
 
     Two ends are one minimum where half a standard error, in cost f / 4 (M - N), exceeds both the
     difference of their costs and what the linear model at the better one makes of their distance:
@@ -138,8 +136,6 @@ def multistart(
     Raises ValueError for bounds that cross or starts outside them.
     """
     points = np.array(starts, dtype=np.float64, ndmin=2)
-    known = min((result.cost for result in earlier), default=inf)
-    legs = [*legs[:-1], replace(legs[-1], known=known)]
     firsts = [0] * len(points) if first_legs is None else first_legs
     joining = [merged is not None and first == 0 for first in firsts]
     near, ends = dict[int, RefinedStart](), dict[int, RefinedStart]()

@@ -235,9 +235,10 @@ class CaseSearches:
 
         counter = SimulationCounter()  # the sub-steps are those of a coarse grid
         starts = further_starts(self.problem, self.options.starts, counter)
+        *first_legs, last = starts.legs
         minima = estimate.multistart(
             starts.points,
-            starts.legs,
+            [*first_legs, replace(last, known=min(end.cost for end in earlier))],
             first_legs=starts.first_legs,
             merged=MERGED,
             workers=self.residuals.threads,
