@@ -40,10 +40,10 @@ hypothesis.settings.register_profile("all", max_examples=100, deadline=None, der
 def pytest_addoption(parser):
     parser.addoption(
         "--models",
-        choices=("few", "others", "all"),
+        choices=("few", "others", "long", "all"),
         default="few",
-        help="few: one model of each family; others: the laws of models over all the others, and "
-        "what takes long; all: every law over every model",
+        help="few: one model of each family; others: the laws of models over all the others; "
+        "long: what takes long; all: every law over every model",
     )
 
 
@@ -53,7 +53,7 @@ def pytest_configure(config):
     Its names are hashes of what the code is made from. A worker has one thread of OpenBLAS, as the
     command line has: there are as many workers as processors.
     """
-    config.addinivalue_line("markers", "long: does not run over the few models")
+    config.addinivalue_line("markers", "long: runs with --models=long or all only")
     config.addinivalue_line("markers", "every_example: runs with --models=all only")
     config.addinivalue_line("markers", "each_model: a law of each model, in whichever folder")
     config.addinivalue_line("markers", "pixels: its commands draw their figures in pixels")
@@ -101,18 +101,18 @@ def pytest_collection_modifyitems(config, items):
 def _is_selected(item, models):
     """Return whether a test runs over the few models, or adds to what runs over them.
 
-    Over the others run the laws of the models themselves, what takes long, and drawn inputs once
-    more, in greater number.
+    Over the others run the laws of the models themselves, and drawn inputs once more, in greater
+    number.
     """
     if item.get_closest_marker("every_example"):
         return False
-    other_model = _is_given_another_model(item)
-    if models == "few":
-        return not (other_model or item.get_closest_marker("long"))
-    if other_model:
-        return item.get_closest_marker("each_model") or OF_MODELS & {*item.path.parts}
+    if (models == "long") != bool(item.get_closest_marker("long")):
+        return False
+    if _is_given_another_model(item):
+        is_law_of_models = item.get_closest_marker("each_model") or OF_MODELS & {*item.path.parts}
+        return models != "few" and is_law_of_models
     is_drawn = hypothesis.is_hypothesis_test(getattr(item, "obj", None))
-    return is_drawn or item.get_closest_marker("long")
+    return models != "others" or is_drawn
 
 
 def _is_given_another_model(item):

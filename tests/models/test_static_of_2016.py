@@ -116,12 +116,9 @@ def test_a_small_step_is_that_of_the_block_diagram(name, changes, seed):
     """Of the reference and of the measured voltage; Runge-Kutta errs by 1e-8 of it."""
     values = drawn_values(name, seed) | changes
     forward, measured = DIAGRAMS[name](SimpleNamespace(**values))
-    times, of_reference = alone(name, values, vref=1e-6, vt=VT, step=2.5e-4)
-    _, of_voltage = alone(name, values, vc1=1e-6, vt=VT, step=2.5e-4)
-    for efd, expected in (
-        (of_reference, 1e-6 * forward.step(times)),
-        (of_voltage, -1e-6 * (measured * forward).step(times)),
-    ):
+    times, found = alone(name, values, vref=[1e-6, 0.0], vc1=[0.0, 1e-6], vt=VT, step=2.5e-4)
+    of_reference, of_voltage = forward.step(times), -(measured * forward).step(times)
+    for efd, expected in zip(found.T, (1e-6 * of_reference, 1e-6 * of_voltage), strict=True):
         # 1e-8 pu of rounding where the step of efd is small
         assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
 

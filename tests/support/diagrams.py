@@ -130,39 +130,41 @@ def standing(name, values, efd=1.3, vt=1.0, ifd=1.1, **inputs):
 def alone(name, values, vref=0.0, vc1=0.0, time=0.5, step=1e-3, held=None, **start):
     """Return times and efd of an exciter after steps at t = 0, by Runge-Kutta.
 
-    ``vref`` and ``vc1`` are steps, vref also a function of time or several steps (a column of efd
-    for each); the limiters ``held`` act from t = 0, and all other inputs stay.
+    ``vref`` and ``vc1`` are steps or several of them (a column of efd for each), vref also a
+    function of time; the limiters ``held`` act from t = 0, and all other inputs stay.
     """
     model = MODELS[name]
     u, p, rest = standing(name, values, **start)
-    known = vars(u) | {"vc1": u.vc1 + vc1} | (held or {})
+    known = vars(u) | {"vc1": u.vc1 + np.asarray(vc1)} | (held or {})
     reference, kept = u.vref, {name: vars(rest)[name] for name in model.setpoints}
-    each = 1.0 if np.ndim(vref) == 0 else np.ones(len(vref))
+    each = np.ones(np.broadcast_shapes(np.shape(vref), np.shape(vc1)))
     x = np.array([vars(rest)[state] * each for state in model.states])
 
     def motion(x, t):
         known["vref"] = reference + (vref(t) if callable(vref) else np.asarray(vref))
         s, d = SimpleNamespace(**dict(zip(model.states, x, strict=True)), **kept), Names()
-        return model.equations(s, Names(**known), p, d), [vars(d)[one] for one in model.states]
+        efd = model.equations(s, Names(**known), p, d)
+        return efd * each, [vars(d)[one] for one in model.states]
 
-    def slopes(x, t):
-        return np.array([getattr(s, "slope", s) * each for s in motion(x, t)[1]])
-
-    def clamped(x, t):
-        pairs = zip(x, motion(x, t)[1], strict=True)
-        return np.array(
-            [clip(one, at.low, at.high) if isinstance(at, Limited) else one for one, at in pairs]
-        )
+    def slopes(rates):
+        return np.array([getattr(s, "slope", s) * each for s in rates])
 
     times, found = np.linspace(0.0, time, round(time / step) + 1), []
     for t in times:
         middle = t + step / 2  # a reference jumps between two steps
-        x = clamped(x, middle)
-        found.append(motion(x, middle)[0] * each)
-        k1 = slopes(x, middle)
-        k2 = slopes(x + step / 2 * k1, middle)
-        k3 = slopes(x + step / 2 * k2, middle)
-        k4 = slopes(x + step * k3, middle)
+        efd, rates = motion(x, middle)
+        within = [
+            clip(one, at.low, at.high) if isinstance(at, Limited) else one
+            for one, at in zip(x, rates, strict=True)
+        ]
+        if not np.array_equal(x, within):
+            x = np.array(within)
+            efd, rates = motion(x, middle)
+        found.append(efd)
+        k1 = slopes(rates)
+        k2 = slopes(motion(x + step / 2 * k1, middle)[1])
+        k3 = slopes(motion(x + step / 2 * k2, middle)[1])
+        k4 = slopes(motion(x + step * k3, middle)[1])
         x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     return times, np.array(found)
 

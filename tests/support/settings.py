@@ -1,7 +1,7 @@
 """Settings under which a machine computes as another would, and how to see that they took effect.
 
 ``python tests/support/settings.py oldest`` runs the numerical part of the tests under one of
-them; further arguments go to pytest.
+them, ``... oldest tests/cli`` other tests; further arguments go to pytest.
 """
 
 import os
@@ -58,10 +58,12 @@ def openblas_cores() -> set[str]:
 
 
 def run(name: str, arguments: list[str]) -> None:
-    """Become pytest over the folders whose numbers a setting may change."""
+    """Become pytest over the folders whose numbers a setting may change, or over those given."""
     tests = Path(__file__).parents[1]
-    paths = [tests / "test_settings.py", *(tests / folder for folder in NUMERICAL)]
-    command = [sys.executable, "-m", "pytest", *map(str, paths), *arguments]
+    given = any(Path(argument).exists() for argument in arguments)
+    folders = () if given else ("test_settings.py", *NUMERICAL)
+    paths = [str(tests / folder) for folder in folders]
+    command = [sys.executable, "-m", "pytest", *paths, *arguments]
     os.execve(sys.executable, command, {**os.environ, **SETTINGS[name]})
 
 
