@@ -16,6 +16,8 @@ from exfit.models.blocks import Limited
 from exfit.plants import SATURATION
 from exfit.plants.parts import Names, exciter_inputs, exciter_parameters
 
+FREQUENCIES = np.array([0.01, 0.1, 0.5, 1.0, 3.0, 10.0, 30.0])  # Hz
+
 
 class Transfer:
     """A transfer function, with the algebra of block diagrams; a number is one too."""
@@ -43,6 +45,11 @@ class Transfer:
         path = transfer(path)
         loop = self.under * path.under + self.over * path.over
         return Transfer((self.over * path.under).c, loop.c)
+
+    def at(self, frequencies):
+        """Return the responses to oscillations of one, complex."""
+        s = 2j * np.pi * np.asarray(frequencies)
+        return self.over(s) / self.under(s)
 
     def step(self, times):
         """Return the response to a step of one."""
@@ -191,3 +198,13 @@ def frequency_response(name, p, inputs, frequencies, start, h=1e-5):
     return np.array(
         [C @ np.linalg.solve(2j * np.pi * f * np.eye(n) - A, B) + D for f in frequencies]
     )
+
+
+def assert_is_diagram(name, values, ways, **start):
+    """An exciter answers each of its inputs as the transfer function does that leads from it."""
+    p = SimpleNamespace(**values)
+    found = frequency_response(name, p, list(ways), FREQUENCIES, start)
+    for response, way in zip(found.T, ways.values(), strict=True):
+        expected = way.at(FREQUENCIES)
+        # differences over 1e-5: rounding over it, and a third derivative times its square
+        assert np.abs(response - expected).max() < 1e-7 * np.abs(expected).max()
