@@ -401,6 +401,7 @@ def exdc2a_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return u.vc1 + error - u.vs
 
 
+OF_EXDC2A = "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2"
 EXDC2A = documented(
     exdc2a,
     exdc2a_rest,
@@ -409,9 +410,8 @@ EXDC2A = documented(
         ("TF2", 0.25, *POSITIVE_TIME, "second stabilising feedback time constant", LAG_OF_KF),
     ),
     "VC VL VR EFD VF1 VF2",
-    pslf_records=record(
-        "exdc2a", "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2", doubt=OF_A_LIST
-    ),
+    records=record("EXDC2A", OF_EXDC2A, doubt="its order is InterPSS's"),
+    pslf_records=record("exdc2a", OF_EXDC2A, doubt=OF_A_LIST),
     setpoints=SETPOINTS,
     doubt="rests on one public program, InterPSS; no other source says that VR is fed back",
 )
