@@ -18,7 +18,16 @@ from places import REFERENCE
 from exfit.features.planner.units import read_unit
 from exfit.models import GOVERNORS
 from exfit.models.speed_multiplier import times_speed
-from exfit.plants import GOVERNOR, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
+from exfit.plants import (
+    GOVERNOR,
+    MACHINE,
+    NETWORK,
+    SATURATION,
+    STABILISER,
+    VT0,
+    Attached,
+    Stabilised,
+)
 from exfit.plants import unit as loaded
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.unit import UnitOnLoad
@@ -86,6 +95,10 @@ class TwoBuses:
         if added := told.get("governor"):
             governor = GOVERNORS[added["model"]]
             values |= prefixed(GOVERNOR, added["parameters"])
+        limiters = []
+        for part in parts.limiters:
+            limiters.append(Attached(part.definition.model, part.place))
+            values |= prefixed(limiters[-1].prefix, part.values)
         exciter = parts.exciter.definition.model.in_dialect(dialect)
         self.unit = UnitOnLoad(
             times_speed(exciter) if "efd_times_speed" in told else exciter,
@@ -94,6 +107,7 @@ class TwoBuses:
             stabiliser,
             governor=governor,
             dialect=dialect,
+            limiters=tuple(limiters),
         )
         network = {"f0": 60.0, "R": 0.0, "X": LINE, "Ra": 0.0, "Rc": 0.0, "Xc": 0.0, "P": P, "Q": Q}
         network |= {"Rs": 0.0, "Xs": SOURCE}
@@ -131,6 +145,7 @@ class TwoBuses:
             unit.stabiliser,
             unit.dialect,
             unit.governor,
+            unit.limiters,
             load=self.load,
         )
 

@@ -330,8 +330,9 @@ def _attached(
         ]
         code = int(number(values[flag])) if flag in FLAGS and flag in values else None
         stated = dict(record.places).get(code) if code is not None else None
-        if not places:
-            text = f"limiter {name} is left out: {record.name} has no input for it"
+        if not places or code == 0:  # with UEL = 0 of ST1C a UEL1 does not act in PSS/E 36.7
+            why = f"has {flag} = 0" if places else "has no input for it"
+            text = f"limiter {name} is left out: {record.name} {why}"
             warnings.append(DynamicsFault(limiter.line, text))
             continue
         place = stated if stated in places else places[0]

@@ -437,9 +437,8 @@ def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
         ("AC1C", {"OEL": 1.0}, "OEL2C", "summing", ""),
         ("AC1C", {"OEL": 2.0}, "OEL2C", "takeover", ""),
         ("AC7C", {"OEL": 1.0, "UEL": 3.0}, "UEL2C", "takeover-output", ""),
-        # 4 is a gate behind the PI, 0 no place; OEL3C has no gate; ESAC1A and ST6C say nothing
+        # 4 is a gate behind the PI; OEL3C has no gate; ESAC1A and ST6C say nothing
         ("AC7C", {"OEL": 4.0}, "OEL2C", "takeover", "AC7C has OEL = 4"),
-        ("AC1C", {"OEL": 0.0}, "OEL2C", "takeover", "AC1C has OEL = 0"),
         ("AC1C", {"OEL": 2.0}, "OEL3C", "summing", "AC1C has OEL = 2"),
         ("ESAC1A", {}, "OEL2C", "takeover", "ESAC1A does not state its place"),
         ("ST6C", {}, "OEL2C", "takeover", "ST6C has OEL = 1"),
@@ -460,6 +459,15 @@ def test_a_limiter_acts_where_its_exciter_s_flag_says_else_at_its_usual_place(
     case = parse_case(imported_case(unit, "unit.dyr").text, Path("unit.yaml"))
     (attached,) = case.parts.limiters
     assert (attached.model.name, attached.place) == (limiter, place)
+
+
+def test_a_limiter_whose_flag_is_0_is_left_out_as_in_PSSE():
+    """The reference psse_uel1 has such a unit: at the gate vt would be 1.4e-5 pu off."""
+    parts = ((GENROU, {}), (definition_of("AC1C"), {"OEL": 0.0}), (definition_of("OEL2C"), {}))
+    records = [record_text(part, typical(part.model.sheet) | own, 7, "1") for part, own in parts]
+    unit = read_unit("\n".join(records), "unit.dyr")
+    assert unit.limiters == ()
+    assert "limiter OEL2C is left out: AC1C has OEL = 0" in [own.text for own in unit.warnings]
 
 
 def test_a_governor_that_cannot_be_simulated_is_left_out_with_the_reason():
