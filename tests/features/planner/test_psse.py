@@ -462,7 +462,7 @@ def test_a_limiter_acts_where_its_exciter_s_flag_says_else_at_its_usual_place(
 
 
 def test_a_limiter_whose_flag_is_0_is_left_out_as_in_PSSE():
-    """The reference psse_uel1 has such a unit: at the gate vt would be 1.4e-5 pu off."""
+    """The reference psse_idle_uel1 has such a unit: at the gate vt would be 1.4e-5 pu off."""
     parts = ((GENROU, {}), (definition_of("AC1C"), {"OEL": 0.0}), (definition_of("OEL2C"), {}))
     records = [record_text(part, typical(part.model.sheet) | own, 7, "1") for part, own in parts]
     unit = read_unit("\n".join(records), "unit.dyr")
