@@ -329,7 +329,7 @@ def _attached(
             if fed.issuperset(inputs_at(Attached(own, place)).values())
         ]
         code = int(number(values[flag])) if flag in FLAGS and flag in values else None
-        stated = dict(record.places).get(code) if code is not None else None
+        stated = dict[int | None, str](record.places).get(code)
         if not places or code == 0:  # with UEL = 0 of ST1C a UEL1 does not act in PSS/E 36.7
             why = f"has {flag} = 0" if places else "has no input for it"
             text = f"limiter {name} is left out: {record.name} {why}"
