@@ -209,6 +209,7 @@ REMEMBERED = {
     "exfit.engine.kernel": {"_loaded"},
     "exfit.engine.sampling": {"_scratch"},
     "exfit.util.gate": {"_gates"},
+    "exfit.util.interrupts": {"_received"},
 }
 
 

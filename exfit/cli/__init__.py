@@ -6,23 +6,21 @@ Everything but click is imported in the command that needs it, so that help appe
 import atexit
 import gc
 import os
-from functools import partial
+import signal
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from exfit.cli.options import Interruption, Refusal, with_trust_option
-from exfit.cli.streams import unfailing_output
+from exfit.cli.options import Interruption, Refusal, code_after, with_trust_option
+from exfit.cli.streams import echo, unfailing_output
 from exfit.errors import ExfitError
 from exfit.registry import LazyCommand, LazyPart
 from exfit.registry import commands as of_features
 from exfit.util.gate import guarded
-from exfit.util.interrupts import SIGNALLED, endings_as_interruptions
+from exfit.util.interrupts import endings_as_interruptions
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
-
-    from exfit.util.trust import Code
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -30,6 +28,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # a look for circles of dead objects, where all memory goes anyway, takes a sixth of a short fit
 atexit.register(gc.freeze)
+# all is written then, and the exit code said: a late Ctrl-C changes neither
+atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
 GROUPS = ("start", "fit", "examine", "hand over", "reference")
@@ -65,12 +65,6 @@ OF_CORE = {
 
 def _commands() -> dict[str, LazyCommand]:
     return {**OF_CORE, **of_features()}
-
-
-def _permit(ctx: click.Context, code: "Code") -> None:
-    from exfit.cli.trusting import permit
-
-    permit(ctx, code)
 
 
 class Commands(click.Group):
@@ -114,12 +108,14 @@ class Commands(click.Group):
                 return super().main(*arguments, obj=signals, **settings)
             except SystemExit as ended:
                 code = exit_code(ended.code)
-                raise SystemExit(SIGNALLED + signals[0] if signals else code) from None
+                if signals and code != Interruption.exit_code:
+                    echo("Interrupted: what was done until then is kept", err=True)
+                raise SystemExit(code_after(signals, code or 0)) from None
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, and turn what is wrong with its input into a message."""
         try:
-            with guarded(partial(_permit, ctx)):
+            with guarded(lambda code: LazyPart("exfit.cli.trusting:permit").load()(ctx, code)):
                 return super().invoke(ctx)
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault

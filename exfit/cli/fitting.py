@@ -194,11 +194,8 @@ def fit_one(
 
     (strategy, search), events = settings, output.events
     if events is not None:
-        from exfit.results.side_by_side import outcome_of
-
         watch = partial(events, case.path.stem)
         result = workflows.fit(case, strategy, watch, watch, search=search)
-        events.done(case.path.stem, outcome_of(result), result.holds)
     elif output.live:
         from exfit.output import live, terminal
 
@@ -224,6 +221,10 @@ def fit_one(
                 terminal.show(console, fits.whole(result, place, before))
             else:
                 terminal.show_shortest(console, fits.briefs(result, place, before))
+    if events is not None:
+        from exfit.results.side_by_side import outcome_of
+
+        events.done(case.path.stem, outcome_of(result), result.holds)
     output.draw(figures, listed=verbose)
     return result
 
@@ -253,11 +254,12 @@ def fit_again_and_again(
             except ExfitError as fault:
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:
-                return
+                break
             terminal.waiting(console, stamps)
             if output_is_lost():
                 return
             terminal.again(console, changed(stamps))
+    click.get_current_context().find_root().obj.clear()  # Ctrl-C is how it ends
 
 
 def fit_several(

@@ -1,5 +1,6 @@
 """What several commands share: their options, and small steps on the way."""
 
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -70,15 +71,11 @@ force_option = click.option("--force", is_flag=True, help="Overwrite an existing
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 
 
-def _trusting(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    ctx.meta[TRUST] = value
-
-
 trust_option = click.Option(
     ["--trust"],
     is_flag=True,
     expose_value=False,
-    callback=_trusting,
+    callback=lambda ctx, _, value: ctx.meta.update({TRUST: value}),
     help="Run the code that a case names, and trust it from now on: see exfit trust.",
 )
 
@@ -231,9 +228,9 @@ def announced(progress: str, **arguments: Any) -> "Iterator[Events | None]":
     context = click.get_current_context()
     inputs = (arguments.get(name) for name in ("case", "cases", "programme", "record"))
     strategies = arguments.get("strategies") or arguments.get("strategy")
-    events = Events(str(context.info_name), [*_listed(inputs)], [*_listed([strategies])])
-    code, error = 0, None
+    events, code, error = Events(), 0, None
     try:
+        events.start(str(context.info_name), [*_listed(inputs)], [*_listed([strategies])])
         yield events
     except SystemExit as ended:
         code = int(ended.code or 0)
@@ -248,8 +245,15 @@ def announced(progress: str, **arguments: Any) -> "Iterator[Events | None]":
         code, error = Refusal.exit_code, str(fault)
         raise
     finally:
-        signals = context.find_root().obj  # a signal that ended the command has a code of its own
-        events.end(SIGNALLED + signals[0] if signals else code, error)
+        events.end(code_after(context.find_root().obj, code), error)
+
+
+def code_after(signals: Sequence[int], code: int) -> int:
+    """Return the exit code of a command that signals met."""
+    for number in signals:
+        if number != signal.SIGINT:
+            return SIGNALLED + number
+    return NOT_CONVERGED if signals and code == 0 else code
 
 
 def _listed(given: Iterable[Any]) -> Iterator[str]:

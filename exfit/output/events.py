@@ -33,11 +33,14 @@ class Events:
     is where the command leaves its files.
     """
 
-    def __init__(self, command: str, inputs: Sequence[str], strategies: Sequence[str]) -> None:
+    def __init__(self) -> None:
         self._began = time.monotonic()
         self._begun: set[str] = set()
         self._verdicts: list[str] = []
         self.folder: Path | None = None
+
+    def start(self, command: str, inputs: Sequence[str], strategies: Sequence[str]) -> None:
+        """Write what is run."""
         self.write("start", command=command, inputs=inputs, strategies=strategies)
 
     def write(self, event: str, **content: Any) -> None:

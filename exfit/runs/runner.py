@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from exfit.errors import ExfitError
+from exfit.util.interrupts import interrupted
 
 
 class FitSettings(NamedTuple):
@@ -65,7 +66,7 @@ def run_in_turn(
     """
     runs: list[RunT] = []
     failed: dict[str, str] = {}
-    interrupted = False
+    ended_early = False
     try:
         for planned in plan:
             try:
@@ -74,14 +75,14 @@ def run_in_turn(
             except ExfitError as fault:
                 failed[planned.name] = str(fault)
                 continue
-            if runs[-1].interrupted:
-                interrupted = True
+            if runs[-1].interrupted or interrupted():
+                ended_early = True
                 break
     except KeyboardInterrupt:
-        interrupted = True
+        ended_early = True
     ended = {*failed, *(done.name for done in runs)}
     left = tuple(planned.name for planned in plan if planned.name not in ended)
-    return Runs(tuple(runs), failed, left, interrupted)
+    return Runs(tuple(runs), failed, left, ended_early)
 
 
 def distinct_names(paths: Sequence[Path]) -> list[str]:

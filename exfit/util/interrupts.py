@@ -19,6 +19,9 @@ SIGNALLED = 128  # exit codes of programs that a signal ended are its number and
 IMPORTING = "<frozen importlib._bootstrap>"  # the file of the frames of an import
 AGAIN = 0.02  # s until a signal that met an import is looked at again
 
+# the signals that came, of those who listen: whatever catches an interruption, it stays here
+_received: list[list[int]] = []
+
 
 @contextmanager
 def deferred_interrupts() -> Iterator[None]:
@@ -57,13 +60,18 @@ def _deferred(*numbers: signal.Signals) -> Iterator[None]:
         signal.raise_signal(first)
 
 
+def interrupted() -> bool:
+    """Tell whether an interruption has come, whoever has caught it: nothing new is begun then."""
+    return any(_received)
+
+
 @contextmanager
 def endings_as_interruptions() -> Iterator[list[int]]:
     """Have signals that end a program interrupt what is inside, as Ctrl-C does.
 
-    What is given holds the numbers of those that came. Those that are ignored, as by nohup, stay
-    so; other threads than the main one get none. An import ends first, as Ctrl-C lets it end, too:
-    a module that was interrupted cannot be imported again, nor what needs it.
+    What is given holds the numbers of those that came, of Ctrl-C too. Those that are ignored, as by
+    nohup, stay so; other threads than the main one get none. An import ends first: a module that
+    was interrupted cannot be imported again, nor what needs it.
     """
     received: list[int] = []
     program, imports = os.getpid(), _imports(sys._getframe())
@@ -78,8 +86,7 @@ def endings_as_interruptions() -> Iterator[list[int]]:
             again.daemon = True
             again.start()
             return
-        if number != signal.SIGINT:
-            received.append(number)
+        received.append(number)
         raise KeyboardInterrupt
 
     main = threading.current_thread() is threading.main_thread()
@@ -92,8 +99,10 @@ def endings_as_interruptions() -> Iterator[list[int]]:
     try:
         for number in former:
             signal.signal(number, interrupt)
+        _received.extend([received] if former else ())
         yield received
     finally:
+        _received[:] = [each for each in _received if each is not received]
         for number, handler in former.items():
             signal.signal(number, handler)
         # where an interruption has passed through code made of text, as dataclasses are, CPython

@@ -127,7 +127,8 @@ def test_an_interrupted_fit_announces_its_end(run, empty_folder, monkeypatch, nu
 
 
 def test_numbers_that_are_not_finite_are_null(capsys):
-    watch = events.Events("fit", [], [])
+    watch = events.Events()
+    watch.start("fit", [], [])
     watch.stage("case", "causes", 0, 1, float("nan"))
     watch.write("end", exit_code=0, verdict=float("inf"), folder=None, error=None)
     read, _ = announced(capsys.readouterr().err)

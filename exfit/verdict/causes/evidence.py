@@ -82,7 +82,8 @@ class Pace:
 
     def stopped(self, untried: tuple[str, ...], interrupted: bool) -> None:
         """Keep what an interruption, or the end of the time, has left untried."""
-        self.untried, self.interrupted = untried, interrupted
+        self.untried = (*self.untried, *untried)
+        self.interrupted = self.interrupted or interrupted
 
     @property
     def sentence(self) -> str:

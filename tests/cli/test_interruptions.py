@@ -1,0 +1,88 @@
+"""An interruption at any stage that a command announces reaches its message and its exit code."""
+
+import contextlib
+import json
+import signal
+
+import pytest
+from ended_commands import contents
+
+from exfit.output import events
+from exfit.util import files
+
+COMMANDS = {  # that announce their stages
+    "profile": ("profile", "case.yaml"),
+    "fit": ("fit", "case.yaml"),
+    "fit without a match": ("fit", "misfit.yaml"),
+    "several fits": ("fit", "case.yaml", "other.yaml"),
+    "run": ("run", "case.yaml", "--again"),
+    "rank": ("rank", "unit.yaml", "--models", "AC1A,SEXS", "--search", "local"),
+}
+FEW = ("profile", "fit")  # the others take longer
+OPTIONS = ("--no-plots", "--progress", "json", "-q", "-o", "folder")
+
+pytestmark = pytest.mark.usefixtures("in_prepared_folder")
+
+
+@pytest.fixture
+def stages(monkeypatch):
+    """Return a function that sends SIGINT when a command announces something for the n-th time."""
+    real, announced = events.Events.write, []
+
+    def interrupting(at, times):
+        def write(self, event, **content):
+            real(self, event, **content)
+            announced.append(
+                (event, content.get("run"), content.get("stage", content.get("phase")))
+            )
+            if at is not None and at < len(announced) <= at + times and event != "end":
+                signal.raise_signal(signal.SIGINT)
+
+        announced.clear()
+        monkeypatch.setattr(events.Events, "write", write)
+        return announced
+
+    return interrupting
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name if name in FEW else pytest.param(name, marks=pytest.mark.long) for name in COMMANDS],
+)
+def test_an_interruption_at_each_stage_is_never_swallowed(run, prepared_folder, stages, name):
+    """At the last time that a command announces each stage; of few also the first, and two."""
+    case = (prepared_folder / "case.yaml").read_text(encoding="utf-8")
+    misfit = case.replace("step: 1.0", "step: 0.6")
+    assert misfit != case
+    (prepared_folder / "misfit.yaml").write_text(misfit, encoding="utf-8")
+    announced = stages(None, 0)
+    assert run(*COMMANDS[name], *OPTIONS).code in (0, 3)
+    before = {*contents(prepared_folder)}
+    first = {stage: at for at, stage in reversed([*enumerate(announced)])}
+    last = {stage: at for at, stage in enumerate(announced)}
+    met = {*last.values(), *(first.values() if name in FEW else ())} - {len(announced) - 1}
+    for at in sorted(met):
+        for times in (1, 2) if name in FEW else (1,):
+            stages(at, times)
+            ran = run(*COMMANDS[name], *OPTIONS)
+            assert ran.code in (3, 130), (at, times, ran)
+            assert "nterrupted" in ran.err, (at, times, ran)
+            assert "Traceback" not in ran.err
+            end = [json.loads(line) for line in ran.err.splitlines() if line.startswith("{")][-1]
+            assert end["exit_code"] == ran.code
+            assert {*contents(prepared_folder)} <= before  # whole, and nothing temporary
+
+
+def test_an_interruption_that_something_swallows_is_an_exit_code(run, monkeypatch):
+    real = files._write_new
+
+    def swallowing(path, data):
+        real(path, data)
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(files, "deferred_interrupts", contextlib.nullcontext)
+    monkeypatch.setattr(files, "_write_new", swallowing)
+    ran = run("simulate", "case.yaml", "--no-plots", "-q", "-o", "folder")
+    assert ran.code == 3
+    assert ran.err == "Interrupted: what was done until then is kept\n"
