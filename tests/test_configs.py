@@ -58,7 +58,7 @@ def test_a_case_is_fitted_well_and_its_validations_hold(name):
 @pytest.mark.parametrize("name", ["ac1a_typical", "ac1a_low", "ac8b_unit1", "ac8b_on_line"])
 def test_a_case_is_fitted_at_its_lowest_cost(name):
     case = load_case(CONFIGS / f"{name}.yaml")
-    result = fit(replace(case, validations=(), accept=None))
+    result = fit(replace(case, validations=()))
     many = case.estimate.model_copy(update={"starts": MANY})
-    lowest = fit(replace(case, estimate=many, validations=(), accept=None)).cost
+    lowest = fit(replace(case, estimate=many, validations=())).cost
     assert result.cost <= 1.005 * lowest

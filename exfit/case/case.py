@@ -18,13 +18,11 @@ from exfit.case.schema import (
     FreeSection,
     FurtherUnitSection,
     Governor,
-    Limit,
     Limiter,
     Parameters,
     Plant,
     RecordFile,
     Recording,
-    ReportRequest,
     SaturationName,
     SimulationSection,
     Stabiliser,
@@ -37,7 +35,7 @@ from exfit.models.sheet import Parameter
 from exfit.plants import KINDS, NETWORK, PlantKind
 from exfit.records.record import Record
 from exfit.util.text import near
-from exfit.util.vocabulary import FITTED, NOT_STATED, TYPICAL, least_certain
+from exfit.util.vocabulary import FITTED, NOT_STATED, TYPICAL, Criteria, least_certain
 
 
 class GivenValue(NamedTuple):
@@ -85,9 +83,8 @@ class Case:
     estimate: Estimate
     simulation: SimulationSection
     validations: tuple[Recording, ...]
-    accept: Limit | None
+    criteria: Criteria
     as_found: AsFoundSection | None
-    report: ReportRequest
     parts: Parts
     ties: Ties
     external: ExternalPlant | FmuPlant | None = None
@@ -106,13 +103,21 @@ class Case:
     def of(
         cls, document: CaseDocument, parts: Parts, ties: Ties, path: Path, from_file: bool = True
     ) -> "Case":
-        """Return the case of checked sections that are, or would be, in the file ``path``."""
+        """Return the case of checked sections that are, or would be, in the file ``path``.
+
+        Raises CaseError for faults in the file of its criteria.
+        """
         sections = {name: getattr(document, name) for name in CaseDocument.model_fields}
         external = sections["plant"]
         if isinstance(external, ExternalPlant | FmuPlant):
             sections.update(plant=external.plant, external=external)
             if "search" not in document.estimate.model_fields_set:
                 sections["estimate"] = sections["estimate"].model_copy(update={"search": "local"})
+        sections["criteria"] = Criteria()
+        if document.criteria is not None:
+            from exfit.case.criteria import criteria_of
+
+            sections["criteria"] = criteria_of(document.criteria, path.parent)
         return cls(path=path, from_file=from_file, parts=parts, ties=ties, **sections)
 
     @classmethod

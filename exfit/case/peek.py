@@ -9,7 +9,7 @@ from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.util.files import siblings
 
-NAMING_FILES = ("test", "record", "records", "validate", "tests")
+NAMING_FILES = ("test", "record", "records", "validate", "tests", "criteria")
 # the places of parameters, and how their names begin
 SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "": (("parameters", "free"), ("parameters", "fixed")),

@@ -210,7 +210,7 @@ def validate(
     result = replace(result, options=tuple(_options(as_found, parameters, *by_hand)))
     figures = run_folder.write_validation(result, folder)
     content = {"validation": [plain(match) for match in result.matches]}
-    blocks = (paragraph(result.origin), *validations.validation(result.matches))
+    blocks = (paragraph(result.origin), *validations.validation(result))
     output.show(content, blocks, folder, figures)
     if not result.accepted:
         raise SystemExit(NOT_CONVERGED)

@@ -1,4 +1,4 @@
-"""What an engineer reads off a step response: rise, overshoot, peak, settling, final value."""
+"""What an engineer reads off a step response: rise, overshoot, settling, damping, final value."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from exfit.util.arrays import Array, Places
+from exfit.util.arrays import Array, Mask, Places
 
 TAIL = 0.05  # share of the response after the step whose mean is its final value
 BAND = 0.02  # of the step: within it the response has settled
@@ -22,7 +22,8 @@ LABELS = (
     ("peak time", "peak_time", "s"),
     ("settling time 2 %", "settling_time", "s"),
 )  # of the features, with name and unit
-TIMES = ("rise_time", "peak_time", "settling_time")  # those that may be missing
+TIMES = ("rise_time", "peak_time", "settling_time", "delay")
+MAY_BE_MISSING = (*TIMES, "damping_ratio")
 
 
 class RemovedLine(NamedTuple):
@@ -52,6 +53,8 @@ class Features:
     overshoot_percent: Annotated[float, nan]
     peak_time: float | None
     settling_time: float | None
+    delay: float | None = None
+    damping_ratio: float | None = None
     errors: Mapping[str, float] = field(default_factory=dict)
     why: Mapping[str, str] = field(default_factory=dict)
     without: tuple[RemovedLine, ...] = ()
@@ -67,7 +70,10 @@ def features(time: Array, signal: Array, step_at: float, until: float) -> Featur
 
     Rise is from 10 to 90 % of the way from the initial to the final value (means before the step
     and over the last twentieth), overshoot the excursion beyond the final value in percent of that
-    way, settling the last time outside 2 % of it. None where nothing moves: there is no way.
+    way, settling the last time outside 2 % of it, delay the time until 10 % of it. The damping
+    ratio is that of a second-order system with the same decrement from the largest swing about the
+    final value to the next one, on its other side. None where nothing moves: there is no way.
+    Source: IEEE Std 421.2 (step response); IEC 61400-21-1 (delay, there the reaction time).
     """
     after = (time >= step_at) & (time <= until)
     t, y = time[after] - step_at, signal[after]
@@ -84,7 +90,7 @@ def features_after(t: Array, y: Array, initial: float) -> Features | None:
     }
     if isnan(figures["overshoot_percent"]):
         return None
-    times = {name: None if isnan(figures[name]) else figures[name] for name in TIMES}
+    times = {name: None if isnan(figures[name]) else figures[name] for name in MAY_BE_MISSING}
     return Features(**{**figures, **times})  # type: ignore[arg-type]
 
 
@@ -108,10 +114,34 @@ def figures_of(t: Array, curves: Array, initial: Array) -> dict[str, Array]:
         "initial_value": initial,
         "final_value": final,
         "rise_time": end - begin,
+        "delay": begin,
+        "damping_ratio": _damping_ratios(curves - final[:, None], tail),
         "overshoot_percent": np.where(final == initial, np.nan, overshoot),
         "peak_time": np.where(overshoots, at, np.nan),
         "settling_time": _settled(t, way),
     }
+
+
+def _damping_ratios(swing: Array, tail: Mask) -> Array:
+    """Damping ratios of swings (K, M) about their final values, nan where they do not swing.
+
+    A swing is a turning point at more than 2 % of the range, before the tail.
+    """
+    slope = np.diff(swing, axis=1)
+    turns = np.zeros(swing.shape, dtype=bool)
+    turns[:, 1:-1] = (slope[:, 1:] * slope[:, :-1] < 0.0) & ~tail[1:-1]
+    size = np.where(turns, np.abs(swing), 0.0)
+    row, first = np.arange(len(swing)), np.argmax(size, axis=1)
+    side = np.sign(swing[row, first])[:, None]
+    after = np.arange(swing.shape[1]) > first[:, None]
+    second = np.argmax(np.where(after & turns, -side * swing, 0.0), axis=1)
+    steps = np.arange(swing.shape[1], dtype=float)  # evenly enough for the height of a vertex
+    _, larger = _vertices(steps, side * swing, first)
+    _, smaller = _vertices(steps, -side * swing, second)
+    read = (size[row, first] > BAND * np.ptp(swing, axis=1)) & (second > 0) & (smaller > 0.0)
+    with np.errstate(all="ignore"):
+        decrement = np.log(larger / smaller)
+    return np.where(read, decrement / np.hypot(np.pi, decrement), np.nan)
 
 
 def _first_crossings(t: Array, way: Array, level: float) -> Array:

@@ -16,7 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.dsp.features import TIMES, Features, RemovedLine, features, features_after, figures_of
+from exfit.dsp.features import (
+    MAY_BE_MISSING,
+    TIMES,
+    Features,
+    RemovedLine,
+    features,
+    features_after,
+    figures_of,
+)
 from exfit.dsp.lines import cosine_and_sine, largest_line
 from exfit.dsp.noise import noise
 from exfit.util.arrays import Array, Mask, Places, distinct, median_step
@@ -122,7 +130,7 @@ def recorded_features(response: RecordedResponse) -> Features | None:
     drawn = smooth + smoothing.noise * np.sqrt(smoothing.shrunk) * normal
     curves = guides + drawn @ smoothing.basis.T
     figures = figures_of(t[read], curves[:, :-2], curves[:, -2])
-    for name in ("peak_time", "settling_time"):  # since the step, wherever that is
+    for name in ("peak_time", "settling_time", "delay"):  # since the step, wherever that is
         figures[name] = figures[name] - (curves[:, -1] - late)
     between_samples = SAMPLING_ERROR * median_step(t)
     return replace(_with_errors(own, figures, between_samples), without=lines)
@@ -286,12 +294,12 @@ def _with_errors(own: Features, drawn: Mapping[str, Array], between_samples: flo
         seen = draws[np.isfinite(draws)]
         half = NORMAL_95 * float(np.sqrt(np.mean((seen - value) ** 2))) if len(seen) else 0.0
         hidden = ""
-        if name in TIMES:
+        if name in MAY_BE_MISSING:
             low, high = (round(share * len(seen)) for share in MIDDLE)
             middle = np.sort(seen)[low:high]  # with a wide gap it is of two kinds
             if len(middle) > 1 and float(np.max(np.diff(middle))) > MOST_APART * half:
                 hidden = EITHER
-            half = hypot(half, between_samples)
+            half = hypot(half, between_samples) if name in TIMES else half
             if len(seen) < (1.0 - MOST_WITHOUT) * len(draws) or half > value:
                 hidden = NOT_SEEN
         if hidden:

@@ -26,7 +26,7 @@ from exfit.output.blocks import (
     row,
     unresolved,
 )
-from exfit.output.validations import comparisons, in_a_line, played, rejections
+from exfit.output.validations import comparisons, criteria_table, in_a_line, played, rejections
 from exfit.results.causes_in_words import causes_in_words
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.verdict import GOOD, MATCHES
@@ -67,6 +67,9 @@ def _brief(
     causes, accepted, noted = most
     yield fitted_table(result, before, of_records)
     yield figures(f"cost {result.start_cost:.4e} -> {result.cost:.4e}", *_errors(result))
+    if result.criteria.given:
+        yield criteria_table(result)
+    yield from rejections(result.comparisons)
     good = [match for match in result.validation if not match.reason]
     for match in result.validation:
         if match.reason or match in good[:accepted]:
@@ -135,7 +138,9 @@ def whole(
         yield from comparisons([*result.comparisons, *result.validation])
     else:
         yield from played(result.comparisons)
-    yield from rejections(result.validation)
+    if result.criteria.given:
+        yield criteria_table(result)
+    yield from rejections([*result.comparisons, *result.validation])
     yield from _causes(result, folder)
     if folder is not None:
         yield paragraph(written_to(folder))

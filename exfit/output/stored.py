@@ -42,7 +42,7 @@ def show(
                 raise ExfitError(f"{place}: {text}")
             validation = load_validation(validated)
             terminal.show(console, [paragraph(validation.origin)])
-            terminal.show(console, validations.validation(validation.matches))
+            terminal.show(console, validations.validation(validation))
             return
         fit, folder = load_result(source), source.parent
     if history:

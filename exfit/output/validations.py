@@ -1,23 +1,28 @@
 """Records beside simulations, as blocks."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
 from exfit.dsp.features import LABELS
 from exfit.output.blocks import (
     Block,
     Cell,
+    Mark,
     Note,
     Table,
     TableColumn,
     columns,
     notes,
+    number,
     paragraph,
     remarks,
     row,
 )
-from exfit.results.comparisons import Comparison, Excursion, StepFeatures
+from exfit.results.comparisons import Comparison, Excursion, JudgedCriterion, StepFeatures
+from exfit.results.criteria import judged_by_criteria
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.util.text import percentage
 
+MARKS: Mapping[str, Mark] = {"met": "ok", "not met": "bad"}  # of criteria
 FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interval
 
 
@@ -89,7 +94,7 @@ def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
 
 
 def rejections(all_of_them: Iterable[Comparison]) -> Iterator[Note]:
-    """Yield the reason for each validation that is not accepted."""
+    """Yield the reason for each record that is not accepted."""
     return remarks("not accepted:", (match.reason for match in all_of_them), "bad")
 
 
@@ -101,9 +106,44 @@ def in_a_line(match: Comparison) -> Note:
     return Note(f"{figures}, accepted", "verdict", f"validation {match.name}:", "ok")
 
 
-def validation(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
-    """Yield the rejections, the fitted records, and the match of each."""
+def criteria_table(result: Reported) -> Table:
+    """Make the table of a result's criteria: on each record difference, limit and outcome."""
+    unseen = {match.name for match in result.validation}
+    return table_of_criteria(judged_by_criteria(result).criteria, unseen)
+
+
+def table_of_criteria(
+    criteria: Iterable[JudgedCriterion],
+    unseen: Container[str] | None,
+    title: str = "Criteria: simulated minus recorded",
+) -> Table:
+    """Make the table of criteria, with the use of each record if those ``unseen`` are known."""
+    rows = []
+    for each in criteria:
+        use = []
+        if unseen is not None:
+            use = ["to validate" if each.record in unseen else "to fit" if each.record else ""]
+        numbers = (number(each.difference, 2), number(each.limit, 3))
+        outcome = Cell(
+            f"{each.outcome}: {each.why}" if each.why else each.outcome, MARKS.get(each.outcome, "")
+        )
+        rows.append((*row(each.record or "-", *use, each.label, *numbers, each.unit), outcome))
+    heads = (
+        TableColumn("record", folds=True),
+        *([] if unseen is None else [TableColumn("used", expendable=1)]),
+        TableColumn("criterion", folds=True),
+        *columns("difference", "limit", "unit", numbers=("difference", "limit")),
+        TableColumn("result", folds=True),
+    )
+    return Table(heads, tuple(rows), title)
+
+
+def validation(result: ValidationResult) -> Iterator[Block]:
+    """Yield the rejections, the fitted records, the criteria, and the match of each record."""
+    all_of_them = result.matches
     yield from rejections(all_of_them)
+    if result.criteria.given:
+        yield criteria_table(result)
     for role, chosen in (("fitted, not judged:", False), ("validated:", True)):
         records = [f"{m.name} ({m.record})" for m in all_of_them if m.validation is chosen]
         if records:

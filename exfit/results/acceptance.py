@@ -16,32 +16,28 @@ def judged(
     validation: Comparison,
     fitted: Sequence[Comparison],
     channels: Sequence[Channel],
-    accept: float | None = None,
 ) -> Comparison:
     """Return a validation with its verdict: the limit of its rmse, and why it is not accepted.
+
+    Without criteria of a case it must match better than a constant would, and its rmse must not
+    exceed three times the largest one of the fit in the same signal, or three times the noise of
+    its own record where that is larger: no model comes below the noise. Of a grid event that was
+    played in, P and Q are judged so.
 
     Args:
         validation: the comparison with a record that was not fitted.
         fitted: those with the records of the fit.
         channels: those of the validation's record; they give its noise.
-        accept: the limit of the case (pu), which judges alone. Without it a validation must match
-            better than a constant would, and its rmse must not exceed three times the largest one
-            of the fit in the same signal, or three times the noise of its own record where that is
-            larger: no model comes below the noise. Of a grid event that was played in, P and Q
-            are judged so.
     """
     limits: dict[str, float | None] = {}
     for channel in channels:
         if channel.signal in validation.judging:
             fit_error = _error_of_fit(channel.signal, fitted)
-            if accept is None and fit_error is not None:
-                noise = noise_of(channel) * noise_shape(channel).gain
-                limits[channel.signal] = MUCH_WORSE * max(fit_error, noise)
-            else:
-                limits[channel.signal] = accept
+            noise = noise_of(channel) * noise_shape(channel).gain
+            limit = None if fit_error is None else MUCH_WORSE * max(fit_error, noise)
+            limits[channel.signal] = limit
     reasons = (
-        _why_not(validation, signal, fitted, limits[signal], accept is not None)
-        for signal in validation.judging
+        _why_not(validation, signal, fitted, limits[signal]) for signal in validation.judging
     )
     reason = "; ".join(filter(None, reasons))
     limit = limits[validation.judging[0]]
@@ -59,15 +55,11 @@ def _why_not(
     signal: str,
     fitted: Sequence[Comparison],
     limit: float | None,
-    given: bool,
 ) -> str:
-    """Word why a signal is rejected, "" if it is not; ``given``: the case sets the limit."""
+    """Word why a signal is rejected, "" if it is not."""
     name, rmse = validation.name, validation.channels[signal].rmse
     of_signal = f" of {signal}" if len(validation.judging) > 1 else ""
     within = limit is None or rmse <= limit
-    if given:
-        error = f"on {name} the error{of_signal}, rmse {rmse:.3e} pu"
-        return "" if within else f"{error}, exceeds the limit of accept, {limit:g} pu"
     if not validation.channels[signal].describes:
         if validation.played is not None:
             return (

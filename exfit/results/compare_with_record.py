@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from math import nan, pi
 
 import numpy as np
@@ -12,6 +13,7 @@ from exfit.fitting.experiment import Channel, ExperimentSetup, compared
 from exfit.results.comparisons import (
     Comparison,
     DrivingSignal,
+    Event,
     Excursion,
     LeftOut,
     Overlay,
@@ -24,6 +26,7 @@ from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limit_hits import limiter_actions
 from exfit.util.arrays import Array
+from exfit.util.vocabulary import Criteria
 
 Values = Mapping[str, float]
 
@@ -39,13 +42,14 @@ def compare_with_record(
     of_record: Values | None = None,
     moves: Sequence[Values] | None = None,
     measured: Features | None = None,
+    criteria: Criteria | None = None,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
     The setup has sub-steps enough for both; ``of_record`` is what was found about the record
     itself. ``moves`` are what was found by the record: which values each moves, and how fast; by
     default what was found about it. ``measured`` are the features of the record, where they have
-    been read already. The comparison is not judged.
+    been read already. The comparison is judged by ``criteria`` alone, if given.
     """
     at = setup.with_start_values(values)
     samples, substeps = setup.experiment.samples(at)
@@ -55,23 +59,43 @@ def compare_with_record(
     channels = {signal: match_of(overlay) for signal, overlay in overlays.items()}
     if moves is None:
         moves = [{parameter.name: 1.0} for parameter in setup.free]
-    return Comparison(
+    event = _event(setup, setup.record.time, at)
+    stepped = event is not None and event.of_vref
+    step_of = cache(partial(_step_features, setup, overlays, samples, at, moves, measured))
+    comparison = Comparison(
         name=setup.name,
         record=setup.record.source.name,
         cost=0.5 * float(errors @ errors),
         accepted=True,
         channels=channels,
-        features=_step_features(setup, overlays, samples, at, moves, measured),
+        features=step_of("vt") if stepped else StepFeatures(None, None),
         notes=setup.record.notes,
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
         substeps=substeps,
         step=setup.experiment.simulator.step,
         time=setup.record.time,
+        event=event,
         overlays=overlays,
         played=_played(setup, overlays, samples) if setup.driving else None,
         limiters=limiter_actions(*setup.experiment.at(at)),
     )
+    if criteria is None:
+        return comparison
+    from exfit.results.criteria import SignalToJudge, with_criteria
+
+    signals = {
+        signal: SignalToJudge(
+            setup.record.time,
+            overlay.measured,
+            overlay.simulated,
+            None if event is None else event.at,
+            stepped,
+            partial(step_of, signal),
+        )
+        for signal, overlay in overlays.items()
+    }
+    return with_criteria(comparison, criteria, signals)
 
 
 def overlays_of(setup: ExperimentSetup, values: Values) -> dict[str, Overlay]:
@@ -133,43 +157,57 @@ def _step_features(
     values: Values,
     moves: Sequence[Values],
     read: Features | None,
+    signal: str,
+    end: float | None = None,
 ) -> StepFeatures:
-    """Return the features of vt without its periodic disturbances; ``samples`` (M, channels)."""
-    vt = overlays.get("vt")
-    if vt is None:
+    """Return the features of a signal without its periodic disturbances, after the first event.
+
+    ``samples`` are (M, channels); it ends with the next event, or at most ``end`` s after it.
+    Those of vt in the record are ``read`` already where they are given.
+    """
+    if signal not in overlays:
         return StepFeatures(None, None)
-    k = list(overlays).index("vt")
+    whole, k = overlays[signal], list(overlays).index(signal)
     channel = setup.channels[k]
     alone = samples[:, k] - setup.experiment.disturbances(values)[:, k]
     simulated = compared(channel, alone)
     kept = np.isfinite(simulated)
     time = setup.record.time[kept]
-    window = _first_move(setup, time, values)
-    if read is None:
-        undisturbed = Overlay(vt.measured - (vt.simulated - simulated), simulated)
-        read = _measured_features(setup, channel, undisturbed, values, moves)
-    return StepFeatures(read, None if window is None else features(time, simulated[kept], *window))
+    event = _event(setup, time, values)
+    if event is None:
+        return StepFeatures(None, None)
+    until = event.until if end is None else min(event.until, event.at + end)
+    if read is None or signal != "vt" or end is not None:
+        undisturbed = Overlay(whole.measured - (whole.simulated - simulated), simulated)
+        read = _measured_features(setup, channel, undisturbed, values, moves, until)
+    return StepFeatures(read, features(time, simulated[kept], event.at, until))
 
 
 def _measured_features(
-    setup: ExperimentSetup, channel: Channel, vt: Overlay, values: Values, moves: Sequence[Values]
+    setup: ExperimentSetup,
+    channel: Channel,
+    signal: Overlay,
+    values: Values,
+    moves: Sequence[Values],
+    until: float,
 ) -> Features | None:
     """Return the features of the record, with the error that its noise leaves them."""
-    kept = np.isfinite(vt.measured) & np.isfinite(vt.simulated)
+    kept = np.isfinite(signal.measured) & np.isfinite(signal.simulated)
     time = setup.record.time[kept]
-    window = _first_move(setup, time, values)
-    if window is None:
+    event = _event(setup, time, values)
+    if event is None:
         return None
     found = None
     if moves:
         curve, errors = setup.experiment.undisturbed_slopes(channel.signal, values, moves)
         moved = [{**values, **{n: values[n] + SMALL * d for n, d in m.items()}} for m in moves]
-        instants = [window, *(_first_move(setup, time, each) for each in moved)]
-        at = np.array([np.nan if instant is None else instant[0] for instant in instants])
+        instants = [event, *(_event(setup, time, each) for each in moved)]
+        at = np.array([np.nan if instant is None else instant.at for instant in instants])
         found = FoundByRecord(curve, errors, (at[1:] - at[0]) / SMALL)
         if not all(np.isfinite(each).all() for each in found):
             found = None
-    response = RecordedResponse(time, vt.measured[kept], vt.simulated[kept], *window, found)
+    both = signal.measured[kept], signal.simulated[kept]
+    response = RecordedResponse(time, *both, event.at, until, found)
     measured = recorded_features(response)
     if measured is None:
         return None
@@ -181,24 +219,29 @@ def _measured_features(
     return replace(measured, without=(*removed, *measured.without))
 
 
-def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[float, float] | None:
-    """Find the instants between which the reference stays after its first move, s.
+def _event(setup: ExperimentSetup, time: Array, values: Values) -> Event | None:
+    """Find the first disturbance of a record: a move of the reference, or what else changes.
 
-    They are as the recorder shows them. A recorded reference may move before it jumps, from the end
-    of the steady part on.
+    A recorded reference may move before it jumps, from the end of the steady part on; so may what
+    is played in.
     """
     simulator = setup.experiment.with_inputs(values)
     changes = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
     steady = setup.test.steady
     jumps = changes[0].at if changes else float(setup.record.time[-1])
-    if "vref" in simulator.inputs.recorded and steady is not None and steady < jumps:
-        changes = [InputStep(steady, 0.0), *changes]
+    if steady is not None and steady < jumps:
+        if "vref" in simulator.inputs.recorded:
+            changes = [InputStep(steady, 0.0), *changes]
+        elif setup.driving:
+            changes = [InputStep(steady, 0.0, setup.driving[0]), *changes]
     inside = [change for change in changes if change.at >= time[0]]
-    if not inside or inside[0].signal != "vref":
+    if not inside:
         return None
-    first = Inputs(float(time[0]), float(time[-1]), tuple(inside)).moves("vref")[0]
-    later = [change.at for change in inside if change.at > first.end]
-    return inside[0].at, later[0] if later else float(time[-1])
+    of_vref, end = inside[0].signal == "vref", inside[0].end
+    if of_vref:
+        end = Inputs(float(time[0]), float(time[-1]), tuple(inside)).moves("vref")[0].end
+    later = [change.at for change in inside if change.at > end]
+    return Event(inside[0].at, later[0] if later else float(time[-1]), of_vref)
 
 
 def left_out_of(whole: Array, compared: Array, simulated: Array) -> LeftOut | None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import nan
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from exfit.simulation.limit_hits import LimiterAction
 from exfit.util.arrays import Array
 from exfit.util.text import rounded
 from exfit.util.typed import IN_FILE, KEY
+from exfit.util.vocabulary import QUANTITIES
 
 POWERS = ("p", "q")  # what a unit gives to the grid
+Outcome = Literal["met", "not met", "open", "not judged"]  # of a criterion
 REFERENCE = "vref, from where vt rests"  # how figures call the reference beside vt
 
 
@@ -201,6 +203,51 @@ class PlayedRecord:
     left_out: Mapping[str, LeftOut] = field(default_factory=dict)
 
 
+class Event(NamedTuple):
+    """A disturbance as the recorder shows it, until the next one, s; it may be a step of vref."""
+
+    at: float
+    until: float
+    of_vref: bool
+
+
+@dataclass(frozen=True)
+class JudgedCriterion:
+    """A criterion on a signal of a record: the difference beside its limit, both in ``unit``.
+
+    ``begin`` and ``end`` are s after the event; ``recorded`` is the quantity in the record, where
+    it has one. ``why`` says why it is "open", for the noise of the record, or "not judged".
+    """
+
+    record: str
+    quantity: str
+    signal: str
+    begin: float | None = None
+    end: float | None = None
+    recorded: float | None = None
+    difference: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    outcome: Outcome = "met"
+    why: str = ""
+
+    @property
+    def label(self) -> str:
+        """The criterion in words, with the part of the record that it holds for."""
+        label = f"{QUANTITIES[self.quantity].label}, {self.signal}"
+        if self.begin is None and self.end is None:
+            return label
+        begin = "start" if self.begin is None else f"{self.begin:g}"
+        return f"{label}, {begin} ... {'end' if self.end is None else f'{self.end:g} s'}"
+
+    @property
+    def sentence(self) -> str:
+        """The difference in words, and its limit."""
+        differs = "is not reached" if self.difference is None else f"{self.difference:+.2g}"
+        limit = "" if self.limit is None else f", the limit is {self.limit:.2g} {self.unit}"
+        return f"on {self.record} {self.label}: {differs}{limit}"
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """A simulated response beside a record.
@@ -209,12 +256,13 @@ class Comparison:
     ``channels`` says how well each signal matches, ``overlays`` holds its samples at ``time`` (M,)
     in s: of a result that is read back they are thinned, and missing in files of an earlier
     version. ``played`` says what of the record drove the simulation, where it did in place of a
-    plant. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
-    (pu) that is accepted, ``reason`` why it is not accepted, and ``of_record`` what was found about
-    the record itself; ``steps`` are those of a record that was given by hand, ``notes`` what must
-    be known of it. ``step`` is that of the simulation, s. ``limiters`` are those of excitation that
-    acted. ``rmse``, ``max_error`` and ``fit_percent`` are those of vt, or of the first signal where
-    there is no vt.
+    plant. ``criteria`` are those that it was judged by, ``reason`` says why it is not accepted.
+    ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse (pu)
+    that is accepted without criteria of the case, and ``of_record`` what was found about the record
+    itself; ``steps`` are those of a record that was given by hand, ``notes`` what must be known of
+    it. ``step`` is that of the simulation, s. ``limiters`` are those of excitation that acted.
+    ``rmse``, ``max_error`` and ``fit_percent`` are those of vt, or of the first signal where there
+    is no vt.
     """
 
     DERIVED: ClassVar = {
@@ -231,6 +279,7 @@ class Comparison:
     features: StepFeatures
     limit: float | None = None
     reason: str = ""
+    criteria: tuple[JudgedCriterion, ...] = ()
     validation: bool = False
     steps: tuple[ValidatedStep, ...] = ()
     notes: tuple[str, ...] = ()
@@ -239,6 +288,7 @@ class Comparison:
     substeps: int = field(default=0, metadata=IN_FILE)
     step: float = field(default=0.0, metadata=IN_FILE)
     time: Array = field(default_factory=lambda: np.zeros(0), metadata=IN_FILE)
+    event: Event | None = field(default=None, metadata=IN_FILE)
     overlays: Mapping[str, Overlay] = field(default_factory=dict, metadata=IN_FILE)
     iteration_responses: IterationResponses | None = field(default=None, metadata=IN_FILE)
     played: PlayedRecord | None = field(default=None, metadata=IN_FILE)

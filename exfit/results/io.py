@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from exfit.results.validation_result import ValidationResult
 
 Form = TypeVar("Form")
-VERSION = 11  # of the files; others are refused
+VERSION = 12  # of the files; others are refused
 
 
 def files_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:

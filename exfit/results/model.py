@@ -407,8 +407,8 @@ class FitResult:
 
     @property
     def accepted(self) -> bool:
-        """Whether every validation is within the limit of the case."""
-        return all(match.accepted for match in self.validation)
+        """Whether every record meets the criteria of the case, or its validation holds."""
+        return all(match.accepted for match in (*self.comparisons, *self.validation))
 
     @property
     def describes(self) -> bool:

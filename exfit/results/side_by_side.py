@@ -36,7 +36,8 @@ def outcome_of(result: FitResult) -> str:
 def explanation_of(result: FitResult) -> str:
     """Explain in a sentence why a fit ended so."""
     if outcome_of(result) == NOT_ACCEPTED:
-        return "; ".join(match.reason for match in result.validation if match.reason)
+        every = (*result.comparisons, *result.validation)
+        return "; ".join(match.reason for match in every if match.reason)
     return result.verdict.reason
 
 

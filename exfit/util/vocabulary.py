@@ -64,23 +64,62 @@ ORIGIN_OF_CRITERIA = (
 )
 
 
-class Criteria(NamedTuple):
-    """The largest differences between simulated and recorded response that meet a criterion.
+class Quantity(NamedTuple):
+    """What a criterion limits the difference of; the unit is "" where it is that of the signal.
 
-    rmse           rms of the difference, % of the change that was recorded
-    final_value    % of that change
-    overshoot      % of that change
-    rise_time      % of the recorded time, as are peak_time and settling_time
-    time           s: a time that differs by no more meets its criterion
+    It is one ``of_samples``, of which there may be some in any part of a record, or of a step.
     """
 
-    rmse: float = 5.0
-    final_value: float = 2.0
-    overshoot: float = 5.0
-    rise_time: float = 10.0
-    peak_time: float = 10.0
-    settling_time: float = 20.0
-    time: float = 0.02
+    label: str
+    unit: str = ""
+    of_samples: bool = False
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "rms": Quantity("rms of the difference", of_samples=True),
+    "largest": Quantity("largest difference", of_samples=True),
+    "mean": Quantity("mean of the difference", of_samples=True),
+    "mean_absolute": Quantity("mean magnitude of the difference", of_samples=True),
+    "final_value": Quantity("final value"),
+    "rise_time": Quantity("rise time 10-90 %", "s"),
+    "overshoot": Quantity("overshoot", "%"),
+    "peak_time": Quantity("peak time", "s"),
+    "settling_time": Quantity("settling time 2 %", "s"),
+    "delay": Quantity("delay to 10 %", "s"),
+    "damping_ratio": Quantity("damping ratio", "1"),
+}
+
+
+class Criterion(NamedTuple):
+    """The largest difference of a quantity, simulated less recorded, that is accepted.
+
+    It is ``limit``, in the unit of the quantity, or ``percent`` of what was recorded: of the change
+    of the signal, of times, overshoot and damping ratio of their own recorded value. Of both the
+    larger counts. Without ``signals`` it holds for those that a record is judged by; ``begin`` and
+    ``end`` are s after the event.
+    """
+
+    quantity: str
+    signals: tuple[str, ...] = ()
+    limit: float | None = None
+    percent: float | None = None
+    begin: float | None = None
+    end: float | None = None
+
+
+class Criteria(NamedTuple):
+    """Acceptance criteria with their ``source``; those of a case are ``given``: they decide."""
+
+    rows: tuple[Criterion, ...] = (
+        Criterion("rms", percent=5.0),
+        Criterion("final_value", percent=2.0),
+        Criterion("overshoot", limit=5.0),
+        Criterion("rise_time", limit=0.02, percent=10.0),
+        Criterion("peak_time", limit=0.02, percent=10.0),
+        Criterion("settling_time", limit=0.02, percent=20.0),
+    )
+    source: str = ORIGIN_OF_CRITERIA
+    given: bool = False
 
 
 def least_certain(sources: Iterable[str]) -> str:

@@ -36,7 +36,6 @@ from exfit.results.intervals.value_errors import (
     errors_of_values,
     given_error_notes,
 )
-from exfit.results.intervals.windows import spread_over_windows, with_spread
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.results.verdict import Verdict
 from exfit.util.vocabulary import Criteria
@@ -77,10 +76,6 @@ INTERRUPTED_AFTERWARDS = (
     "interrupted after the search: intervals, or comparisons with records that were not fitted, "
     "are missing"
 )
-NOTHING_TO_ACCEPT = (
-    "accept: this case has no record under validate to judge; `exfit validate CASE --record FILE` "
-    "judges one"
-)
 
 
 def fit_result(
@@ -110,7 +105,7 @@ def fit_result(
     residuals, values = problem.residuals, problem.residuals.values(best.x)
     history = [_iteration(line, residuals) for line in found.history]
     fine = [setup.with_enough_substeps(values) for setup in state.fitted]
-    comparisons = _comparisons(fine, residuals, values, history)
+    comparisons = _comparisons(fine, residuals, values, history, case.criteria)
     analysis = _analysed(state, values, fine, comparisons, history)
     uncertainty = analysis.uncertainty
     walked = problem.compressed if program is None else None
@@ -196,7 +191,7 @@ def fit_result(
         files=names,
         case_text=case_text,
         as_found=analysis.as_found,
-        criteria=Criteria(**dict(case.report.criteria)),
+        criteria=case.criteria,
         other_program=other_program_of(case, program, simulated),
     )
 
@@ -261,13 +256,14 @@ def _comparisons(
     residuals: Residuals,
     values: Values,
     history: Sequence[Iteration],
+    criteria: Criteria,
 ) -> tuple[Comparison, ...]:
     """Return the fitted response beside each record, with the iterations that led to it."""
     start = residuals.values(residuals.start)
     moves = residuals.moves(scaled_values(residuals.free, values))
     return tuple(
         with_iteration_responses(
-            compare_with_record(setup, values, start, moves=moves),
+            compare_with_record(setup, values, start, moves=moves, criteria=criteria),
             setup,
             residuals,
             history,
@@ -319,9 +315,12 @@ def _analysed(
             uncertainty = allowing_for_bias(uncertainty, *at)
             noises = uncertainty.confidence.noise
             errors = errors_of_values(case, problem, best.x, noises, fine)
-            windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
-            analysis.windows = windows
-            uncertainty = allowing_for(errors, with_spread(uncertainty, windows), *at)
+            if case.plant.type == "machine-playback":
+                from exfit.results.intervals.windows import spread_over_windows, with_spread
+
+                windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
+                analysis.windows, uncertainty = windows, with_spread(uncertainty, windows)
+            uncertainty = allowing_for(errors, uncertainty, *at)
             averages = recorder_averages(case, problem.residuals, best.x, uncertainty)
             analysis.averages = averages
             uncertainty = allowing_for_averages(uncertainty, problem.residuals, averages)
@@ -381,8 +380,6 @@ def _notes(
     state: SearchState, comparisons: Sequence[Comparison], analysis: Analysis
 ) -> Iterator[str]:
     case, residuals, best = state.case, state.problem.residuals, state.found.best
-    if case.accept is not None and not case.validations:
-        yield NOTHING_TO_ACCEPT
     if not best.success:
         yield "the search did not end at a minimum: the errors and intervals assume that it did"
     yield from given_value_notes(case)

@@ -97,9 +97,11 @@ def validation_of(
 ) -> Comparison:
     """Judge `aligned` values on a record that was not fitted, by the ``fitted`` ones."""
     of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
-    comparison = compare_with_record(setup, values, of_record=of_record)
-    accept = None if case.accept is None else case.accept.rmse
-    return judged(comparison, fitted, setup.channels, accept)
+    criteria = case.criteria
+    comparison = compare_with_record(setup, values, of_record=of_record, criteria=criteria)
+    if criteria.given:
+        return replace(comparison, validation=True)
+    return judged(comparison, fitted, setup.channels)
 
 
 class LiveResponse(NamedTuple):

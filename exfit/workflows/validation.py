@@ -25,7 +25,7 @@ from exfit.results.comparisons import Comparison, ValidatedStep
 from exfit.results.description import OtherProgram, RecordedTest, versions
 from exfit.results.validation_result import ValidationResult
 from exfit.util.file_names import folded
-from exfit.util.vocabulary import NOT_STATED, Criteria
+from exfit.util.vocabulary import NOT_STATED
 from exfit.verdict.diagnostics import causes_before_fit
 from exfit.verdict.run_quality import (
     state_of_rest_notes,
@@ -155,7 +155,7 @@ def _fitted(
         residuals = residuals_of(case, [setup])
         at = scaled_values(residuals.free, setup.with_start_values(values))
         moves = residuals.moves(at)
-    comparison = compare_with_record(setup, values, moves=moves)
+    comparison = compare_with_record(setup, values, moves=moves, criteria=case.criteria)
     return ComparedTest(recording, setup, values, comparison)
 
 
@@ -317,7 +317,7 @@ def validation_result(
         files=names,
         case_text=text_of(case),
         as_found=found,
-        criteria=Criteria(**dict(case.report.criteria)),
+        criteria=case.criteria,
         other_program=other_program,
     )
 

@@ -61,7 +61,7 @@ validate:
   - name: down-step
     test: {vref: [{at: 1.0, step: -0.05}]}
     record: {file: data/down.csv, time: t, channels: {vt: vt}}
-accept: {rmse: 1.5e-4}
+criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}
 """
 
 SHORTEST_CASE = """\
@@ -127,7 +127,7 @@ def test_the_case_holds_what_the_file_says(case_file):
     assert (estimate.stop.rmse, estimate.armijo) == (2e-4, 1e-3)
     assert (estimate.dgn.step, estimate.dgn.cut) == ("full", "half")
     assert (estimate.lm.update, estimate.lm.nu_min) == ("ratio", 1e-6)
-    assert (estimate.good_enough.rmse, case.accept.rmse) == (3e-4, 1.5e-4)
+    assert (estimate.good_enough.rmse, case.criteria.rows[0].limit) == (3e-4, 1.5e-4)
     assert (case.simulation.step, case.simulation.output_step) == (0.002, 0.01)
     (validation,) = case.validations
     assert (validation.name, validation.record.file) == ("down-step", "data/down.csv")
@@ -160,7 +160,8 @@ def test_what_identifies_the_unit_is_nothing_else(case_file, value, text):
 def test_what_may_be_missing_has_a_default(case_file):
     case = load_case(case_file(SHORTEST_CASE))
     assert case.saturation == "quadratic"
-    assert case.parts.machine is case.record is case.accept is None
+    assert case.parts.machine is case.record is None
+    assert not case.criteria.given
     assert case.typical() == ("k", "a")
     assert case.parameters.fixed == case.parameters.free == {}
     assert case.values() == {"k": 4.0, "a": 2.0}
@@ -403,7 +404,24 @@ FORM = {
         "test",
         ["'x'"],
     ),
-    "list for a section": ("accept: {rmse: 1.5e-4}", "accept: [1]", "accept", ["not a mapping"]),
+    "list for a section": (
+        "criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
+        "criteria: [1]",
+        "criteria",
+        ["not a mapping"],
+    ),
+    "earlier name of the criteria": (
+        "criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
+        "accept: {rmse: 1.5e-4}",
+        "accept",
+        ["is now a row of criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}"],
+    ),
+    "earlier place of the criteria": (
+        "criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
+        "report: {criteria: {rmse: 5}}",
+        "report",
+        ["now those of the case: {limits: [{quantity: rms, percent: 5}]}"],
+    ),
     "number for values": ("{KE: 1.0, TR: 0.0,", "5 #", "parameters.fixed", ["5 is not a mapping"]),
     "mapping for a list": (
         "[0.0, 10.0]",
@@ -625,6 +643,36 @@ MEANING = {
         "validate[0].test.duration",
         ["only without a record"],
     ),
+    "criterion without a limit": (
+        "quantity: rms, limit: 1.5e-4",
+        "quantity: rms",
+        "criteria.limits[0]",
+        ["has no limit"],
+    ),
+    "part of a step": (
+        "quantity: rms, limit: 1.5e-4",
+        "quantity: rise_time, limit: 1, from: 1",
+        "criteria.limits[0]",
+        ["from: not with rise_time"],
+    ),
+    "part that ends before it begins": (
+        "limit: 1.5e-4",
+        "limit: 1.5e-4, from: 2, to: 1",
+        "criteria.limits[0]",
+        ["from: 2 s is not below to: 1 s"],
+    ),
+    "no criteria": (
+        "criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
+        "criteria: {source: nobody}",
+        "criteria",
+        ["has no limits: name a file"],
+    ),
+    "file beside limits": (
+        "criteria: {",
+        "criteria: {file: limits.yaml, ",
+        "criteria",
+        ["file: not with source or limits"],
+    ),
     "voltage of nothing": ("vt0: 1.0", "vt0: 0", "test.vt0", ["0 is not above 0"]),
     "no measured voltage": (
         "channels: {vt: vt}",
@@ -633,9 +681,9 @@ MEANING = {
         ["is missing", "no vt"],
     ),
     "name twice": (
-        "accept:",
+        "criteria:",
         "  - {name: Down-Step, test: {vref: [{at: 1, step: 1}]},\n"
-        "     record: {file: x, time: t, channels: {vt: vt}}}\naccept:",
+        "     record: {file: x, time: t, channels: {vt: vt}}}\ncriteria:",
         "validate[1].name",
         ["'Down-Step' is taken by 'down-step'"],
     ),

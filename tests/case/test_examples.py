@@ -6,7 +6,7 @@ import yaml
 from places import CONFIGS
 
 from exfit.case.json_schema import json_schema
-from exfit.case.schema import Estimate, RecordFile, ReportRequest
+from exfit.case.schema import CriteriaSection, Estimate, RecordFile
 
 DOCS = CONFIGS.parent / "docs"
 OF_SCHEMA = re.compile(r"<!-- keys -->.*?<!-- /keys -->", re.DOTALL)  # tables made of it
@@ -41,7 +41,7 @@ def test_every_key_of_the_schema_stands_in_an_example():
     assert sorted(missing) == []
 
 
-SECTIONS = {"record": RecordFile, "estimate": Estimate, "report": ReportRequest}
+SECTIONS = {"record": RecordFile, "estimate": Estimate, "criteria": CriteriaSection}
 
 
 def test_every_example_of_a_page_is_yaml_and_its_sections_are_sound():

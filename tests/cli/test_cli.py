@@ -52,6 +52,13 @@ CASE = {
         }
     ],
 }
+
+
+def rms_below(limit):
+    """Return the change of a case that accepts an rms of the difference up to a limit (pu)."""
+    return "criteria", {"limits": [{"quantity": "rms", "limit": limit}]}
+
+
 MACHINE_CASE = {
     **yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text()),
     "test": {"vt0": 1.0, "vref": [{"at": 0.5, "step": 0.05}]},
@@ -268,13 +275,13 @@ def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
 
 
 def test_all_faults_of_a_case_are_reported_at_once(run):
-    case = case_file(changed(CASE, ("model", "AC1B"), ("test.vref.0.at", "x"), ("accept", {})))
+    case = case_file(changed(CASE, ("model", "AC1B"), ("test.vref.0.at", "x"), ("criteria", {})))
     ran = run("fit", case)
     assert ran.code == 1
     assert [line.split(": ")[1] for line in ran.err.removeprefix("Error: ").splitlines()] == [
         "model",
         "test.vref[0].at",
-        "accept.rmse",
+        "criteria",
     ]
 
 
@@ -488,19 +495,36 @@ def test_the_iteration_limit_ends_with_3_and_leaves_the_best_point(run):
 
 
 def test_a_validation_beyond_its_limit_ends_with_3(run):
-    case = case_file(changed(CASE, ("accept", {"rmse": 1e-12})))
+    case = case_file(changed(CASE, rms_below(1e-12)))
     ran = run("fit", case, "--no-plots")
     assert ran.code == 3
-    assert "not accepted: on down-step" in ran.out
-    assert "verdict: matches" in ran.out
+    assert "not accepted: on down-step rms of the difference, vt: +" in ran.out
+    assert "the limit is 1e-12 pu" in " ".join(ran.out.split())
+    assert re.search(r"to fit +rms of the difference, +\S+ +1e-12 +pu +not met", ran.out)
     ran = run("validate", case, "--no-plots")
     assert ran.code == 3
-    assert ran.out.splitlines()[1].startswith("not accepted: on down-step")
-    assert "not accepted: on fit" not in ran.out
-    assert "fitted, not judged: fit (up.csv)" in ran.out
+    assert ran.out.splitlines()[1].startswith("not accepted: on fit")
+    assert "\nnot accepted: on down-step" in ran.out
 
 
-def test_a_validation_much_worse_than_the_fit_ends_with_3_and_accept_alone_judges(run):
+def test_a_file_of_criteria_judges_the_case_that_names_it(run):
+    Path("limits").mkdir()
+    rows = "limits: [{quantity: overshoot, limit: 5}, {quantity: rms, percent: 10, to: 2}]"
+    file = Path("limits/planner.yaml")
+    file.write_text(f"source: the planner\n{rows}\n")
+    case = case_file(changed(CASE, ("criteria", {"file": "limits/planner.yaml"})))
+    ran = run("fit", case, "--no-plots", "--json")
+    assert ran.code == 0
+    (match,) = json.loads(ran.out)["records"]
+    outcomes = {each["quantity"]: each["outcome"] for each in match["criteria"]}
+    assert outcomes == {"overshoot": "met", "rms": "met"}
+    file.write_text("source: the planner\nlimits:\n  - {quantity: rme, limit: 1}\n")
+    ran = run("fit", case, "--no-plots")
+    assert ran.code == 1
+    assert "planner.yaml:3: limits[0].quantity: 'rme' is not possible" in ran.err
+
+
+def test_a_validation_much_worse_than_the_fit_ends_with_3_and_criteria_alone_judge(run):
     """The step down is that of a unit whose voltage is 5 % higher."""
     samples = columns("down.csv")
     Path("down.csv").write_text(csv_text(TIME, 1.05 * np.array(samples["v"], float)))
@@ -514,7 +538,7 @@ def test_a_validation_much_worse_than_the_fit_ends_with_3_and_accept_alone_judge
     assert not match["accepted"]
     assert match["reason"]
     assert run("validate", case_file(), "--no-plots").code == 3
-    case = case_file(changed(CASE, ("accept", {"rmse": 0.2})))
+    case = case_file(changed(CASE, rms_below(0.2)))
     assert run("fit", case, "--no-plots").code == 0
     assert run("validate", case, "--no-plots").code == 0
 
@@ -669,7 +693,7 @@ def test_the_fitted_record_does_not_validate_its_fit_and_the_command_says_so(run
 
 def test_a_record_that_is_called_fit_is_not_taken_for_the_fitted_one(run):
     shutil.copy("down.csv", "fit.csv")
-    case = case_file(changed(CASE, ("accept", {"rmse": 1e-12})))
+    case = case_file(changed(CASE, rms_below(1e-6)))
     given = ["--parameters", "values.yaml", "--record", "fit.csv"]
     ran = run("validate", case, "--no-plots", "--json", *given)
     assert ran.code == 3
@@ -1175,13 +1199,6 @@ def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
     told = " ".join(ran.out.split())
     assert "cause: " in told[: told.index("verdict: no match: the response goes the other way")]
     assert "converged" not in told
-
-
-def test_an_acceptance_without_a_validation_waits_for_a_record_by_hand(run):
-    case = changed(CASE, ("accept", {"rmse": 1.0}), ("validate", []))
-    ran = run("fit", case_file(case), "--no-plots", "--verbose")
-    assert ran.code == 0
-    assert "no record under validate to judge" in " ".join(ran.out.split())
 
 
 def test_a_search_that_was_cut_short_ends_with_3_though_its_best_point_converged(run, monkeypatch):

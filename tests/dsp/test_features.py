@@ -139,3 +139,44 @@ def test_a_record_that_begins_with_the_step_starts_from_its_first_sample():
     response = features(time, 2.0 + first_order(2.0)(time), 0.0, 10.0)
     assert response.initial_value == 2.0
     assert response.rise_time == pytest.approx(log(9.0) / 2.0, abs=SAMPLING)
+
+
+# ---- to 1e-6, on responses whose figures are known in closed form
+
+FINE = 2e-4  # s: what is read between samples is exact to its square
+FINE_TIME = np.arange(0.0, 13.0, FINE)
+
+
+@pytest.mark.parametrize(("zeta", "w0"), [(0.2, 8.0), (0.4, 6.0), (0.55, 5.0)])
+def test_a_second_order_response_gives_its_overshoot_peak_time_and_damping(zeta, w0):
+    found = read(FINE_TIME, stepped(FINE_TIME, second_order(w0, zeta)))
+    root = sqrt(1.0 - zeta**2)
+    assert found.overshoot_percent / 100.0 == pytest.approx(exp(-pi * zeta / root), abs=1e-6)
+    assert found.peak_time == pytest.approx(pi / (w0 * root), abs=1e-6)
+    assert found.damping_ratio == pytest.approx(zeta, abs=1e-6)
+    assert found.final_value == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("a", "late"), [(2.0, 0.0), (2.0, 0.05), (5.0, 0.1234)])
+def test_a_delayed_first_order_response_gives_its_times(a, late):
+    response = first_order(a)
+    found = read(FINE_TIME, stepped(FINE_TIME, lambda t: response(np.maximum(t - late, 0.0))))
+    assert found.delay == pytest.approx(late - log(0.9) / a, abs=1e-6)
+    assert found.rise_time == pytest.approx(log(9.0) / a, abs=1e-6)
+    assert found.settling_time == pytest.approx(late - log(BAND) / a, abs=1e-6)
+    assert found.peak_time is found.damping_ratio is None
+
+
+def test_the_damping_ratio_does_not_depend_on_the_side_of_the_swing():
+    up, down = (
+        read(FINE_TIME, sign * stepped(FINE_TIME, second_order(6.0, 0.3))) for sign in (1, -2)
+    )
+    assert up.damping_ratio == pytest.approx(down.damping_ratio, rel=1e-12)
+
+
+def test_a_swing_that_returns_to_its_level_has_a_damping_ratio():
+    """As the power of a unit behind a fault: exp(-s t) sin(w t), whose extrema decay evenly."""
+    s, w = 1.5, 9.0
+    t = np.maximum(FINE_TIME - STEP_AT, 0.0)
+    found = read(FINE_TIME, np.exp(-s * t) * np.sin(w * t) + 1e-4 * (t > 0.0))
+    assert found.damping_ratio == pytest.approx(s / np.hypot(s, w), abs=1e-6)

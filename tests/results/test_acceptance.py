@@ -93,17 +93,8 @@ def test_the_noise_that_counts_is_that_which_a_filter_leaves():
     assert limit == pytest.approx(MUCH_WORSE * left, rel=0.2)
 
 
-@pytest.mark.parametrize("rmse", [1e-3, 1e-1])
-def test_accept_judges_alone(rmse):
-    """Neither the fit's error, nor a constant, nor the noise has a say."""
-    found = judged(comparison("down", rmse, -206.0), [FIT], [channel(1.0)], accept=1e-2)
-    assert (found.accepted, found.limit) == (rmse < 1e-2, 1e-2)
-    assert ("limit of accept" in found.reason) is not found.accepted
-
-
 def test_an_error_that_is_not_a_number_is_not_accepted():
-    for accept in (None, 1.0):
-        assert not judged(comparison("down", nan), [FIT], [channel()], accept).accepted
+    assert not judged(comparison("down", nan), [FIT], [channel()]).accepted
 
 
 def test_signals_are_held_against_their_own_kind():

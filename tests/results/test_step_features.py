@@ -91,8 +91,8 @@ def test_a_settling_time_that_noise_puts_at_one_swing_or_the_next_is_not_stated(
     features = recorded_features(RecordedResponse(time, noisy, clean, 1.0, 12.0))
     assert features.settling_time is None
     assert features.why == {"settling_time": EITHER}
-    assert {*features.errors} == {*NAMES} - {"settling_time"}
-    assert {*TIMES} - {*features.why} == {"rise_time", "peak_time"}
+    assert {*features.errors} == {*NAMES, "delay", "damping_ratio"} - {"settling_time"}
+    assert {*TIMES} - {*features.why} == {"rise_time", "peak_time", "delay"}
 
 
 def test_tables_say_without_which_line_measured_features_are():

@@ -78,7 +78,7 @@ def study(name, count):
     """Yield the row of a case with its validation, and without."""
     case = load_case(CONFIGS / f"{name}.yaml")
     starts = [{}, *random_starts(case, count)]
-    variants = {name: case, f"{name}, no validation": replace(case, validations=(), accept=None)}
+    variants = {name: case, f"{name}, no validation": replace(case, validations=())}
     fits = {label: [fit_from(own, start) for start in starts] for label, own in variants.items()}
     every = [fit.cost for label in fits for fit in fits[label]]
     lowest = min(lowest_cost(case), *every)

@@ -141,7 +141,7 @@ def of_starts(count: int, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
 def of_fits(draws: int, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """Yield how many fits of each case find the lowest minimum that any of them found."""
     for name in names:
-        case = replace(load_case(CONFIGS / f"{name}.yaml"), validations=(), accept=None)
+        case = replace(load_case(CONFIGS / f"{name}.yaml"), validations=())
         residuals, costs = residuals_named(name), dict[str, list[float]]()
         for reach in ("local", "global"):
             estimate = case.estimate.model_copy(update={"search": reach})

@@ -104,8 +104,7 @@ parameters:
 estimate: {strategy: lm, loss: huber, loss_scale: 1.0, starts: 4, iterations: 50}
 simulation: {step: 0.002, output_step: 0.01}
 as_found: {source: base, parameters: {KPR: 50.0, machine.Xd: 2.0}}
-report: {criteria: {rmse: 5.0}}
-accept: {rmse: 1.0e-3}
+criteria: {source: us, limits: [{quantity: rms, limit: 1.0e-3, to: 5.0}]}
 about: {Unit: 1, Rated MVA: 120}
 """
 

@@ -7,6 +7,7 @@ from records import TEST, TIME, UNIT, case_of, one, synthetic
 from exfit import workflows
 from exfit.errors import CaseError
 from exfit.results.io import load_result, result_text
+from exfit.util.vocabulary import Criteria, Criterion
 
 
 def fitted(folder, **sections):
@@ -97,6 +98,8 @@ def test_a_fault_of_the_section_is_reported_with_its_place(tmp_path, stated, fau
 
 
 def test_the_criteria_of_a_case_are_those_of_its_result(tmp_path):
-    result = fitted(tmp_path, report={"criteria": {"rmse": 1.0, "time": 0.01}})
-    limits = result.criteria
-    assert (limits.rmse, limits.time, limits.overshoot) == (1.0, 0.01, 5.0)
+    limits = [{"quantity": "rise_time", "percent": 1.0, "limit": 0.01}]
+    result = fitted(tmp_path, criteria={"limits": limits, "source": "the planner"})
+    row = Criterion("rise_time", percent=1.0, limit=0.01)
+    assert result.criteria == Criteria((row,), "the planner", given=True)
+    assert not fitted(tmp_path).criteria.given

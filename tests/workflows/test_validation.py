@@ -13,9 +13,10 @@ from tiers import few_of
 
 from exfit.case.case import Case
 from exfit.case.load import load_case
-from exfit.case.schema import ChannelSection, Limit, StepSection
+from exfit.case.schema import ChannelSection, StepSection
 from exfit.errors import CaseError, RecordError
 from exfit.records.record import Record
+from exfit.util.vocabulary import Criteria, Criterion
 from exfit.workflows import fit, read_record, simulate, validate, validation_result
 
 AC1A = {"KA": 364.1523, "TA": 0.0542, "KF": 0.0413, "TF": 1.458, "TE": 1.6724, "KC": 0.486}
@@ -109,7 +110,8 @@ def three_ways(unit, way, values, limit=3.0 * NOISE):
 
     The last has the instant of its step given, too. The ``limit`` of the error is that of the case.
     """
-    case = replace(case_of(THESIS[unit], alone=False), accept=Limit(rmse=limit))
+    criteria = Criteria((Criterion("rms", limit=limit),), "us", given=True)
+    case = replace(case_of(THESIS[unit], alone=False), criteria=criteria)
     if way == "up":
         (up,) = case.recordings
         case = replace(case, validations=(up.model_copy(update={"name": "up"}),))

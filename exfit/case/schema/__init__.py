@@ -1,14 +1,14 @@
 """The schema of the case file, section by section; pydantic checks it.
 
-Here is the whole of the file, and what its report judges by. The descriptions reach editors through
+Here is the whole of the file. The descriptions reach editors through
 the JSON Schema, and the documentation of the keys.
 """
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
+from exfit.case.schema.estimate import Estimate, Parameters, SimulationSection
 from exfit.case.schema.plants import (
     ExternalPlant,
     FmuPlant,
@@ -60,9 +60,11 @@ from exfit.case.schema.values import (
     Unknown,
     Value,
     nothing,
+    refusal,
     start_value,
 )
-from exfit.util.vocabulary import Criteria
+from exfit.signals import COMPARED
+from exfit.util.vocabulary import QUANTITIES
 
 __all__ = [
     "MOST_ROWS",
@@ -72,6 +74,7 @@ __all__ = [
     "BumpTest",
     "CaseDocument",
     "ChannelSection",
+    "CriteriaSection",
     "CurrentPhasor",
     "Estimate",
     "ExternalPlant",
@@ -81,7 +84,6 @@ __all__ = [
     "FreeSection",
     "FurtherUnitSection",
     "Governor",
-    "Limit",
     "Limiter",
     "MedianSection",
     "Parameters",
@@ -93,7 +95,6 @@ __all__ = [
     "Reference",
     "ReferenceFile",
     "ReferenceTable",
-    "ReportRequest",
     "SaturationName",
     "SimulationSection",
     "SineSection",
@@ -108,8 +109,6 @@ __all__ = [
     "VoltagePhasor",
     "start_value",
 ]
-
-DEFAULTS = Criteria()
 
 
 class AsFoundSection(Section):
@@ -144,42 +143,80 @@ class AsFoundSection(Section):
     )
 
 
+if TYPE_CHECKING:
+    QuantityName = str
+    SignalName = str
+else:
+    QuantityName = Literal[tuple(QUANTITIES)]
+    SignalName = Literal[tuple(COMPARED)]
+
+
+class CriterionSection(Section):
+    """The largest difference of a quantity, simulated less recorded, that is accepted."""
+
+    quantity: QuantityName = Field(description="What is compared.")
+    signals: tuple[SignalName, ...] = Field(
+        default=(),
+        min_length=1,
+        description="Signals it holds for. Default: vt, or the first compared; of a grid event P "
+        "and Q.",
+    )
+    limit: Positive | None = Field(
+        default=None,
+        description="Limit in the unit of the quantity: pu, s, % of the change for the overshoot.",
+    )
+    percent: Positive | None = Field(
+        default=None,
+        description="Limit in % of what was recorded: of the change of the signal, or of the time, "
+        "the overshoot, the damping ratio. With limit, the larger of both counts.",
+    )
+    begin: Number | None = Field(
+        default=None,
+        alias="from",
+        description="Begin of the part that it holds for, s after the event; of rms, largest, mean "
+        "and mean_absolute. Default: that of the record.",
+    )
+    end: Number | None = Field(
+        default=None,
+        alias="to",
+        description="End of that part, s after the event. Default: that of the record, of a step "
+        "the next one.",
+    )
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> "CriterionSection":
+        if self.limit is None and self.percent is None:
+            raise refusal("has no limit: give limit, percent or both")
+        if not QUANTITIES[self.quantity].of_samples:
+            if self.begin is not None:
+                raise refusal(f"from: not with {self.quantity}, which begins with the event")
+            if self.end is not None and self.end <= 0.0:
+                raise refusal(f"to: {self.end:g} s is not after the event")
+        if self.begin is not None and self.end is not None and self.begin >= self.end:
+            raise refusal(f"from: {self.begin:g} s is not below to: {self.end:g} s")
+        return self
+
+
 class CriteriaSection(Section):
-    """Limits of the differences between simulated and recorded response."""
+    """Acceptance criteria, or the file that has them."""
 
-    rmse: Positive = Field(
-        default=DEFAULTS.rmse,
-        description="Limit for the rms of the difference, % of the recorded change.",
+    file: Text | None = Field(
+        default=None,
+        description="YAML file with source and limits, relative to the case; many cases may share "
+        "it.",
     )
-    final_value: Positive = Field(
-        default=DEFAULTS.final_value, description="Limit for the final value, % of that change."
-    )
-    overshoot: Positive = Field(
-        default=DEFAULTS.overshoot, description="Limit for the overshoot, % of that change."
-    )
-    rise_time: Positive = Field(
-        default=DEFAULTS.rise_time, description="Limit for the rise time, % of the recorded one."
-    )
-    peak_time: Positive = Field(
-        default=DEFAULTS.peak_time, description="Limit for the peak time, % of the recorded one."
-    )
-    settling_time: Positive = Field(
-        default=DEFAULTS.settling_time,
-        description="Limit for the settling time, % of the recorded one.",
-    )
-    time: Positive = Field(
-        default=DEFAULTS.time,
-        description="A time within this of the recorded one meets its criterion, s.",
+    source: Text | None = Field(default=None, description="Who set the limits, and where.")
+    limits: tuple[CriterionSection, ...] = Field(
+        default=(), min_length=1, description="The criteria."
     )
 
-
-class ReportRequest(Section):
-    """Acceptance criteria of the report."""
-
-    criteria: CriteriaSection = Field(
-        default_factory=CriteriaSection,
-        description="Criteria for the match of a response with its record.",
-    )
+    @model_validator(mode="after")
+    def _has_limits(self) -> "CriteriaSection":
+        if self.file is not None and (self.limits or self.source is not None):
+            raise refusal("file: not with source or limits, which stand in it")
+        if self.file is None and not self.limits:
+            raise refusal("has no limits: name a file, or give limits")
+        return self
 
 
 ABOUT = Field(
@@ -261,16 +298,13 @@ class CaseDocument(Section):
         alias="validate",
         description="Records on which the result is validated; they are not used in the fit.",
     )
-    accept: Limit | None = Field(
+    criteria: CriteriaSection | None = Field(
         default=None,
-        description="Limit of the error on records that were not fitted; beyond it the exit code "
-        "is 3. Default: better than a constant, with an rmse of at most 3 times that of the fit, "
-        "or 3 times the noise of the record if that is larger.",
+        description="Acceptance criteria of all records; where one is not met, the exit code is 3. "
+        "Default: a record that was not fitted must be matched better than by a constant, with an "
+        "rmse of at most 3 times that of the fit, or 3 times its noise if that is larger.",
     )
     as_found: AsFoundSection | None = Field(
         default=None,
         description="The model in the planner's base before the test; default: the start values.",
-    )
-    report: ReportRequest = Field(
-        default_factory=ReportRequest, description="Acceptance criteria of the report."
     )

@@ -23,6 +23,7 @@ from exfit.features.compare.curves import (
     read_curve,
     refuse_unknown,
 )
+from exfit.features.compare.revalidation import Revalidation, revalidation
 from exfit.results.comparisons import judged_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
@@ -42,7 +43,7 @@ class Agreement:
     The differences are those of the others from A, and those of all from the record.
     ``features`` are those of the judged signal after the step at ``step_at`` (s), by the name of
     the curve; there are none where no step is known. ``results`` are those of the curves that are
-    fits.
+    fits, ``revalidation`` what two fits alone differ by.
     """
 
     curves: tuple[Curve, ...]
@@ -52,6 +53,7 @@ class Agreement:
     features: Mapping[str, Features]
     results: Mapping[str, FitResult]
     notes: tuple[str, ...]
+    revalidation: Revalidation | None = None
 
     @property
     def time(self) -> Array:
@@ -101,6 +103,7 @@ class Agreement:
                 for name, result in self.results.items()
             },
             "notes": list(self.notes),
+            "revalidation": plain(self.revalidation),
         }
 
 
@@ -170,6 +173,7 @@ def compare(
         of_curves,
         results,
         (*_repetitions(curves), *clocks.notes, *removed, *unread),
+        revalidation(*results.values()) if len(results) == len(sources) == 2 else None,
     )
 
 

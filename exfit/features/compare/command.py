@@ -1,6 +1,7 @@
 """The command compare, and what it shows."""
 
 from collections.abc import Iterator
+from functools import partial
 from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +11,13 @@ import click
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options
 from exfit.errors import ExfitError
-from exfit.output.blocks import Block, Table, columns, notes, number, paragraph, row
-from exfit.util.text import percentage, rounded
+from exfit.output.blocks import Block, Mark, Table, columns, interval, notes, number, paragraph, row
+from exfit.output.validations import table_of_criteria
+from exfit.util.text import error_of_interval, percentage, rounded, rounded_value
 
 if TYPE_CHECKING:
     from exfit.features.compare.agreement import Agreement
+    from exfit.features.compare.revalidation import Revalidation
 
 
 @click.command(short_help="Compare responses, from any program.")
@@ -73,7 +76,9 @@ def compare(
     program; they are named A, B, C and so on. The signals of A are compared over the time that all
     cover, on the finest of their clocks: with A, and with the record at its samples. f is half the
     sum of the squared differences. Clocks that differ are reported, and shifted with --align or
-    --shift. Parameters of fits are shown side by side.
+    --shift. Parameters of fits are shown side by side. Of two fits, OLD and NEW, it says which
+    parameters moved beyond the intervals of both, and where their responses to the same records
+    differ by more than the criteria of NEW allow.
 
     Writes compare.json, compare.csv and compare.png to runs/compare, or to DIR; with a record
     compare-record.csv too.
@@ -166,6 +171,8 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
         yield rows_table([*result.features], rows, title)
     if len(result.results) > 1:
         yield from side_by_side(result.results, models=True)
+    if result.revalidation is not None:
+        yield from _revalidation(result.revalidation)
     yield from notes(result.notes)
     time = result.differences[0].time
     yield paragraph(f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} samples")
@@ -175,3 +182,20 @@ def blocks_of(result: "Agreement") -> Iterator[Block]:
             f"between samples: a cubic, up to {worst.interpolation:.1e} pu from a straight line "
             f"({worst.signal})"
         )
+
+
+def _revalidation(found: "Revalidation") -> Iterator[Block]:
+    """Yield the parameters of two fits that moved or did not, and their responses by criteria."""
+    rows = []
+    for each in found.parameters:
+        cells = []
+        for value, limits in zip(each.values, each.intervals, strict=True):
+            digits = partial(rounded_value, error=error_of_interval(*(limits or (None, None))))
+            cells += [digits(value), interval(limits, digits)]
+        mark: Mark = "bad" if each.outcome == "moved" else ""
+        rows.append(row(each.name, *cells, each.unit, each.outcome, mark=mark))
+    heads = columns("", "A", "95 %", "B", "95 %", "unit", "result", numbers=("A", "B"))
+    yield Table(heads, tuple(rows), "moved: each value lies beyond the interval of the other fit")
+    if found.criteria:
+        yield table_of_criteria(found.criteria, None, "Criteria, B minus A")
+        yield paragraph(f"source of the criteria: {found.source}", "faint")

@@ -117,9 +117,10 @@ class CaseSummary:
     folder of the batch where there is a way, and ``key`` the folder of its fit there, "" without
     one. ``reason`` says why it is not done, or is the reason of the verdict, and ``cause`` is the
     first cause of that with its remedy. ``rmse`` (pu) is by signal, the largest over the fitted
-    records; ``parameters`` are all of the unit's, fitted or not; ``unresolved`` names those fitted
-    that the records do not determine. ``seconds`` is processor time; ``about`` are the facts that
-    the case of a fit states of its unit and test.
+    records; ``criteria`` is the result of those that the case gives; ``parameters`` are all of the
+    unit's, fitted or not; ``unresolved`` names those fitted that the records do not determine.
+    ``seconds`` is processor time; ``about`` are the facts that the case of a fit states of its unit
+    and test.
     """
 
     name: str
@@ -136,6 +137,7 @@ class CaseSummary:
     holds: bool = False
     rmse: Mapping[str, Annotated[float, nan]] = field(default_factory=dict)
     validation: SummaryValidation = field(default_factory=SummaryValidation)
+    criteria: str = ""
     unresolved: tuple[str, ...] = ()
     parameters: Mapping[str, SummaryParameter] = field(default_factory=dict)
     curves: tuple[SummaryCurve, ...] = field(default=(), metadata=IN_FILE)
@@ -191,6 +193,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
 
     Its name and path are those of its case until a batch gives others.
     """
+    from exfit.results.criteria import judged_by_criteria
     from exfit.results.side_by_side import explanation_of
 
     found = result.as_found
@@ -221,6 +224,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
         holds=result.holds,
         rmse=rmse,
         validation=validation,
+        criteria=judged_by_criteria(result).sentence if result.criteria.given else "",
         unresolved=_unresolved(result),
         parameters=_parameters(result),
         curves=tuple(_curves(result)),

@@ -40,6 +40,7 @@ CASE_COLUMNS: Mapping[str, str] = {
     "reason": "reason",
     "validation": "validation.outcome",
     "validation rmse": "validation.rmse",
+    "criteria": "criteria",
     "unresolved": "unresolved",
     "seconds": "seconds",
     "case": "case",

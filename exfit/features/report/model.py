@@ -25,11 +25,12 @@ from exfit.output.blocks import (
     remarks,
     row,
 )
+from exfit.output.validations import criteria_table
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import SheetRow
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.validation_result import Reported
-from exfit.util.vocabulary import ORIGIN_OF_CRITERIA, UNSTATED, Criteria
+from exfit.util.vocabulary import UNSTATED
 
 Row = tuple[Cell, ...]
 
@@ -242,20 +243,9 @@ def criteria(result: Reported) -> Iterator[Block]:
     }
     word, mark = words[judged.passed]
     yield Note(f"{judged.sentence}.", "verdict", word, mark)
-    rows = []
-    for each in judged.criteria:
-        met = {True: "met", False: "not met", None: "open"}[each.met]
-        marks: Mapping[bool | None, Mark] = {True: "ok", False: "bad", None: ""}
-        used = "to fit" if each.fitted else "to validate"
-        numbers = (number(each.difference, 2), number(each.limit, 3))
-        outcome = Cell(f"{met}: {each.why}" if each.why else met, marks[each.met])
-        rows.append((*row(each.record, used, each.label, *numbers, each.unit), outcome))
-    if rows:
-        titles = ("record", "used", "criterion", "difference", "limit", "unit", "result")
-        heads = columns(*titles, numbers=("difference", "limit"))
-        yield Table(heads, tuple(rows), "Criteria: simulated minus recorded")
-    own = "The case sets limits. " if result.criteria != Criteria() else ""
-    yield Note(f"{own}{ORIGIN_OF_CRITERIA}.")
+    if judged.criteria:
+        yield criteria_table(result)
+    yield Note(f"{result.criteria.source.removesuffix('.')}.", label="Source:")
 
 
 def findings(result: Reported) -> Iterator[Block]:

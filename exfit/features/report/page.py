@@ -162,8 +162,9 @@ def headline(result: Reported) -> Headline:
         good = {GOOD: True, MATCHES: None}.get(word, False)
         explained = [*filter(None, [explanation_of(result)])]
     else:
-        reasons = [match.reason for match in result.validation if match.reason]
-        limited = all(match.limit is not None for match in result.validation)
+        reasons = [match.reason for match in result.matches if match.reason]
+        limits = (match.limit for match in result.validation)
+        limited = result.criteria.given or all(limit is not None for limit in limits)
         word, good = ("accepted", True) if limited else ("compared", None)
         if reasons:
             word, good = "not accepted", False
@@ -194,7 +195,7 @@ def _validated(result: Reported) -> Iterator[str]:
     """Yield the limits that accepted validations keep."""
     if not result.validation:
         yield "the case has no record for a validation"
-    elif result.accepted:
+    elif result.accepted and not result.criteria.given:
         limits = [
             f"{match.limit:.2e} pu ({match.name})"
             for match in result.validation

@@ -21,7 +21,7 @@ from exfit.features.fleet.table import (
 
 FIRST = [
     "name", "unit", "bus", "id", "model", "machine", "status", "verdict", "reason", "validation",
-    "validation rmse", "unresolved", "seconds", "case", "key",
+    "validation rmse", "criteria", "unresolved", "seconds", "case", "key",
 ]  # fmt: skip
 STARTS = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 

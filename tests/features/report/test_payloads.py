@@ -25,8 +25,7 @@ def content():
     case = config("ac1a_typical")
     case["about"] = {"Plant": "Höllental", "Unit": 2, "Tested by": "N. N.", "Date": "2026-11-22"}
     case["as_found"] = {"source": "unit.dyr, bus 101", "parameters": {"KA": 700.0}}
-    case["report"] = {"criteria": {"rmse": 5.0}}
-    case["accept"] = {"rmse": 1e-3}
+    case["criteria"] = {"limits": [{"quantity": "rms", "percent": 5.0, "limit": 1e-3}]}
     case["estimate"] = {"search": "local"}
     return case
 

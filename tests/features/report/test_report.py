@@ -403,7 +403,8 @@ def test_a_search_that_ended_at_a_tolerance_is_not_called_converged(tmp_path):
     ],
 )
 def test_the_verdict_is_that_of_the_validation(tmp_path, accept, down, word):
-    sections = {"accept": None if accept is None else {"rmse": accept}}
+    limits = {"limits": [{"quantity": "rms", "limit": accept}]}
+    sections = {"criteria": None if accept is None else limits}
     run = first_order(tmp_path / "case", **sections, **({} if down else {"validate": None}))
     judged = headline(load_result(run))
     assert judged.word == word

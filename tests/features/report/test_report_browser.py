@@ -64,7 +64,12 @@ def content(name):
     content = several(recording("up"), recording("down"), free=free)
     validate = [recording("up"), recording("down")]
     validate = [{**one, "name": f"{one['name']}-again"} for one in validate]
-    return {**content, "about": about, "validate": validate, "accept": {"rmse": 1e-3}}
+    return {
+        **content,
+        "about": about,
+        "validate": validate,
+        "criteria": {"limits": [{"quantity": "rms", "limit": 1e-3}]},
+    }
 
 
 @pytest.fixture
