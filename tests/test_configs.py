@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from places import CONFIGS
 
+from exfit.case.criteria import criteria_of
 from exfit.case.load import load_case
+from exfit.case.schema import CriteriaSection
 from exfit.fitting.recordings import record_of
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.workflows import fit, simulate
+from exfit.workflows import fit, simulate, validate
 
 CASES = sorted(CONFIGS.glob("*.yaml"))
 QUICK = ("ac1a_typical", "first_order")  # of each part of the tests
@@ -62,3 +64,18 @@ def test_a_case_is_fitted_at_its_lowest_cost(name):
     many = case.estimate.model_copy(update={"starts": MANY})
     lowest = fit(replace(case, estimate=many, validations=())).cost
     assert result.cost <= 1.005 * lowest
+
+
+@pytest.mark.parametrize(
+    "file", sorted((CONFIGS / "criteria").glob("*.yaml")), ids=lambda f: f.stem
+)
+def test_published_criteria_judge_a_case_that_names_their_file(file):
+    case = load_case(CONFIGS / "ac1a_typical.yaml")
+    section = CriteriaSection(file=file.name)
+    criteria = criteria_of(section, file.parent)
+    assert criteria.given
+    assert criteria.source.startswith("RTE, Documentation technique de référence, fiche I16")
+    match = validate(replace(case, criteria=criteria), {"KA": 333.0})[0]
+    outcomes = {each.outcome for each in match.criteria}
+    assert outcomes <= {"met", "not met"}
+    assert bool(match.criteria) is (file.stem == "rte_setpoint")

@@ -179,8 +179,8 @@ def validate(
     CASE has no free parameter. The steps of --record are detected and shown; --step -0.05 and
     --at 1.0 replace the sizes and times detected, once for each step. Writes validation.json,
     samples and overlays to runs/CASE-validate, or to DIR; exfit report makes a report of that
-    folder. Exit code 1: bad input, no step detected, or no record to validate on; 3: a validation
-    is not accepted.
+    folder. Exit code 1: bad input, no step detected, or no record to validate on; 3: a record
+    does not meet the criteria of the case, or a validation is not accepted.
     """
     from exfit import workflows
     from exfit.output import run_folder, validations

@@ -108,8 +108,8 @@ def fit(
     The last line of the result is the verdict: good | matches, not all determined | misses the
     record | no match | not converged. Above it stand up to five causes, the likeliest first, each
     with a remedy. --verbose prints everything else, as does exfit show later; exfit report writes a
-    page of it. Exit code 0: the first two verdicts; 1: bad input; 3: the others, or a validation
-    that is not accepted. Its limit is accept in the case; without it, it must be better than a
+    page of it. Exit code 0: the first two verdicts; 1: bad input; 3: the others, or a record
+    that does not meet the criteria of the case; without them a validation must be better than a
     constant and within 3 times the error of the fit.
 
     --set overrides --parameters, and both override the case: they give the start of a free

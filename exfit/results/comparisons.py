@@ -12,7 +12,7 @@ from exfit.simulation.limit_hits import LimiterAction
 from exfit.util.arrays import Array
 from exfit.util.text import rounded
 from exfit.util.typed import IN_FILE, KEY
-from exfit.util.vocabulary import QUANTITIES
+from exfit.util.vocabulary import QUANTITIES, QuantityName
 
 POWERS = ("p", "q")  # what a unit gives to the grid
 Outcome = Literal["met", "not met", "open", "not judged"]  # of a criterion
@@ -220,7 +220,7 @@ class JudgedCriterion:
     """
 
     record: str
-    quantity: str
+    quantity: QuantityName
     signal: str
     begin: float | None = None
     end: float | None = None

@@ -1,7 +1,7 @@
 """What case, result and report share: words of sources, strategies and searches, criteria."""
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 TYPICAL = "typical"
 FITTED = "fitted"
@@ -89,6 +89,11 @@ QUANTITIES: Mapping[str, Quantity] = {
     "damping_ratio": Quantity("damping ratio", "1"),
 }
 
+if TYPE_CHECKING:
+    QuantityName = str
+else:
+    QuantityName = Literal[tuple(QUANTITIES)]
+
 
 class Criterion(NamedTuple):
     """The largest difference of a quantity, simulated less recorded, that is accepted.
@@ -99,7 +104,7 @@ class Criterion(NamedTuple):
     ``end`` are s after the event.
     """
 
-    quantity: str
+    quantity: QuantityName
     signals: tuple[str, ...] = ()
     limit: float | None = None
     percent: float | None = None

@@ -21,7 +21,9 @@ HARMLESS = (
     "harmless words `code` of/the same\nplaces"  # a slash, as above: what follows names a file
 )
 # keys of texts that must be one of a few words, and of one that is drawn: its form is its picture
-WORDS = ("interval_method", "method", "percent_of", "verdict", "ways", "drawing")
+WORDS = (
+    "interval_method", "method", "percent_of", "verdict", "ways", "drawing", "outcome", "quantity",
+)  # fmt: skip
 
 
 class Structure(HTMLParser):

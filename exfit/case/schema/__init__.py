@@ -64,7 +64,7 @@ from exfit.case.schema.values import (
     start_value,
 )
 from exfit.signals import COMPARED
-from exfit.util.vocabulary import QUANTITIES
+from exfit.util.vocabulary import QUANTITIES, QuantityName
 
 __all__ = [
     "MOST_ROWS",
@@ -144,10 +144,8 @@ class AsFoundSection(Section):
 
 
 if TYPE_CHECKING:
-    QuantityName = str
     SignalName = str
 else:
-    QuantityName = Literal[tuple(QUANTITIES)]
     SignalName = Literal[tuple(COMPARED)]
 
 
@@ -158,28 +156,27 @@ class CriterionSection(Section):
     signals: tuple[SignalName, ...] = Field(
         default=(),
         min_length=1,
-        description="Signals it holds for. Default: vt, or the first compared; of a grid event P "
-        "and Q.",
+        description="Default: vt, or the first compared; of a grid event P and Q.",
     )
     limit: Positive | None = Field(
         default=None,
-        description="Limit in the unit of the quantity: pu, s, % of the change for the overshoot.",
+        description="Limit: pu, s, or % of the change for the overshoot.",
     )
     percent: Positive | None = Field(
         default=None,
-        description="Limit in % of what was recorded: of the change of the signal, or of the time, "
-        "the overshoot, the damping ratio. With limit, the larger of both counts.",
+        description="Limit in % of the recorded change, or of the recorded time, overshoot or "
+        "damping ratio; of both limits the larger counts.",
     )
     begin: Number | None = Field(
         default=None,
         alias="from",
-        description="Begin of the part that it holds for, s after the event; of rms, largest, mean "
-        "and mean_absolute. Default: that of the record.",
+        description="Begin of the part that it holds for, s after the event; only of rms, largest, "
+        "mean and mean_absolute.",
     )
     end: Number | None = Field(
         default=None,
         alias="to",
-        description="End of that part, s after the event. Default: that of the record, of a step "
+        description="End of that part, s after the event; default: that of the record, of a step "
         "the next one.",
     )
 
@@ -202,8 +199,7 @@ class CriteriaSection(Section):
 
     file: Text | None = Field(
         default=None,
-        description="YAML file with source and limits, relative to the case; many cases may share "
-        "it.",
+        description="YAML file with source and limits, relative to the case.",
     )
     source: Text | None = Field(default=None, description="Who set the limits, and where.")
     limits: tuple[CriterionSection, ...] = Field(

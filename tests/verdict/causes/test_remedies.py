@@ -26,7 +26,7 @@ from exfit.workflows import fit
 
 COARSE, STATIC = (15, 1, 7), (16, 1, 7)  # seeds: AC8B every 20 ms, ST1A with efd
 CASES = sorted(path.relative_to(CONFIGS) for path in CONFIGS.glob("**/*.yaml"))
-CASES = [path for path in CASES if path.parts[0] != "programmes"]
+CASES = [path for path in CASES if path.parts[0] not in ("programmes", "criteria")]
 
 
 def case_file(folder, content, time, signals):
