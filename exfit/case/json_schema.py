@@ -40,9 +40,9 @@ def json_schema() -> Mapping[str, Any]:
 
 Data = Mapping[str, Any]
 
-RENAMED: Mapping[str, str] = {  # keys at the top
-    "accept": "is now a row of criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
-    "report": "its criteria are now those of the case: {limits: [{quantity: rms, percent: 5}]}",
+RENAMED: Mapping[Place, str] = {
+    ("accept",): "is now a row of criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
+    ("report",): "its criteria are now those of the case: {limits: [{quantity: rms, percent: 5}]}",
 }
 KIND_OF_TEST = "_kind_of_test"  # the function by which the schema distinguishes tests
 NOT_A_MAPPING = "is not a mapping (key: value)"
@@ -110,10 +110,9 @@ def _fault(detail: Data, schema: Data) -> Fault:
             name for part in _at(schema, schema, section) for name in part.get("properties", ())
         ]
         text = "not allowed with this type"
-        if not section and key in RENAMED:
-            text = RENAMED[key]
-        elif key not in known:
-            text = f"unknown key; {near(key, list(dict.fromkeys(known)))}"
+        if key not in known:
+            unknown = f"unknown key; {near(key, list(dict.fromkeys(known)))}"
+            text = RENAMED.get((*section, key), unknown)
         return Fault((*section, key), text)
     if kind == "missing":
         words = [word for part in _at(schema, schema, place) for word in part.get("enum", ())]

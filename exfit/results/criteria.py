@@ -152,32 +152,38 @@ def _judged(
     judged = JudgedCriterion(record, row.quantity, signal, row.begin, row.end, unit=unit)
     if row.quantity in OF_SAMPLES:
         return _of_samples(judged, row, curves)
-    name, why = OF_STEP[row.quantity]
+    name, _ = OF_STEP[row.quantity]
     shown = curves.event is not None and (curves.step or row.quantity in OF_ANY_EVENT)
     recorded, simulated = curves.after(row.end) if shown else (None, None)
-    value = None if recorded is None else getattr(recorded, name)
-    if recorded is None:
-        why = f"the record shows no {'step' if not shown else 'change'}"
-    elif value is None:
-        why = recorded.why.get(name) or f"the record does not show it: {why}"
-    elif row.quantity == "peak_time" and recorded.overshoot_percent <= insignificant:
-        why = f"an overshoot of {recorded.overshoot_percent:.2g} % is within its own limit"
-    else:
-        why = ""
-    if recorded is None or value is None or why:
+    why = _why_not_shown(row.quantity, recorded, shown, insignificant)
+    if recorded is None or why:
         return replace(judged, outcome="not judged", why=why)
-    base = value if row.quantity != "final_value" else _change(curves, recorded)
-    limit = _limit(row, base)
-    judged, half = replace(judged, recorded=value, limit=limit), recorded.errors.get(name, 0.0)
+    value, half = getattr(recorded, name), recorded.errors.get(name, 0.0)
+    limit = _limit(row, value if row.quantity != "final_value" else _change(curves, recorded))
     response = None if simulated is None else getattr(simulated, name)
+    reached = response is not None and isfinite(response)
+    difference = response - value if reached else None
+    judged = replace(judged, recorded=value, limit=limit, difference=difference)
     if half > limit:
         text = f"by noise the recorded one is uncertain by ±{half:.2g} {unit}"
-        judged = replace(judged, outcome="open", why=text)
-    if response is None or not isfinite(response):
-        return judged if judged.why else replace(judged, outcome="not met", why=NOT_REACHED)
-    difference = response - value
-    outcome = judged.outcome if judged.why else _within(difference, limit)
-    return replace(judged, difference=difference, outcome=outcome)
+        return replace(judged, outcome="open", why=text)
+    if difference is None:
+        return replace(judged, outcome="not met", why=NOT_REACHED)
+    return replace(judged, outcome=_within(difference, limit))
+
+
+def _why_not_shown(
+    quantity: str, recorded: Features | None, shown: bool, insignificant: float
+) -> str:
+    """Say why a record does not show a quantity, "" if it does."""
+    name, why = OF_STEP[quantity]
+    if recorded is None:
+        return f"the record shows no {'change' if shown else 'step'}"
+    if getattr(recorded, name) is None:
+        return recorded.why.get(name) or f"the record does not show it: {why}"
+    if quantity == "peak_time" and recorded.overshoot_percent <= insignificant:
+        return f"an overshoot of {recorded.overshoot_percent:.2g} % is within its own limit"
+    return ""
 
 
 def _of_samples(judged: JudgedCriterion, row: Criterion, curves: SignalToJudge) -> JudgedCriterion:
