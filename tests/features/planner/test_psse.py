@@ -499,9 +499,10 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         values = {**own, **dict.fromkeys(record.ignored, 7.5), **dict(record.absent)}
         taken = {*own, *record.ignored}
         icons = [(name, value) for name, value in record.icons if name not in taken]
-        # a code that no signal stands for: the slope of the voltage
+        # a code that no signal stands for: the slope of the voltage, or the frequency of a bus
+        unheard = 2 if 6 in definition.signals else 6
         of_icons = {name: value + ((name, value) in icons) for name, value in record.icons}
-        of_icons |= dict.fromkeys(definition.codes, 6)
+        of_icons |= dict.fromkeys(definition.codes, unheard)
         given = [value for name, value in of_icons.items() if name not in record.cons]
         absent = dict(record.absent)
         given += [values[name] + (1 if name in absent else 0) for name in record.cons]
