@@ -27,9 +27,9 @@ from exfit.fitting.experiment import (
     with_enough_substeps,
 )
 from exfit.fitting.nuisances import TURN, Found, nuisances_of, prefix_from
-from exfit.fitting.recordings import deviation, levels_of, record_of, span_of
+from exfit.fitting.recordings import deviation, levels_of, record_of, span_of, speed_at_start
 from exfit.fitting.system import system_of
-from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, VT0
+from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, SPEED, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.simulator import LARGEST_STEP, Simulator
@@ -57,7 +57,9 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     driving = [signal for signal in file.channels if signal in driven]
     whole, record, switchings = _records(case, recording, driving, kind.finds_rest)
     test, references, files = _as_recorded(case, recording, record, kind.finds_rest)
-    network = {} if view is case else _network_values(view)
+    network = {}  # of the record in place of the case's
+    if view is not case:
+        network = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}
     at = {**values, **network}
     inputs, found = _moved(view, recording, test, record, driving, switchings, references, at)
     simulator = _simulator(case, system, inputs, record.time)
@@ -86,11 +88,6 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
 
         setup = with_sines(case, file, setup, values)
     return _with_given_starts(case, setup)
-
-
-def _network_values(view: Case) -> dict[str, float]:
-    """Return the values of the network that a record has in place of the case's."""
-    return {name: value for name, value in view.values().items() if name.startswith(NETWORK)}
 
 
 def _records(
@@ -187,6 +184,7 @@ def _moved(
     if offset is not None:
         length = end - begin
         steps.append(InputStep(begin, offset * TURN * length, "angle", ramp=length))
+    steps += speed_steps(test, begin, end)
     scaled = case.kind.scaled
     found = [*nuisances_of(prefix, test, file, steps, not references, scaled), *found]
     if any(nuisance.kind == "shift" for nuisance, _ in found):
@@ -254,6 +252,12 @@ def _network_steps(case: Case, test: BumpTest, values: Values) -> Iterator[Input
             raise CaseError(f"{case.path}: test: {text}")
 
 
+def speed_steps(test: BumpTest, begin: float, end: float) -> list[InputStep]:
+    """List the even change of the speed between two instants (s), none where it holds."""
+    change = start_value(test.speed_change)
+    return [] if change is None else [InputStep(begin, change, SPEED, ramp=end - begin)]
+
+
 def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
     """Return the simulator and the initial levels of a case without a record.
 
@@ -279,8 +283,9 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
         from exfit.fitting.recorded_steps import references_of
 
         test, recorded, _ = references_of(case, test, (0.0, duration))
-    inputs = Inputs(0.0, duration, tuple(input_steps(case, test, values)), recorded)
-    return _simulator(case, system_of(case), inputs, times), {VT0: vt0}
+    steps = (*input_steps(case, test, values), *speed_steps(test, 0.0, duration))
+    inputs, levels = Inputs(0.0, duration, steps, recorded), {VT0: vt0, **speed_at_start(test)}
+    return _simulator(case, system_of(case), inputs, times), levels
 
 
 def _simulator(case: Case, system: System, inputs: Inputs, times: Array) -> Simulator:

@@ -6,7 +6,7 @@ from math import pi
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
-from exfit.plants import BREAKER, DRIVING_SCALE, REFERENCES, VT0
+from exfit.plants import BREAKER, DRIVING_SCALE, REFERENCES, SPEED, VT0
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from exfit.fitting.parameters import FreeParameter
 
 NuisanceKind = Literal[
-    "at", "shift", "step", "drift", "switching", "vt0", "delay", "scale", "offset", "driving",
-    "frequency", "cosine", "sine",
+    "at", "shift", "step", "drift", "switching", "vt0", "speed", "delay", "scale", "offset",
+    "driving", "frequency", "cosine", "sine",
 ]  # fmt: skip
 
 NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
@@ -25,6 +25,7 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "switching": ("s", "time of a switching in the grid"),
     "drift": ("Hz", "offset of the frequency"),
     "vt0": ("pu", "voltage before the first step"),
+    "speed": ("pu", "speed at the start"),
     "delay": ("s", "delay of the recorder"),
     "scale": ("", "factor of a channel"),
     "offset": ("pu", "offset of a channel"),
@@ -36,7 +37,7 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
 
 
 # those that are a parameter of the system
-OF_SYSTEM: Mapping[NuisanceKind, str] = {"vt0": VT0, "driving": DRIVING_SCALE}
+OF_SYSTEM: Mapping[NuisanceKind, str] = {"vt0": VT0, "speed": "speed0", "driving": DRIVING_SCALE}
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,8 @@ def names_of(recording: Recording) -> Iterator[str]:
         steps.append(InputStep(0.0, 1.0, BREAKER))
     if test.frequency_offset is not None:
         steps.append(InputStep(0.0, 0.0, "angle"))
+    if test.speed_change is not None:
+        steps.append(InputStep(0.0, 0.0, SPEED))
     yield from (nuisance.name for nuisance, _ in _of_steps(prefix, test, steps, shift=False))
     yield from (nuisance.name for nuisance, _ in _of_record(prefix, test, file))
     if finds_level(test, file):
@@ -158,6 +161,8 @@ def _of_steps(
     if isinstance(test.frequency_offset, Unknown):
         name, place = f"{prefix}frequency_offset", len(steps) - 1  # the last of all
         yield Nuisance(name, "drift", place, factor=TURN * steps[place].ramp), test.frequency_offset
+    if isinstance(test.speed_change, Unknown):
+        yield Nuisance(f"{prefix}speed_change", "step", len(steps) - 1), test.speed_change
     if test.breaker is not None and isinstance(test.breaker.opens, Unknown):
         # the only step of its test
         yield Nuisance(f"{prefix}{OPENING}", "shift"), test.breaker.opens
@@ -168,6 +173,8 @@ def _of_record(
 ) -> Iterator[tuple[Nuisance, Unknown]]:
     if isinstance(test.vt0, Unknown):
         yield Nuisance(f"{prefix}{VT0}", "vt0"), test.vt0
+    if isinstance(test.speed, Unknown):
+        yield Nuisance(f"{prefix}{SPEED}", "speed"), test.speed
     if isinstance(file.delay, Unknown):
         yield Nuisance(f"{prefix}delay", "delay"), file.delay
     kinds: tuple[Literal["scale", "offset"], ...] = ("scale", "offset")

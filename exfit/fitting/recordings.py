@@ -238,11 +238,17 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     for signal in kind.levels:
         if signal in record.signals:
             levels[initial(signal)] = mean_at_rest(test, record, signal)
-    levels[VT0] = vt0
+    levels |= {VT0: vt0, **speed_at_start(test)}
     if kind.scaled:
         levels[DRIVING_SCALE] = 1.0
     given = {initial(name): v for name, v in case.plant.given.items() if name in kind.driving}
     return {**levels, **given}
+
+
+def speed_at_start(test: BumpTest) -> dict[str, float]:
+    """Return the parameter of the speed before a test, none where that is rated."""
+    speed = start_value(test.speed)
+    return {initial("speed"): 1.0 if speed is None else speed} if test.gives_speed else {}
 
 
 def deviation(test: BumpTest, record: Record, signal: str) -> Array:

@@ -7,7 +7,6 @@ from traceback import extract_tb
 
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, RecordFile, Recording
-from exfit.case.schema.tests import BumpTest
 from exfit.case.ties import Ties
 from exfit.engine.system import System, parameters_used, trace
 from exfit.errors import CaseError, ModelError
@@ -29,10 +28,11 @@ from exfit.plants.limiting import inputs_for_limiters
 Values = Mapping[str, float]
 
 
-def system_of(case: Case, recording: Recording | None = None) -> System:
+def system_of(case: Case, recording: Recording | None = None, more: tuple[str, ...] = ()) -> System:
     """Return the exciter of a case in its plant, or the machine alone.
 
-    Given the ``recording``, the breaker opens only if it does in its own test. Raises ModelError
+    Given the ``recording``, the breaker opens only if it does in its own test; ``more`` are inputs
+    beside those of the tests. Raises ModelError
     where the equations of a user's own model cannot be traced, CaseError where a record lacks a
     signal that drives it.
     """
@@ -51,7 +51,7 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
         exciter=None if parts.exciter is None else parts.exciter.in_dialect(dialect),
         machine=parts.machine,
         saturation=SATURATION[case.saturation],
-        inputs=inputs_of(case, recording),
+        inputs=(*inputs_of(case, recording), *more),
         recorded=frozenset(set.intersection(*records) if records else ()),
         given=frozenset(case.plant.given),
         stabiliser=stabiliser,
@@ -78,7 +78,9 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     changed = {"vref"}
     for test in case.tests:
         changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
-        changed |= _changed_in_network(test)
+        switched = ({n for n in ("R", "X", "E") if getattr(s, n) is not None} for s in test.network)
+        changed = changed.union(*switched, FAULT if test.fault else ())
+        changed |= {SPEED} if test.gives_speed else set()
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}
@@ -89,12 +91,6 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed |= {*driving_after_opening(case, recording)}
     inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", *FAULT, BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
-
-
-def _changed_in_network(test: BumpTest) -> set[str]:
-    names = ("R", "X", "E")
-    switched = {n for switch in test.network for n in names if getattr(switch, n) is not None}
-    return switched | {*FAULT} if test.fault else switched
 
 
 def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:

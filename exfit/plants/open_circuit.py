@@ -1,4 +1,4 @@
-"""A machine whose breaker is open, at rated speed."""
+"""A machine whose breaker is open."""
 
 from functools import cache
 
@@ -9,6 +9,7 @@ from exfit.models.sheet import Model
 from exfit.plants import (
     MACHINE,
     MEASURED,
+    SPEED,
     VT0,
     Equipment,
     PlantKind,
@@ -28,6 +29,7 @@ from exfit.plants.parts import (
     Names,
     exciter_inputs,
     exciter_parameters,
+    initial,
     motion,
     named_parameters,
     present,
@@ -65,20 +67,23 @@ def open_circuit(
     inputs: tuple[str, ...] = ("vref",),
     limiters: Limiters = (),
 ) -> System:
-    """Return an exciter on a machine whose breaker is open, at rated speed.
+    """Return an exciter on a machine whose breaker is open.
 
     Parameters are the exciter's, the machine's (``machine.Tpd0``) and the initial voltage ``vt0``;
     of the inputs, ``vref`` is the change of the reference from the one that holds ``vt0``, and
     ``vs`` a signal in place of a stabiliser; ``vc1`` is added to the voltage that the exciter
-    measures. The ``limiters`` are those that see the field current: without stator current the
-    others do nothing. All per unit.
+    measures. The speed is rated, or ``speed0`` and the input ``speed``, its change: vt is the flux
+    times it (Kundur 1994, 3.121). The ``limiters`` are those that see the field current: without
+    stator current the others do nothing. All per unit.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *machine.d_axis))
     states = (*machine.d_axis, *model.states, *states_of(limiters))
     unit, of_limiters = (("", model.sheet), (MACHINE, machine.sheet)), sheets_of(limiters)
+    speed0 = (initial(SPEED),) if SPEED in inputs else ()
 
     def rest(p: Signals) -> Rest:
-        fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
+        flux = p[VT0] / p[initial(SPEED)] if speed0 else p[VT0]
+        fluxes, ifd = at_rest(machine, flux, named_parameters(p, MACHINE, machine.sheet))
         u = exciter_inputs(vt=p[VT0], ifd=ifd)
         exciter = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
         waiting = limiters_rest(limiters, u, p)
@@ -86,7 +91,8 @@ def open_circuit(
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         values, d = named_parameters(p, MACHINE, machine.sheet), Names()
-        fluxes, vt, ifd = without_current(machine, x, values)
+        fluxes, flux, ifd = without_current(machine, x, values)
+        vt = (p[initial(SPEED)] + u[SPEED]) * flux if speed0 else flux
         vref, measured = r["vref"] + u["vref"], vt + u.get(MEASURED, 0.0)
         seen = exciter_inputs(vref=vref, vt=vt, vc1=measured, ifd=ifd, vs=u.get("vs", 0.0))
         efd, signals = limited_exciter(model, saturation, limiters, seen, p, {**r, **x}, d)
@@ -95,7 +101,7 @@ def open_circuit(
         return motion(d, states, {**outputs, **x, **signals})
 
     return System(
-        parameters=(*symbols(*unit), VT0, *symbols(*of_limiters)),
+        parameters=(*symbols(*unit), VT0, *speed0, *symbols(*of_limiters)),
         setpoints=("vref", *model.setpoints),
         states=states,
         inputs=inputs,
@@ -114,7 +120,7 @@ def _build(equipment: Equipment) -> System:
 
 OPEN_CIRCUIT = PlantKind(
     name="open-circuit",
-    title="breaker open, rated speed",
+    title="breaker open",
     needs=("exciter", "machine"),
     events=("vref", "vs"),
     signals=compared(OUTPUTS),

@@ -14,7 +14,7 @@ from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slices, slopes_of, spread_of, spread_of_errors
 from exfit.inference.whitening import BIAS_KNOWN_TO
-from exfit.plants import REFERENCES, VT0
+from exfit.plants import REFERENCES, SPEED, VT0
 from exfit.registry import parts
 from exfit.results.cause import Cause, Remedy
 from exfit.results.verdict import REJECTED
@@ -293,7 +293,7 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
     if evidence.case.kind.finds_rest:  # the others are jumps of what is recorded
         steps = tuple(step for step in steps if step.signal in REFERENCES)
     for place, step in enumerate(steps):
-        if step.step and ("step", place) not in found:
+        if step.step and step.signal != SPEED and ("step", place) not in found:
             words = f"the step of {step.step:+g} pu{of_record}"
             yield (
                 Held(words, _of_steps(evidence, number, {place: step.step}), step.step),

@@ -6,9 +6,11 @@ from oracle import drawn_values, system_of, typical_values
 from references import reference
 from typed_units import AC1A, AC8B, integrated
 
+from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import MACHINE, VT0
+from exfit.plants import MACHINE, SATURATION, SPEED, VT0
+from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
@@ -26,6 +28,36 @@ def test_a_bump_up_and_down_is_that_of_another_simulator(name):
     assert np.abs(got["efd"] - columns["efd"]).max() < 2e-3
     assert np.abs(got["ifd"] - columns["ifd"]).max() < 2e-3
     assert np.abs(got["vref"] - columns["vref"]).max() < 2e-6  # old still at the instants
+
+
+def test_at_another_speed_the_unit_is_a_rated_one_with_a_larger_gain():
+    """vt is speed times flux: w of the speed, KA w times and KF, vt0, the step a w-th as large."""
+    machine, speed, times = MACHINES["GENROU"], 1.04, np.linspace(0.0, 6.0, 601)
+    turning = open_circuit(MODELS["AC1A"], machine, SATURATION["quadratic"], ("vref", SPEED))
+    values = typical_values("AC1A", KA=200.0, KF=0.03)
+    faster = {**values, VT0: 1.02, f"{SPEED}0": speed}
+    rated = {**values, VT0: 1.02 / speed, "KA": speed * 200.0, "KF": 0.03 / speed}
+
+    def response(system, own, step):
+        inputs = Inputs(0.0, times[-1], (InputStep(1.0, step),))
+        return Simulator(system, inputs, times, 1e-3).response(own).signals
+
+    got = response(turning, faster, 0.05)
+    expected = response(system_of("AC1A"), rated, 0.05 / speed)
+    # two runs of the same equations: rounding
+    assert np.abs(got["vt"] - speed * expected["vt"]).max() < 1e-9
+    for signal in ("efd", "ifd"):
+        assert np.abs(got[signal] - expected[signal]).max() < 1e-8
+
+
+def test_a_falling_speed_takes_vt_along_where_the_flux_holds():
+    """With a regulator so slow that it does nothing, vt falls as the speed does."""
+    machine, times = MACHINES["GENROU"], np.linspace(0.0, 2.0, 201)
+    turning = open_circuit(MODELS["AC1A"], machine, SATURATION["quadratic"], ("vref", SPEED))
+    values = {**typical_values("AC1A", TA=1e4, TF=1e4), VT0: 1.0, f"{SPEED}0": 1.0}
+    inputs = Inputs(0.0, 2.0, (InputStep(0.0, -0.02, SPEED, ramp=2.0),))
+    vt = Simulator(turning, inputs, times, 1e-3).response(values).signals["vt"]
+    assert np.abs(vt - (1.0 - 0.01 * times)).max() < 1e-4
 
 
 # --- the check system in closed form --------------------------------------------------------------

@@ -29,6 +29,10 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
         yield from terminal_fault_faults(test.at("fault"), duration)
     if not kind.finds_rest and test.at("frequency_offset").value is not None:
         yield test.at("frequency_offset").fault(no_event(kind))
+    if {"speed", "speed_change"} & test.content.keys():
+        from exfit.case.checks.speed import speed_faults
+
+        yield from speed_faults(test, kind)
     for switch in test.at("network").entries:
         if switch.at("E").number is not None and "E" not in network:
             text = "only where plant.network gives E; test.E changes it by steps"
@@ -294,6 +298,8 @@ def _findable(test: ContentNode, record: ContentNode) -> list[ContentNode]:
         *(step.at(key) for step in steps for key in AUTOMATIC),
         test.at(BREAKER, "opens"),
         test.at("frequency_offset"),
+        test.at("speed"),
+        test.at("speed_change"),
         record.at("delay"),
         *(channel.at(key) for channel in channels for key in ("scale", "offset")),
     ]
@@ -312,16 +318,11 @@ def _shown_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
         text = f"is missing: the record does not show it while {unknown[0]} of vt is fitted"
         yield test.at("vt0").fault(text)
     for _, channel in channels.sections:
-        yield from _frequency_faults(channel.at("sine", "frequency"))
-
-
-def _frequency_faults(frequency: ContentNode) -> Iterator[Fault]:
-    """Yield the faults of the frequency of a periodic disturbance."""
-    if frequency.is_section:
-        yield from _needed_bounds(frequency)
-    for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
-        if node.number is not None and node.number <= 0.0:
-            yield node.fault(f"{show(node.number)} Hz must be above 0")
+        frequency = channel.at("sine", "frequency")
+        yield from _needed_bounds(frequency) if frequency.is_section else ()
+        for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
+            if node.number is not None and node.number <= 0.0:
+                yield node.fault(f"{show(node.number)} Hz must be above 0")
 
 
 def _value_faults(value: ContentNode) -> Iterator[Fault]:

@@ -193,7 +193,8 @@ def _phasors_faults(record: ContentNode) -> Iterator[Fault]:
 
 def _phasor_faults(phasor: ContentNode, quantity: str, in_unit: str | None) -> Iterator[Fault]:
     """Check a voltage or a current, which is in a unit or per unit."""
-    counts = [_count(phasor.at(key)) for key in ("magnitude", "angle")]
+    both = [phasor.at(key) for key in ("magnitude", "angle")]
+    counts = [1 if each.text is not None else len(each.entries) or None for each in both]
     if None in counts:
         return
     if counts[0] != counts[1]:
@@ -225,7 +226,3 @@ def _computed_faults(channel: ContentNode, record: ContentNode) -> Iterator[Faul
         yield place.fault(f"{name} is not computed from phasors, only {names}")
     elif signal in OF_CURRENT_PHASOR and "current" not in record.at("phasors"):
         yield place.fault(f"{name} needs record.phasors.current, which is missing")
-
-
-def _count(columns: ContentNode) -> int | None:
-    return 1 if columns.text is not None else len(columns.entries) or None

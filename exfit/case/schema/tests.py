@@ -237,6 +237,14 @@ class BumpTest(Section):
         description="Added to the frequency of the grid, less its mean at rest, Hz; or {start, "
         "min, max} to fit it; grid-playback only. Default: none.",
     )
+    speed: Findable | None = Field(
+        default=None,
+        description="Speed at the start, pu, or {start, min, max}; open-circuit only.",
+    )
+    speed_change: Findable | None = Field(
+        default=None,
+        description="Its even change until the end of the record, pu, or {start, min, max}.",
+    )
     vref: Reference = Field(
         default=(),
         description="The reference: steps and ramps in order of time; a table; a file; or "
@@ -289,6 +297,11 @@ class BumpTest(Section):
         """Give vref, vs or pref as the case has it."""
         given: Reference = getattr(self, signal)
         return given
+
+    @property
+    def gives_speed(self) -> bool:
+        """Whether the speed is another than the rated one."""
+        return self.speed is not None or self.speed_change is not None
 
     @property
     def angle_steps(self) -> tuple[AngleStep, ...]:

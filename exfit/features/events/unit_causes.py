@@ -19,8 +19,8 @@ from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
 from exfit.results.cause import Cause
 from exfit.verdict.causes.evidence import Evidence, Suspicion, likelihood, suspected
+from exfit.verdict.causes.exciters import STRUCTURE
 from exfit.verdict.causes.trials import freed_within, refitted, tried, with_freed
-from exfit.verdict.causes.unit import STRUCTURE
 
 LARGEST_FACTOR = 4.0  # of the inertia
 MOST_DAMPING = 20.0  # pu

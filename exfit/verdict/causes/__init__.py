@@ -22,7 +22,6 @@ from exfit.verdict.causes.evidence import (
     Suspicion,
 )
 from exfit.verdict.causes.levels import unsteady_record, wrong_levels, wrong_voltage
-from exfit.verdict.causes.unit import with_model
 
 __all__ = ["Evidence", "FittedRecord", "Pace", "Recogniser", "Suspicion", "causes_of"]
 
@@ -52,13 +51,16 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
             pace.counts(done, len(recognisers), evidence.cost)
             for suspicion in recognise(evidence):
                 found[recognise].append(suspicion)
-        pace.ended()
     except (KeyboardInterrupt, OutOfTime) as ending:
         left = (*recognisers,)[max(len(found) - 1, 0) :]
         pace.stopped(left, isinstance(ending, KeyboardInterrupt))
     suspicions = sorted(_credible(evidence, found), key=lambda each: -each.likelihood)
     if not nothing_to_explain:
+        from exfit.verdict.causes.exciters import with_model
+
         suspicions = likely(with_model(evidence, suspicions))
+    if not pace.untried:
+        pace.ended()
     causes = {suspicion.cause.sentence: suspicion.cause for suspicion in reversed(suspicions)}
     return tuple(reversed(causes.values()))
 

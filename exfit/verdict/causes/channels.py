@@ -17,7 +17,6 @@ from exfit.verdict.causes.evidence import (
     Evidence,
     FittedRecord,
     Suspicion,
-    Trial,
     suspected,
 )
 from exfit.verdict.causes.trials import (
@@ -75,7 +74,9 @@ def _other_scale(
     if found < 0.0:
         turned = rescaled(evidence, number, channel, found).changes
         cause = Cause(f"{place} is inverted{starts}", "check the polarity", "polarity", turned)
-    elif is_wrong_base(signal, found) and (not with_voltage or nearer_to_rated(levels, trial)):
+    elif is_wrong_base(signal, found) and (
+        not with_voltage or nearer_to_rated(levels, trial.values["cause.vt0"])
+    ):
         text = f"the base of {place}{starts}; values {found:.4g} times as large would match"
         cause = Cause(text, *rescaled(evidence, number, channel, found))
     else:
@@ -100,9 +101,9 @@ def _factor_between(measured: float, simulated: float) -> float:
     return simulated / measured if measured and simulated else 1.0
 
 
-def nearer_to_rated(levels: tuple[float, float] | None, trial: Trial) -> bool:
+def nearer_to_rated(levels: tuple[float, float] | None, matched: float) -> bool:
     """Test whether another base brings vt before the step nearer to 1 pu, as units are tested."""
-    return levels is not None and abs(trial.values["cause.vt0"] - 1.0) < abs(levels[0] - 1.0)
+    return levels is not None and abs(matched - 1.0) < abs(levels[0] - 1.0)
 
 
 def _voltage(evidence: Evidence, number: int) -> Opened:

@@ -21,6 +21,7 @@ from exfit.results.cause import Cause
 from exfit.results.comparisons import Comparison
 from exfit.results.influences import RecorderAverages
 from exfit.results.intervals.determination import NEEDS_PROFILE
+from exfit.util.arrays import Array
 
 LEAST_TIME = 30.0  # s
 TIMES_SEARCH = 3.0  # times what the search took
@@ -221,14 +222,16 @@ class Evidence:
 
 
 class Trial(NamedTuple):
-    """The end of a trial: its cost, and every value by name."""
+    """The end of a trial: its cost, every value by name, its residuals and where they ended."""
 
     cost: float
     values: Mapping[str, float]
+    residuals: Residuals
+    theta: Array
 
 
 class Suspicion(NamedTuple):
-    """A cause, and the logarithm of the likelihood of the record with it.
+    """A cause, the logarithm of the likelihood of the record with it, and its trial, if any.
 
     It is that of white noise of unknown size, -M/2 log(cost), less log(M)/2 for each number that
     is found with it (Schwarz 1978).
@@ -236,6 +239,7 @@ class Suspicion(NamedTuple):
 
     cause: Cause
     likelihood: float
+    trial: Trial | None = None
 
 
 Recogniser = Callable[[Evidence], Iterator[Suspicion]]  # yields the causes of one kind
@@ -256,13 +260,13 @@ def suspected(
     the logarithm of how much likelier it is than others, before any record.
     """
     if isinstance(trial, Trial):
-        cost = trial.cost
+        cost, tried = trial.cost, trial
         own = {name: trial.values[name] for name in evidence.own if name in trial.values}
         cause = cause._replace(values=own)
     else:
-        cost = trial
+        cost, tried = trial, None
     gained = likelihood(evidence, cost, numbers) - likelihood(evidence, evidence.cost)
     share = (evidence.cost - cost) / max(evidence.cost - evidence.noise_cost, TINY_COST)
     beyond_noise = evidence.cost > evidence.noise_cost
     if gained > LEAST_GAIN and (share > LEAST_SHARE or not beyond_noise):
-        yield Suspicion(cause, likelihood(evidence, cost, numbers) + prior)
+        yield Suspicion(cause, likelihood(evidence, cost, numbers) + prior, tried)

@@ -10,7 +10,15 @@ from exfit.verdict.causes.channels import (
 )
 from exfit.verdict.causes.evidence import Recogniser
 from exfit.verdict.causes.levels import unsteady_record, wrong_voltage
-from exfit.verdict.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
+from exfit.verdict.causes.recorder import (
+    aliased_ripple,
+    averaging,
+    drift,
+    other_clock,
+    ripple,
+    spiky_channel,
+)
+from exfit.verdict.causes.speed import other_speed
 from exfit.verdict.causes.steps import (
     further_step,
     ramped_step,
@@ -43,10 +51,12 @@ BY_TRIAL: Mapping[str, Recogniser] = {
     "zero of a channel": wrong_offset,
     "vt0": wrong_start,
     "clipped channel": clipped_channel,
+    "aliased ripple": aliased_ripple,
     "bounds": narrow_bound,
     "machine data": machine_data,
     "other fixed values": fixed_values,
     "limits": wrong_limit,
+    "speed": other_speed,
     "ramp of the step": ramped_step,
     "further step": further_step,
 }

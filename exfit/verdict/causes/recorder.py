@@ -1,19 +1,21 @@
 """What a recorder adds to a record: ripple, drift, spikes, averages, another clock."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from exfit.case.changes import changes_to_averages, number_text
 from exfit.case.schema.values import TimeColumn
-from exfit.dsp.lines import MAINS, Ripple
+from exfit.dsp.lines import MAINS, Ripple, cosine_and_sine
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.quality import SPIKE_LIMIT
 from exfit.fitting.channels import finds_instant, with_averages
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.nuisances import Nuisance
+from exfit.fitting.nuisances import COSINE, FREQUENCY, SINE, Nuisance
+from exfit.fitting.sines import Sine
 from exfit.fitting.uncertainty import slices
 from exfit.records.units import SECONDS
 from exfit.results.cause import Cause
@@ -24,6 +26,7 @@ from exfit.verdict.causes.evidence import (
     Evidence,
     FittedRecord,
     Suspicion,
+    Trial,
     suspected,
 )
 from exfit.verdict.causes.trials import (
@@ -37,12 +40,14 @@ from exfit.verdict.causes.trials import (
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FEWEST_AT_REST = 20  # samples from which a drift at rest is taken
 FINER = 8  # points of the spectrum for each of a transform without padding
-FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
+SLOW_FREQUENCIES = 40  # of a folded ripple, of which linear theory chooses where to start
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
 CYCLES = {1.0 / mains: f"cycles of {mains:g} Hz" for mains in MAINS}  # by their lengths, s
 ENOUGH_SAMPLES = 30_000  # to tell windows of averages apart
 WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
+LONGEST = 0.1  # of the record: a longer window hides the response
+WIDE = 3  # windows: as far apart are those that are fitted first
 LATE = Nuisance("cause.delay", "delay")
 
 
@@ -93,11 +98,7 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
             f"{own.channel.signal}{evidence.name_of(own.number)}",
             "look for its source" if folded is None else "record it faster",
             "ripple",
-            {
-                evidence.place(own.number, f"record.channels.{own.channel.signal}.sine"): (
-                    f"{{frequency: {_near(frequency, own.time)}}}"
-                )
-            },
+            _sine_of(evidence, own, frequency),
         )
         yield from suspected(evidence, explained.cost, 3, cause)
 
@@ -105,7 +106,7 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
 def _near(frequency: float, time: Array) -> str:
     """Write the entry of a frequency (Hz) that is fitted as closely as a record shows it."""
     away = 1.0 / float(np.ptp(time))
-    least, most = max(frequency - away, 0.0), min(frequency + away, 0.5 / median_step(time))
+    least, most = max(frequency - away, away), min(frequency + away, 0.5 / median_step(time))
     numbers = (float(f"{number:.6g}") for number in (frequency, least, most))
     return "{{start: {}, min: {}, max: {}}}".format(*numbers)
 
@@ -123,6 +124,61 @@ def _line(own: ChannelErrors, errors: Array) -> float | None:
     return float(frequencies[np.argmax(power)])
 
 
+def aliased_ripple(evidence: Evidence) -> Iterator[Suspicion]:
+    """Suspect a ripple of the mains that the rate of sampling folds to a slow oscillation."""
+    linear = None if evidence.case.kind.finds_rest else linear_fit(evidence)
+    if linear is None:  # the phasors of an event hold none
+        return
+    for own in errors_of_channels(evidence):
+        rate, slowest = 1.0 / median_step(own.time), FEWEST_PERIODS / np.ptp(own.time)
+        if not any(is_folded(mains, rate, slowest) for mains in MAINS):
+            continue
+        middle = 0.5 * float(own.time[0] + own.time[-1])
+
+        def explained(frequency: float, own: ChannelErrors = own, middle: float = middle) -> float:
+            pair = cosine_and_sine(frequency, own.time - middle)
+            return linear.with_columns(own.columns(len(linear.errors), pair)).cost
+
+        start = min(np.linspace(0.0, slowest, SLOW_FREQUENCIES + 1)[1:], key=explained)
+        name, signal, number = "cause", own.channel.signal, own.number
+        experiment = evidence.residuals.experiments[number]
+        sine = Sine(name, signal, middle, None)
+        wavy = replace(experiment, sines=(*experiment.sines, sine))
+        largest = float(np.ptp(own.channel.measured[own.channel.kept]))
+        opened = [
+            Opened(
+                Nuisance(f"{name}.{FREQUENCY}", "frequency", signal=signal), start, 0.0, slowest
+            ),
+            Opened.around(Nuisance(f"{name}.{COSINE}", "cosine", signal=signal), 0.0, largest),
+            Opened.around(Nuisance(f"{name}.{SINE}", "sine", signal=signal), 0.0, largest),
+        ]
+        residuals = with_experiment(evidence.residuals, number, wavy)
+        if trial := refitted(evidence, with_opened(residuals, number, opened)):
+            frequency, height = sine.frequency_at(trial.values), sine.amplitude_at(trial.values)
+            cause = Cause(
+                f"a ripple of the mains in {signal}{evidence.name_of(number)}, {height:.1e} pu, "
+                f"which {rate:.4g} samples a second show at {frequency:.2g} Hz",
+                "record it faster",
+                "ripple",
+                _sine_of(evidence, own, frequency),
+            )
+            yield from suspected(evidence, trial, len(opened), cause)
+
+
+def is_folded(frequency: float, rate: float, slowest: float) -> bool:
+    """Test whether a rate of sampling folds a frequency to a slow one (all in Hz)."""
+    times = round(frequency / rate)
+    return times > 0 and abs(frequency - times * rate) < slowest
+
+
+def _sine_of(evidence: Evidence, own: ChannelErrors, frequency: float) -> Mapping[str, str]:
+    """Return the change by which a fit finds a sine (Hz); none for less than a period."""
+    if frequency < 1.0 / np.ptp(own.time):
+        return {}
+    place = evidence.place(own.number, f"record.channels.{own.channel.signal}.sine")
+    return {place: f"{{frequency: {_near(frequency, own.time)}}}"}
+
+
 def drift(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect channels that drift all along the record.
 
@@ -137,14 +193,9 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
         explained = linear.with_columns(columns)
         change = float(explained.coefficients[0])
         of_event = evidence.case.kind.finds_rest  # its phasors hold no ripple of the mains
-        rate = 1.0 / median_step(own.time)
-        cycles = [mains / rate for mains in MAINS]
-        folded = any(abs(each - round(each)) < FOLDED and each > 0.5 for each in cycles)
-        folding = ", or aliased ripple of the mains," if folded else ""
         cause = Cause(
-            f"a drift{'' if of_event else folding} of "
-            f"{own.channel.signal}{evidence.name_of(own.number)}: {change:+.1e} pu from start to "
-            "end",
+            f"a drift of {own.channel.signal}{evidence.name_of(own.number)}: {change:+.1e} pu from "
+            "start to end",
             MOVED_IN_EVENT if of_event else UNSTEADY,
             "shorter",
             _shorter_window(evidence, own.number),
@@ -217,42 +268,80 @@ def averaging(evidence: Evidence) -> Iterator[Suspicion]:
     for number, record, experiment in evidence.tests:
         if any(channel.filtering is not None for channel in experiment.channels):
             continue
-        window = _likeliest_window(evidence, record, experiment)
-        if window is None:
+        best = _fitted_window(evidence, number, record, experiment)
+        if best is None:
             continue
-        of_means = with_averages(experiment, window)
-        residuals = with_experiment(evidence.residuals, number, of_means)
-        delay = experiment.simulator.delay
-        opened_late = Opened(LATE, delay + 0.5 * window, delay - window, delay + window)
-        opened = [] if finds_instant(experiment) else [opened_late]
-        if trial := refitted(evidence, with_opened(residuals, number, opened)):
-            late, after = trial.values.get(LATE.name), ""
-            if late is not None:
-                after = f", and is {1e3 * late:.0f} ms late"
-            cause = Cause(
-                f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
-                f"{after}",
-                "ask for its setting",
-                "averaged",
-                changes_to_averages(evidence.case, number, experiment.signals, window, late),
+        trial, window = best
+        late, after = trial.values.get(LATE.name), ""
+        if late is not None:
+            after = f", and is {1e3 * late:.0f} ms late"
+        cause = Cause(
+            f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
+            f"{after}",
+            "ask for its setting",
+            "averaged",
+            changes_to_averages(evidence.case, number, experiment.signals, window, late),
+        )
+        yield from suspected(evidence, trial, 1 if late is None else 2, cause)
+
+
+def _fitted_window(
+    evidence: Evidence, number: int, record: FittedRecord, experiment: Experiment
+) -> tuple[Trial, float] | None:
+    """Return the trial with averages over the best window, and that (s); None without one.
+
+    Linear theory at a fit without averages may miss the best by far: some others are fitted, too,
+    and then the neighbours of the best, until it is better than both.
+    """
+    windows = windows_of(record)
+    likeliest = _likeliest_window(evidence, windows, experiment)
+    if likeliest is None:
+        return None
+    trials = dict[int, Trial | None]()
+    found, delay = finds_instant(experiment), experiment.simulator.delay
+
+    def cost(k: int) -> float:
+        if k not in trials:
+            window = windows[k]
+            residuals = with_experiment(
+                evidence.residuals, number, with_averages(experiment, window)
             )
-            yield from suspected(evidence, trial, 1 + len(opened), cause)
+            late = Opened(LATE, delay + 0.5 * window, delay - window, delay + window)
+            trials[k] = refitted(evidence, with_opened(residuals, number, [] if found else [late]))
+        trial = trials[k]
+        return inf if trial is None else trial.cost
+
+    places = {windows.index(likeliest)}
+    if not evidence.case.kind.finds_rest:  # an event takes too long for others
+        places |= {*range(len(windows) - 1, 0, -WIDE)}
+    best = min(places, key=cost)
+    while len(places) > 1:
+        near = min(range(max(best - 1, 0), min(best + 2, len(windows))), key=cost)
+        if near == best:
+            break
+        best = near
+    trial = trials[best]
+    return None if trial is None else (trial, windows[best])
+
+
+def windows_of(record: FittedRecord) -> list[float]:
+    """Return the windows (s) of averages that are tried: between samples, and usual ones."""
+    time = record.setup.record.time
+    step, longest = median_step(time), LONGEST * float(np.ptp(time))
+    return [each for each in (step, *(w for w in WINDOWS if w > step)) if each < longest]
 
 
 def _likeliest_window(
-    evidence: Evidence, record: FittedRecord, experiment: Experiment
+    evidence: Evidence, windows: Sequence[float], experiment: Experiment
 ) -> float | None:
     """Return the window (s) of the average that matches best, by linear theory."""
-    time = record.setup.record.time
-    step = median_step(time)
+    time = experiment.simulator.times
     found, costs = finds_instant(experiment), dict[float, float]()
     every = slice(None, None, -(-len(time) // ENOUGH_SAMPLES))
     thinned = [replace(each, measured=each.measured[every]) for each in experiment.channels]
     simulator = experiment.simulator.at_times(experiment.simulator.times[every])
     experiment = replace(experiment, simulator=simulator, channels=tuple(thinned))
-    for window in sorted({step, *(window for window in WINDOWS if window > step)}):
-        if not window < 0.1 * np.ptp(time):
-            continue
+    for window in windows:
         averaged = with_averages(experiment, window)
         values, moves = evidence.values, [*evidence.residuals.moves(evidence.solution.x)]
         if not found:

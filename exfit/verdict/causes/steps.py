@@ -11,7 +11,7 @@ from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances import Nuisance
 from exfit.fitting.residuals import Residuals
-from exfit.plants import REFERENCES
+from exfit.plants import REFERENCES, SPEED
 from exfit.results.cause import Cause, Remedy
 from exfit.simulation.inputs import InputStep
 from exfit.verdict.causes.evidence import Evidence, FittedRecord, Suspicion, Trial, suspected
@@ -33,6 +33,7 @@ FARTHEST_DELAY = 2.0  # s
 RAMP_FACTOR, MOST_RAMPS = 1.5, 3
 RAMPS = tuple(0.02 * RAMP_FACTOR**k for k in range(13))  # s, of the durations that are tried
 INSTANTS = 60  # at which a further step is looked for
+LEAST_FURTHER = 0.03  # of the largest step: smaller further ones are rare
 LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
 
@@ -60,7 +61,7 @@ def wrong_sign(evidence: Evidence) -> Iterator[Suspicion]:
 
 def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the size of the steps of a record."""
-    for number, _, experiment in evidence.tests:
+    for number, record, experiment in evidence.tests:
         opened = [*_open_sizes(experiment)]
         trial = opened and refitted(evidence, with_opened(evidence.residuals, number, opened))
         if not trial:
@@ -71,9 +72,11 @@ def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
             continue
         sizes = ", ".join(f"{size:+.4g}" for size in found.values())
         given = ", ".join(f"{each.start:+.4g}" for each in opened)
+        # of a linear unit: the level does not tell, where it is that of the record
+        alone = experiment.signals == ("vt",) and record.given_vt0 is None
         cause = Cause(
             f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
-            f"has {given} pu",
+            f"has {given} pu{'; a wrong base of vt looks the same' if alone else ''}",
             *correct_step(evidence, number, found),
         )
         prior = -RARE if change < USUAL_CHANGE else 0.0
@@ -84,7 +87,7 @@ def _open_sizes(experiment: Experiment) -> Iterator[Opened]:
     """Leave open the sizes of the steps that the case gives."""
     free = {nuisance.step for nuisance in experiment.nuisances if nuisance.kind == "step"}
     for k, step in enumerate(experiment.simulator.inputs.steps):
-        if k not in free and step.step:
+        if k not in free and step.step and step.signal != SPEED:
             yield Opened.within(Nuisance(f"cause.step{k}", "step", k), step.step, LARGEST_FACTOR)
 
 
@@ -294,7 +297,8 @@ def further_step(evidence: Evidence) -> Iterator[Suspicion]:
                 "further-step",
                 _added(evidence, number, trial.values),
             )
-            yield from suspected(evidence, trial, 2, cause)
+            small = abs(trial.values["cause.step"]) < LEAST_FURTHER * size
+            yield from suspected(evidence, trial, 2, cause, -RARE if small else 0.0)
 
 
 def _added(evidence: Evidence, number: int, found: Mapping[str, float]) -> Mapping[str, str]:

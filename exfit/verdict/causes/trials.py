@@ -90,7 +90,7 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     own = {
         free.name: x for free, x in zip(evidence.residuals.free, evidence.solution.x, strict=True)
     }
-    residuals = compressed(residuals)
+    whole, residuals = residuals, compressed(residuals)
     start, (low, high) = residuals.start, residuals.bounds
     solution = np.array(
         [own.get(free.name, x) for free, x in zip(residuals.free, start, strict=True)]
@@ -112,7 +112,7 @@ def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     if not ends:
         return None
     best = min(ends, key=lambda end: end.cost)
-    return Trial(best.cost, residuals.values(best.x))
+    return Trial(best.cost, residuals.values(best.x), whole, best.x)
 
 
 def tried(

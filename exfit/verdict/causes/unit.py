@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import inf, isfinite, log, sqrt
+from math import log
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from exfit.verdict.causes.evidence import (
     CERTAIN,
     Evidence,
     Suspicion,
-    likelihood,
     suspected,
 )
 from exfit.verdict.causes.trials import (
@@ -40,8 +39,6 @@ TPD0 = f"{MACHINE}Tpd0"
 SATURATION = (f"{MACHINE}S10", f"{MACHINE}S12")
 USUAL_ERROR = 0.5  # of the logarithm of a value that is given
 RARE = 5.0  # log-likelihood: other fixed values are wrong less often than machine data
-OF_SCATTER = 10.0  # variance of the logarithm of a squared scatter, times the samples it is from
-STRUCTURE = 0.01  # of the error beyond the noise: what leaves more is less likely than the model
 
 
 def machine_data(evidence: Evidence) -> Iterator[Suspicion]:
@@ -222,24 +219,3 @@ def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
             {"estimate.iterations": most},
         )
         yield Suspicion(cause, CERTAIN)
-
-
-def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
-    """Return suspicions, the likeliest first, with that of the model.
-
-    None of another one was tried: it stands second where the first leaves much unexplained, else
-    last.
-    """
-    samples = max(1, evidence.residuals.samples)
-    noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
-    beyond = evidence.cost - noise
-    if beyond <= 0.0 or not evidence.case.kind.has_exciter:
-        return [*suspicions]
-    own = likelihood(evidence, noise + STRUCTURE * beyond)
-    cause = Cause(
-        f"the model: the unit may be of another type than {evidence.case.subject}",
-        "compare others: exfit rank CASE --models A,B",
-    )
-    compared = [each.likelihood for each in suspicions if isfinite(each.likelihood)]
-    place = 1 if max(compared, default=inf) < own else len(suspicions)
-    return [*suspicions[:place], Suspicion(cause, own), *suspicions[place:]]

@@ -6,7 +6,6 @@ from faulty_cases import KINDS, WORDS, cause_rank, drawn
 from exfit.errors import RecordError
 from exfit.records.record import Record
 from exfit.verdict.causes import channels
-from exfit.verdict.causes.trials import Trial
 from exfit.workflows import fit
 
 LINES = 2  # in which the cause stands
@@ -43,8 +42,7 @@ def test_a_case_without_a_fault_has_no_cause():
     [(1.0, 0.9565, False), (0.99, 1.02, False), (0.92, 1.0, True), (1.732, 1.01, True)],
 )
 def test_a_base_is_suspected_only_if_it_brings_vt_nearer_to_rated(measured, matched, suspected):
-    trial = Trial(0.0, {"cause.vt0": matched})
-    assert channels.nearer_to_rated((measured, measured), trial) == suspected
+    assert channels.nearer_to_rated((measured, measured), matched) == suspected
 
 
 def test_every_cause_of_the_study_has_its_words():

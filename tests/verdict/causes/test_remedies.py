@@ -65,15 +65,27 @@ def spoilt(spoil, folder, step=0.01, until=8.0, **sections):
     return case_file(folder, content | sections, *spoil(time, signals))
 
 
-def ramped(folder):
-    """Write the case of the AC8B whose reference was ramped, not stepped."""
+def otherwise(folder, change):
+    """Write the case of the AC8B, whose test was changed where it was recorded."""
     unit, rng = UNITS["AC8B"], np.random.default_rng(1)
     content, time = content_of(unit, {"vt": 1.0}, 0.05), np.arange(0.0, 8.0, 0.01)
     own = deepcopy(content)
-    own["test"]["vref"][0]["ramp"] = 0.2
+    change(own["test"])
     signals = {"vt": recorded(own, time)["vt"] + 1e-4 * rng.standard_normal(len(time))}
     content["parameters"] = {"fixed": dict(unit.fixed), "free": free_near(unit.free, rng)}
     return case_file(folder, content, time, signals)
+
+
+def ramped(test):
+    test["vref"][0]["ramp"] = 0.2
+
+
+def slowing_down(test):
+    test["speed_change"] = -0.03
+
+
+def folded(time, signals):
+    return time, {"vt": signals["vt"] + 1e-3 * np.sin(2.0 * np.pi * 50.2 * time)}
 
 
 def unsteady(time, signals):
@@ -124,7 +136,9 @@ PLANTED = {
     "machine data": partial(drawn, "Tpd0", STATIC),
     "other fixed values": partial(drawn, "Tpd0", STATIC),
     "limits": partial(drawn, "limit not of the unit", COARSE),
-    "ramp of the step": ramped,
+    "aliased ripple": partial(spoilt, folded, step=0.02),
+    "speed": lambda folder: otherwise(folder, slowing_down),
+    "ramp of the step": lambda folder: otherwise(folder, ramped),
     "further step": partial(drawn, "second step", COARSE),
     "recorder that averages": partial(drawn, "averaging recorder", COARSE),
     "record of the event": inverted_power,
