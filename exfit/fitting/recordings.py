@@ -247,8 +247,8 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
 
 def speed_at_start(test: BumpTest) -> dict[str, float]:
     """Return the parameter of the speed before a test, none where that is rated."""
-    speed = start_value(test.speed)
-    return {initial("speed"): 1.0 if speed is None else speed} if test.gives_speed else {}
+    rated = test.speed is test.speed_change is None
+    return {} if rated else {initial("speed"): start_value(test.speed) or 1.0}
 
 
 def deviation(test: BumpTest, record: Record, signal: str) -> Array:

@@ -80,7 +80,7 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
         switched = ({n for n in ("R", "X", "E") if getattr(s, n) is not None} for s in test.network)
         changed = changed.union(*switched, FAULT if test.fault else ())
-        changed |= {SPEED} if test.gives_speed else set()
+        changed |= set() if test.speed is test.speed_change is None else {SPEED}
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}

@@ -180,11 +180,6 @@ class PlantKind:
         return self.has_exciter and self.has_machine and not self.plays_back
 
     @property
-    def idle(self) -> bool:
-        """Flag of such a plant without load, whose speed a test may give."""
-        return self.closed_loop and not self.on_load
-
-    @property
     def plays_back(self) -> bool:
         """Flag of a simulation that a record drives, and that cannot be without one."""
         return bool(self.required)

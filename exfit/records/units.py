@@ -115,10 +115,6 @@ def _in_brackets(name: str, unit: str) -> bool:
     return unit_of(unit) is not None and not (unit == "A" and _OF_PHASES.fullmatch(name))
 
 
-def _after_in(_: str, unit: str) -> bool:
-    return unit_of(unit) is not None
-
-
 def _after_slash(name: str, unit: str) -> bool:
     """Check for the unit of what precedes it, and no part of one, as in V/Hz."""
     before = quantity_of(name.split()[-1])
@@ -141,7 +137,10 @@ def _apart(name: str, unit: str) -> bool:
 # how a unit is set apart from the name before it, and whether the two are a name and its unit
 FORMS: tuple[tuple[re.Pattern[str], Callable[[str, str], bool]], ...] = (
     (re.compile(r"(?P<name>.*?)\s*[\[({<]\s*(?P<unit>[^\[\](){}<>]+?)\s*[\])}>]"), _in_brackets),
-    (re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>.*\S)"), _after_in),
+    (
+        re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>.*\S)"),
+        lambda _, unit: unit_of(unit) is not None,
+    ),
     (re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"), _after_slash),
     (re.compile(r"(?P<name>.*[^\s_,])(?:\s*,\s*|\s+|_+)(?P<unit>[^\s_,]+)"), _apart),
 )

@@ -311,6 +311,7 @@ class FitResult:
     phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
     strategy_given: bool = field(default=True, metadata=IN_FILE)
+    search_given: str = field(default="", metadata=IN_FILE)
     parts: tuple[PartDescription, ...] = field(default=(), metadata=IN_FILE)
     tests: tuple[RecordedTest, ...] = field(default=(), metadata=IN_FILE)
     windows: WindowSpread | None = None

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import erfc, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from exfit.results.verdict import (
     NEGLIGIBLE,
     NO_MATCH,
     NOT_CONVERGED,
-    REJECTED,
     ResidualTests,
     Verdict,
     VerdictWords,
@@ -30,7 +28,7 @@ from exfit.verdict.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.verdict.residual_tests import residual_tests
 
 if TYPE_CHECKING:
-    from exfit.verdict.score_tests import Contradiction
+    from exfit.verdict.score_tests import Contradiction, Refuted
 
 MOST_CAUSES = 5  # that a reader is given
 VALUES = "values of the case"
@@ -53,7 +51,11 @@ def verdict_of(evidence: Evidence) -> Verdict:
     averages = evidence.averages
     good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
     noise_is_carried = any(test.carried > NEGLIGIBLE for test in tests)
-    contradicted: list[Contradiction | RecorderAverages | Refuted] = [*_refuted(evidence)]
+    contradicted = list["Contradiction | RecorderAverages | Refuted"]()
+    if any(free.prior is not None for free in evidence.residuals.free):
+        from exfit.verdict.score_tests import refuted
+
+        contradicted += refuted(evidence)
     try:
         if good_but_for_averages and not noise_is_carried:
             from exfit.verdict.score_tests import contradictions
@@ -162,43 +164,6 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
     yield from _not_noise(tests, evidence)
     if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
         yield "the search ended before a minimum"
-
-
-class Refuted(NamedTuple):
-    """A given value that the record contradicts: it lies ``moved`` of its standard errors off."""
-
-    name: str
-    given: float
-    found: str
-    moved: float
-
-    @property
-    def reason(self) -> str:
-        """The value that the record contradicts."""
-        return f"the record contradicts {self.name} = {self.given:g}"
-
-    @property
-    def cause(self) -> Cause:
-        """The value that the record gives, with a remedy."""
-        words = f"{self.name} is {self.found}, not {self.given:g} ({self.moved:+.1f} of its errors)"
-        return Cause(words, "check where it comes from; the fit used the value of the record")
-
-    @property
-    def likelihood(self) -> float:
-        """Log-likelihood that this value is wrong."""
-        return 0.5 * self.moved**2
-
-
-def _refuted(evidence: Evidence) -> Iterator[Refuted]:
-    """Yield the given values that the fit moved by more than their errors allow."""
-    asked = evidence.case.free()
-    for free in evidence.residuals.free:
-        if free.prior is None or free.name in asked:
-            continue
-        value = evidence.values[free.name]
-        moved = (value - free.prior.mean) / free.prior.std
-        if erfc(abs(moved) / sqrt(2.0)) < REJECTED:
-            yield Refuted(free.name, free.prior.mean, f"{value:.4g}", moved)
 
 
 def _vague(evidence: Evidence) -> Iterator[str]:

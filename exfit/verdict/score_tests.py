@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
@@ -108,6 +109,46 @@ class Contradiction(NamedTuple):
     def likelihood(self) -> float:
         """Log-likelihood that this value is wrong: by the record, and beforehand."""
         return 0.5 * self.chi_square - self.held.rare
+
+
+class Refuted(NamedTuple):
+    """A given value that the record contradicts: it lies ``moved`` of its standard errors off."""
+
+    name: str
+    given: float
+    found: float
+    moved: float
+    case: Case
+
+    @property
+    def reason(self) -> str:
+        """The value that the record contradicts."""
+        return f"the record contradicts {self.name} = {self.given:g}"
+
+    @property
+    def cause(self) -> Cause:
+        """The value that the record gives, with a remedy."""
+        words = (
+            f"{self.name} is {self.found:.4g}, not {self.given:g} ({self.moved:+.1f} of its errors)"
+        )
+        check = "check where it comes from, or fit it without its error"
+        return Cause(words, *remedy_of(self.case, {self.name: self.found}, check))
+
+    @property
+    def likelihood(self) -> float:
+        """Log-likelihood that this value is wrong."""
+        return 0.5 * self.moved**2
+
+
+def refuted(evidence: Evidence) -> Iterator[Refuted]:
+    """Yield the given values that the fit moved by more than their errors allow."""
+    asked = evidence.case.free()
+    for free in evidence.residuals.free:
+        if free.prior is not None and free.name not in asked:
+            value = evidence.values[free.name]
+            moved = (value - free.prior.mean) / free.prior.std
+            if _is_significant(moved**2, 1):
+                yield Refuted(free.name, free.prior.mean, value, moved, evidence.case)
 
 
 def contradictions(evidence: Evidence) -> list[Contradiction]:

@@ -35,14 +35,13 @@ from exfit.util.file_names import LONGEST_NAME
 AngleUnit = Literal["deg", "rad"]
 
 
-def _several(value: Any) -> Any:
-    return [value] if isinstance(value, str) else value
-
-
 Columns = Annotated[
     tuple[Text, ...],
     Field(min_length=1, max_length=3),
-    BeforeValidator(_several, json_schema_input_type=Text | tuple[Text, ...]),
+    BeforeValidator(
+        lambda value: [value] if isinstance(value, str) else value,
+        json_schema_input_type=Text | tuple[Text, ...],
+    ),
 ]
 MAGNITUDE = Field(
     description="Column of the magnitude (rms) of the positive sequence, or of the three phases."

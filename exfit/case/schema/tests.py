@@ -186,14 +186,10 @@ class AngleTable(Section):
         )
 
 
-def _kind_of_angle(value: Any) -> str:
-    return "[table]" if isinstance(value, dict | AngleTable) else "[steps]"
-
-
 SourceAngle = Annotated[
     Annotated[tuple[AngleStep, ...], Field(min_length=1), Tag("[steps]")]
     | Annotated[AngleTable, Tag("[table]")],
-    Discriminator(_kind_of_angle),
+    Discriminator(lambda given: "[table]" if isinstance(given, dict | AngleTable) else "[steps]"),
 ]
 
 
@@ -297,11 +293,6 @@ class BumpTest(Section):
         """Give vref, vs or pref as the case has it."""
         given: Reference = getattr(self, signal)
         return given
-
-    @property
-    def gives_speed(self) -> bool:
-        """Whether the speed is another than the rated one."""
-        return self.speed is not None or self.speed_change is not None
 
     @property
     def angle_steps(self) -> tuple[AngleStep, ...]:

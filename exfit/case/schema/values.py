@@ -118,11 +118,6 @@ STD_ERRORS = Field(
 )
 
 
-# marks in brackets stand in no file: the messages take them out of the place of a fault
-def _form_of_given(value: Any) -> str:
-    return "[tie]" if is_tie(value) else section_or_number(value)
-
-
 def _number_or_text(value: Any) -> str:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return "[number]" if number else "[text]"
@@ -211,7 +206,8 @@ else:
         Annotated[Number, Tag("[number]")]
         | Annotated[str, Field(pattern="^="), Tag("[tie]")]
         | Annotated[StatedNumber, Tag("[section]")],
-        Discriminator(_form_of_given),
+        # marks in brackets stand in no file: the messages take them out of the place of a fault
+        Discriminator(lambda given: "[tie]" if is_tie(given) else section_or_number(given)),
     ]
     Known = Annotated[
         Annotated[Number, Tag("[number]")] | Annotated[StatedNumber, Tag("[section]")],

@@ -23,6 +23,7 @@ from exfit.output.blocks import (
     row,
 )
 from exfit.results import facts
+from exfit.results.causes_in_words import options_of
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import PartDescription, RecordedTest, values_of_part
 from exfit.results.facts import AskedFact, answer, stated
@@ -339,12 +340,7 @@ def command_of(result: Reported, folder: Path | None = None) -> str:
         return join(("exfit", "validate", str(result.case), *output, *result.options))
     if OF_PROGRAMME in result.inputs:
         return join(("exfit", "run", str(result.case), *output))
-    options = ["--strategy", result.strategy] if result.strategy_given else []
-    for name, given in result.given_values.items():  # each by itself: its file may be gone
-        options += ["--set", f"{name}={given.value!r}"]
-    if result.freed:
-        options += ["--free", ",".join(result.freed)]
-    return join(("exfit", "fit", str(result.case), *output, *options))
+    return join(("exfit", "fit", str(result.case), *output, *options_of(result)))
 
 
 def reproduction(result: Reported, folder: Path) -> Iterator[Block]:

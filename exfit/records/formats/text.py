@@ -134,7 +134,9 @@ class TextTable:
         except ValueError:
             self._refuse_first(places, partial(self._fault, gappy))
             one_by_one: dict[int | str, Callable[[str], float]] = {
-                places[name]: _number_or_nan for name in gappy if name in places
+                places[name]: lambda cell: np.nan if is_missing(cell) else float(cell)
+                for name in gappy
+                if name in places
             }
             try:
                 data = self._loaded(self._numeric_lines(), places.values(), float, one_by_one)
@@ -330,10 +332,6 @@ def read_text_table(path: Path, memory: float | None = None) -> TextTable:
         comma = has_comma(cells for _, cells in table.rows())
         return replace(table, dialect=dialect._replace(comma=comma))
     return table
-
-
-def _number_or_nan(cell: str) -> float:
-    return np.nan if is_missing(cell) else float(cell)
 
 
 def _decoded(path: Path, data: bytes) -> Text:

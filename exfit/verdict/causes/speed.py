@@ -22,11 +22,11 @@ RARE = 5.0  # log-likelihood: a unit is mostly tested at rated speed
 def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the speed: off the rated one, and falling or rising evenly."""
     case = evidence.case
-    if not case.kind.idle or case.external is not None:
+    if case.kind.on_load or not case.kind.closed_loop or case.external is not None:
         return
     for number, _, experiment in evidence.tests:
         own, recording = experiment.simulator, case.recordings[number]
-        if recording.test.gives_speed:
+        if SPEED in own.system.inputs:
             continue
         system = system_of(case.seen_from(recording), recording, (SPEED,))
         begin, end, steps = own.inputs.start, own.inputs.end, own.inputs.steps
