@@ -51,7 +51,7 @@ def verdict_of(evidence: Evidence) -> Verdict:
     averages = evidence.averages
     good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
     noise_is_carried = any(test.carried > NEGLIGIBLE for test in tests)
-    contradicted = list["Contradiction | RecorderAverages | Refuted"]()
+    contradicted: list[Contradiction | RecorderAverages | Refuted] = []
     if any(free.prior is not None for free in evidence.residuals.free):
         from exfit.verdict.score_tests import refuted
 
