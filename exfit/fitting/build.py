@@ -57,9 +57,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     driving = [signal for signal in file.channels if signal in driven]
     whole, record, switchings = _records(case, recording, driving, kind.finds_rest)
     test, references, files = _as_recorded(case, recording, record, kind.finds_rest)
-    network = {}  # of the record in place of the case's
-    if view is not case:
-        network = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}
+    network = {} if view is case else _network_values(view)
     at = {**values, **network}
     inputs, found = _moved(view, recording, test, record, driving, switchings, references, at)
     simulator = _simulator(case, system, inputs, record.time)
@@ -88,6 +86,11 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
 
         setup = with_sines(case, file, setup, values)
     return _with_given_starts(case, setup)
+
+
+def _network_values(view: Case) -> dict[str, float]:
+    """Return the values of the network that a record has in place of the case's."""
+    return {name: value for name, value in view.values().items() if name.startswith(NETWORK)}
 
 
 def _records(

@@ -6,7 +6,7 @@ from pathlib import Path
 from traceback import extract_tb
 
 from exfit.case.case import Case
-from exfit.case.schema import SINGLE, RecordFile, Recording
+from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording
 from exfit.case.ties import Ties
 from exfit.engine.system import System, parameters_used, trace
 from exfit.errors import CaseError, ModelError
@@ -32,9 +32,8 @@ def system_of(case: Case, recording: Recording | None = None, more: tuple[str, .
     """Return the exciter of a case in its plant, or the machine alone.
 
     Given the ``recording``, the breaker opens only if it does in its own test; ``more`` are inputs
-    beside those of the tests. Raises ModelError
-    where the equations of a user's own model cannot be traced, CaseError where a record lacks a
-    signal that drives it.
+    beside those of the tests. Raises ModelError where the equations of a user's own model cannot be
+    traced, CaseError where a record lacks a signal that drives it.
     """
     kind, parts = case.kind, case.parts
     dialect: Dialect = getattr(case.plant, "dialect", "standard")
@@ -78,9 +77,7 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     changed = {"vref"}
     for test in case.tests:
         changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
-        switched = ({n for n in ("R", "X", "E") if getattr(s, n) is not None} for s in test.network)
-        changed = changed.union(*switched, FAULT if test.fault else ())
-        changed |= set() if test.speed is test.speed_change is None else {SPEED}
+        changed |= _changed_around(test)
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}
@@ -91,6 +88,12 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed |= {*driving_after_opening(case, recording)}
     inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", *FAULT, BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
+
+
+def _changed_around(test: BumpTest) -> set[str]:
+    changed = {n for each in test.network for n in ("R", "X", "E") if getattr(each, n) is not None}
+    turning = set() if test.speed is test.speed_change is None else {SPEED}
+    return changed | turning | ({*FAULT} if test.fault else set())
 
 
 def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from exfit.util.interrupts import deferred_interrupts
 ROOT = "EXFIT_LAID_OUT"  # the variable of the environment that names the folder; its real path
 LARGEST_FILE = 128_000_000  # bytes; a result of a hundred long records has about as many
 MOST_PARTS = 2_000_000  # texts, lists and mappings; a result has some thousand
-LONGEST_INTEGER = 400  # digits; a longer one takes long to read, and no double is as large
+LONGEST_INTEGER = 400  # digits; a longer one, which no double may hold, stays a text
 HALF_CHARACTER = re.compile(r"\\u[dD][89a-fA-F]")
 # of a file that is still to be renamed: computer, process, and which of its files
 TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
@@ -141,7 +141,7 @@ def read_json(path: Path) -> dict[str, Any]:
             text,
             object_pairs_hook=_mapping,
             parse_constant=_refuse_constant,
-            parse_int=_integer,
+            parse_int=lambda text: int(text) if len(text) <= LONGEST_INTEGER else text,
         )
         if HALF_CHARACTER.search(text):
             json.dumps(content, ensure_ascii=False).encode()
@@ -163,11 +163,6 @@ def _mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         duplicate = next(key for k, key in enumerate(keys) if key in keys[:k])
         raise ValueError(f"duplicate key {duplicate!r}")
     return mapping
-
-
-def _integer(text: str) -> int | str:
-    """Return a whole number; one that no double holds as its text, which is refused in place."""
-    return int(text) if len(text) <= LONGEST_INTEGER else text
 
 
 def _refuse_constant(text: str) -> NoReturn:

@@ -51,11 +51,7 @@ def verdict_of(evidence: Evidence) -> Verdict:
     averages = evidence.averages
     good_but_for_averages = words == GOOD or (averages is not None and reason == averages.reason)
     noise_is_carried = any(test.carried > NEGLIGIBLE for test in tests)
-    contradicted: list[Contradiction | RecorderAverages | Refuted] = []
-    if any(free.prior is not None for free in evidence.residuals.free):
-        from exfit.verdict.score_tests import refuted
-
-        contradicted += refuted(evidence)
+    contradicted: list[Contradiction | RecorderAverages | Refuted] = [*_refuted(evidence)]
     try:
         if good_but_for_averages and not noise_is_carried:
             from exfit.verdict.score_tests import contradictions
@@ -75,6 +71,15 @@ def verdict_of(evidence: Evidence) -> Verdict:
     if words == MATCHES:
         causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
+
+
+def _refuted(evidence: Evidence) -> "Sequence[Refuted]":
+    """List the given values that the record contradicts; most fits need not load the test."""
+    if all(free.prior is None for free in evidence.residuals.free):
+        return ()
+    from exfit.verdict.score_tests import refuted
+
+    return (*refuted(evidence),)
 
 
 def _shown(

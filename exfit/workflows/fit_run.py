@@ -185,7 +185,7 @@ def fit_result(
         windows=analysis.windows,
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
         strategy_given=method != case.estimate.strategy,
-        search_given=options.search if options.search != case.estimate.search else "",
+        search_given=options.search * (options is not case.estimate),
         parts=tuple(parts_of(case)),
         tests=tuple(tests_of(case, used, identified)),
         behaviour=analysis.behaviour,

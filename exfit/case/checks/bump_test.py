@@ -318,11 +318,16 @@ def _shown_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
         text = f"is missing: the record does not show it while {unknown[0]} of vt is fitted"
         yield test.at("vt0").fault(text)
     for _, channel in channels.sections:
-        frequency = channel.at("sine", "frequency")
-        yield from _needed_bounds(frequency) if frequency.is_section else ()
-        for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
-            if node.number is not None and node.number <= 0.0:
-                yield node.fault(f"{show(node.number)} Hz must be above 0")
+        yield from _frequency_faults(channel.at("sine", "frequency"))
+
+
+def _frequency_faults(frequency: ContentNode) -> Iterator[Fault]:
+    """Yield the faults of the frequency of a periodic disturbance."""
+    if frequency.is_section:
+        yield from _needed_bounds(frequency)
+    for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
+        if node.number is not None and node.number <= 0.0:
+            yield node.fault(f"{show(node.number)} Hz must be above 0")
 
 
 def _value_faults(value: ContentNode) -> Iterator[Fault]:
