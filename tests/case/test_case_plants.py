@@ -254,7 +254,7 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
         ("{at: 4.0, X: 0.3}", "{at: 4.0, X: -0.3}", "test.network[1].X: -0.3 is below 0"),
         ("Tppd0: 0.035", "Tppd0: 0", "Tppd0: 0 is for open circuit; on load it must be positive"),
         ("inputs: [p]", "inputs: [p, vt]", "stabiliser.inputs: 2 given; PSS1A takes 1"),
-        ("inputs: [p]", "inputs: [f]", "stabiliser.inputs[0]: 'f' is not possible; known: speed"),
+        ("inputs: [p]", "inputs: [w]", "stabiliser.inputs[0]: 'w' is not possible; known: speed"),
         ("PSS1A", "PSS9", "'PSS9' is not a stabiliser model; did you mean"),
         (
             "PSS1A, inputs: [p], parameters: {KS: 0.5}",
