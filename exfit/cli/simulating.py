@@ -34,12 +34,20 @@ def simulate(
     """
     from exfit import workflows
     from exfit.output import run_folder
-    from exfit.workflows.given_values import changed_values, fitted_code, read_parameters
 
-    loaded = load(case, *(fitted_code(parameters) if parameters else ()))
+    code: tuple[str, ...] = ()
+    if parameters is not None:
+        from exfit.workflows.given_values import fitted_code, read_parameters
+
+        code = fitted_code(parameters)
+    loaded, values = load(case, *code), dict[str, float]()
     folder = output.folder_of(loaded, "simulate", run_folder.OF_SIMULATION)
-    values = read_parameters(loaded, parameters) if parameters else {}
-    values |= changed_values(loaded, assignments(changes, "--set"), "--set")
+    if parameters is not None:
+        values = read_parameters(loaded, parameters)
+    if changes:
+        from exfit.workflows.given_values import changed_values
+
+        values |= changed_values(loaded, assignments(changes, "--set"), "--set")
     simulation = workflows.simulate(loaded, values)
     figures = run_folder.write_simulation(simulation, case.stem, folder)
     if output.shown:

@@ -185,10 +185,13 @@ def simulate(case: CaseOrPath, values: "ValuesOrResult | None" = None) -> "Simul
     from exfit.fitting.program import program_of
     from exfit.fitting.system import values_of
     from exfit.workflows import simulation
-    from exfit.workflows.given_values import changes_of
 
     case = loaded(case, values)
     with program_of(case) as program:
+        if not values and not case.given_values:  # the case's own, which are checked
+            return simulation.simulate(case, values_of(case, {}), program)
+        from exfit.workflows.given_values import changes_of
+
         return simulation.simulate(case, values_of(case, changes_of(case, values)), program)
 
 
