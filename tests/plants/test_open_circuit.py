@@ -183,7 +183,6 @@ def test_a_machine_without_saturation_needs_as_much_field_as_voltage(exciter):
         assert response(exciter, machine, slow)[0] == pytest.approx([1.1] * 3, abs=1e-12)
 
 
-@pytest.mark.each_model
 def test_saturation_of_the_machine_has_its_two_points(exciter):
     for machine in MACHINES:
         values = typical_values(exciter, machine)
