@@ -779,7 +779,7 @@ main()
 def test_ctrl_c_keeps_the_best_point_and_ends_with_3():
     ran = program(INTERRUPTED, "fit", case_file(), "--no-plots")
     assert ran.code == 3
-    assert ran.err == ""
+    assert ran.err == "Interrupted: what was done until then is kept\n"
     assert "verdict: not converged: interrupted" in ran.out
     stored = json.loads(Path("runs/case-fit/result.json").read_text())
     assert stored["interrupted"]
