@@ -72,8 +72,9 @@ def open_circuit(
     Parameters are the exciter's, the machine's (``machine.Tpd0``) and the initial voltage ``vt0``;
     of the inputs, ``vref`` is the change of the reference from the one that holds ``vt0``, and
     ``vs`` a signal in place of a stabiliser; ``vc1`` is added to the voltage that the exciter
-    measures. The speed is 1, or ``speed0`` and the change ``speed``; vt is flux times speed (Kundur
-    1994, 3.121). The ``limiters`` are those that see the field current: no other does anything.
+    measures. The speed is 1, or ``speed0`` and the change ``speed``; vt is flux times speed
+    (Kundur 1994, (3.120) and (3.121)). The ``limiters`` are those that see the field current: no
+    other does anything.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *machine.d_axis))
     states = (*machine.d_axis, *model.states, *states_of(limiters))

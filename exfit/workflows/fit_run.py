@@ -316,7 +316,7 @@ def _analysed(
             uncertainty = allowing_for_bias(uncertainty, *at)
             noises = uncertainty.confidence.noise
             errors = errors_of_values(case, problem, best.x, noises, fine)
-            if case.plant.type == "machine-playback":
+            if case.kind.plays_back and not case.kind.has_exciter:
                 from exfit.results.intervals.windows import spread_over_windows, with_spread
 
                 windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
