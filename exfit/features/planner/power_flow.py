@@ -22,12 +22,8 @@ BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
 TITLE_LINES = 3
 SBASE, REV, BASFRQ = 1, 2, 5  # fields of the first line
 BASKV = 2  # of a bus
-MBASE, ZR, RT, XT = (
-    8,
-    9,
-    11,
-    12,
-)  # of a generator; one later in version 35, which has NREG before them
+# of a generator; one later in version 35, which has NREG before them
+MBASE, ZR, RT, XT, GTAP = 8, 9, 11, 12, 13
 WITH_NREG = 35
 THIRD_BUS, CW, CZ, STAT = 2, 4, 5, 11  # of a transformer
 IN_KV, OF_NOMINAL = 2.0, 3.0  # CW: of its taps, else per unit of the bus
@@ -126,6 +122,8 @@ def _ratings(
         resistance = _number(row, RT + later, "RT", faults)
         own = _number(row, XT + later, "XT", faults)
         ra = _number(row, ZR + later, "ZR", faults)
+        if own > 0.0 and _number(row, GTAP + later, "GTAP", faults) not in (0.0, 1.0):
+            continue  # on which side of it the tap is is not public: its case asks
         step_up = StepUp(resistance, own, None) if own > 0.0 else None
         beside = step_ups.get(bus, ())
         if step_up is None and at_bus[bus] == len(beside) == 1:

@@ -63,6 +63,9 @@ def test_each_version_gives_the_ratings_of_its_machines(version, named):
             assert own.step_up == pytest.approx((r, X, HIGH_KV), rel=1e-4)
     Path("net.raw").write_text(power_flow(version, named=named, own_x=0.12))
     assert {own.step_up for own in read_power_flow(Path("net.raw")).values()} == {(0.0, 0.12, None)}
+    with_tap = power_flow(version, named=named, own_x=0.12).replace("0.12,1.0,", "0.12,1.05,", 1)
+    Path("net.raw").write_text(with_tap)
+    assert [*read_power_flow(Path("net.raw"))] == [(9, "1")]
 
 
 @pytest.mark.parametrize(
