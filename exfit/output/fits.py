@@ -1,5 +1,6 @@
 """The result of a fit as blocks: in brief, and whole; and the profiles of its parameters."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shlex import quote
@@ -28,6 +29,7 @@ from exfit.output.blocks import (
 )
 from exfit.output.validations import comparisons, criteria_table, in_a_line, played, rejections
 from exfit.results.causes_in_words import causes_in_words
+from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.text import listed, percentage
@@ -36,6 +38,7 @@ from exfit.util.vocabulary import by_source
 if TYPE_CHECKING:
     from exfit.workflows.profiles import Profiles
 
+MARK_OF_CRITERIA: dict[bool | None, Mark] = {True: "ok", None: "doubt", False: "bad"}
 MARKS: dict[str, Mark] = {GOOD: "ok", MATCHES: "doubt"}  # of verdicts; the others are bad
 
 
@@ -68,21 +71,24 @@ def _brief(
     yield fitted_table(result, before, of_records)
     yield figures(f"cost {result.start_cost:.4e} -> {result.cost:.4e}", *_errors(result))
     if result.criteria.given:
-        yield criteria_table(result)
+        judged = judged_by_criteria(result)
+        counts = Counter(each.outcome for each in judged.criteria)
+        text = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+        yield from remarks("criteria:", [text], MARK_OF_CRITERIA[judged.passed])
     yield from rejections(result.comparisons)
     good = [match for match in result.validation if not match.reason]
     for match in result.validation:
         if match.reason or match in good[:accepted]:
             yield in_a_line(match)
     if accepted < len(good):
-        yield paragraph(f"{len(good) - accepted} further validations are accepted")
+        yield paragraph(f"further validations that are accepted: {len(good) - accepted}")
     yield from notes(result.notes[:noted])
     if noted < len(result.notes):
-        yield paragraph(f"{len(result.notes) - noted} further notes", "doubt")
+        yield paragraph(f"further notes: {len(result.notes) - noted}", "doubt")
     listed = [*_causes(result, folder)]
     yield from listed[:causes]
     if causes < len(listed):
-        yield paragraph(f"{len(listed) - causes} further causes are possible", "faint")
+        yield paragraph(f"further possible causes: {len(listed) - causes}", "faint")
     if folder is not None:
         shown = quote(folder.as_posix())
         yield paragraph(f"{written_to(folder)}; details: `exfit show --all {shown}`")

@@ -124,7 +124,7 @@ def test_in_brief_a_fit_has_thirty_lines_at_most_and_the_verdict_last(missed, wi
     assert all(any(line.startswith(name) for line in lines) for name in missed.parameters)
     assert CAUSES[0].sentence in text
     written = text.count("of the fit")
-    assert written == count or f"{count - written} further notes" in text
+    assert written == count or f"further notes: {count - written}" in text
 
 
 def shown(result, width):
