@@ -13,7 +13,7 @@ SIZE = 0.05  # pu
 TIME = np.arange(0.0, END, SAMPLING)
 SEEDS = 100
 NAMES = ("initial_value", "final_value", "rise_time", "overshoot_percent", "peak_time",
-         "settling_time")  # fmt: skip
+         "settling_time", "delay", "damping_ratio")  # fmt: skip
 
 
 def response(time, w0=6.0, zeta=0.45):

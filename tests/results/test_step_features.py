@@ -52,7 +52,7 @@ def test_features_without_a_ripple_are_as_near_the_truth_as_those_of_a_record_wi
         assert len(rippled.without) == 1
         near = 0.5 / drawn.time[-1]
         assert rippled.without[0].frequency == pytest.approx(drawn.frequency, abs=near)
-        for name in quiet.errors.keys() & rippled.errors.keys():
+        for name in errors.keys() & quiet.errors.keys() & rippled.errors.keys():
             of_truth = [getattr(each, name) - drawn.truth[name] for each in (quiet, rippled)]
             errors[name].append(np.array(of_truth) / quiet.errors[name])
     for name, each in errors.items():

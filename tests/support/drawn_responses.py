@@ -163,4 +163,5 @@ def held(drawn, measured):
     return {
         name: abs(getattr(measured, name) - drawn.truth[name]) <= half
         for name, half in measured.errors.items()
+        if name in NAMES
     }

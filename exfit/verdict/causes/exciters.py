@@ -36,7 +36,8 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
     """Return suspicions, the likeliest first, with that of the model.
 
     Others of its type are tried where the first leaves errors that are not white. Where there was
-    no time for that, it stands second if the first leaves much unexplained, else last.
+    no time for that, or none is better, it stands second if the first leaves much unexplained, else
+    last.
     """
     case = evidence.case
     if case.kind.has_exciter and (case.kind.finds_rest or evidence.pace.untried):
@@ -47,6 +48,8 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
         others = [*_better(evidence, suspicions)]
     except (KeyboardInterrupt, OutOfTime) as ending:
         evidence.pace.stopped((OTHERS,), isinstance(ending, KeyboardInterrupt))
+        return _with_untried(evidence, suspicions)
+    if not others:
         return _with_untried(evidence, suspicions)
     return sorted([*suspicions, *others], key=lambda each: -each.likelihood)
 
@@ -108,7 +111,7 @@ def _better(evidence: Evidence, suspicions: Sequence[Suspicion]) -> Iterator[Sus
 
 
 def _with_untried(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
-    """Return suspicions with that of the model, of which no other one was tried."""
+    """Return suspicions with that of a model that is not named."""
     samples = max(1, evidence.residuals.samples)
     noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
     beyond = evidence.cost - noise

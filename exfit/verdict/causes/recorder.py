@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.case.changes import changes_to_averages, number_text
+from exfit.case.changes import between, changes_to_averages, number_text
 from exfit.case.schema.values import TimeColumn
 from exfit.dsp.lines import MAINS, Ripple, cosine_and_sine
 from exfit.dsp.noise import NEIGHBOURS, noise
@@ -40,6 +40,7 @@ from exfit.verdict.causes.trials import (
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FEWEST_AT_REST = 20  # samples from which a drift at rest is taken
 FINER = 8  # points of the spectrum for each of a transform without padding
+INSIDE = 1e-4  # of a frequency: so far within what a record shows its bounds are, as written
 SLOW_FREQUENCIES = 40  # of a folded ripple, of which linear theory chooses where to start
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
@@ -106,9 +107,9 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
 def _near(frequency: float, time: Array) -> str:
     """Write the entry of a frequency (Hz) that is fitted as closely as a record shows it."""
     away = 1.0 / float(np.ptp(time))
-    least, most = max(frequency - away, away), min(frequency + away, 0.5 / median_step(time))
-    numbers = (float(f"{number:.6g}") for number in (frequency, least, most))
-    return "{{start: {}, min: {}, max: {}}}".format(*numbers)
+    low, high = away * (1.0 + INSIDE), 0.5 / median_step(time) * (1.0 - INSIDE)
+    least, most = max(frequency - away, low), min(frequency + away, high)
+    return between(min(max(frequency, least), most), least, most)
 
 
 def _line(own: ChannelErrors, errors: Array) -> float | None:
@@ -131,7 +132,11 @@ def aliased_ripple(evidence: Evidence) -> Iterator[Suspicion]:
         return
     for own in errors_of_channels(evidence):
         rate, slowest = 1.0 / median_step(own.time), FEWEST_PERIODS / np.ptp(own.time)
-        if not any(is_folded(mains, rate, slowest) for mains in MAINS):
+        has_one = any(
+            sine.signal == own.channel.signal
+            for sine in evidence.residuals.experiments[own.number].sines
+        )
+        if has_one or not any(is_folded(mains, rate, slowest) for mains in MAINS):
             continue
         middle = 0.5 * float(own.time[0] + own.time[-1])
 

@@ -22,13 +22,13 @@ RARE = 5.0  # log-likelihood: a unit is mostly tested at rated speed
 def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
     """Suspect the speed: off the rated one, and falling or rising evenly."""
     case = evidence.case
-    if case.kind.on_load or not case.kind.closed_loop or case.external is not None:
-        return
     for number, _, experiment in evidence.tests:
         own, recording = experiment.simulator, case.recordings[number]
-        if SPEED in own.system.inputs:
+        seen = case.seen_from(recording)
+        is_open = seen.kind.closed_loop and not seen.kind.on_load and case.external is None
+        if not is_open or SPEED in own.system.inputs:
             continue
-        system = system_of(case.seen_from(recording), recording, (SPEED,))
+        system = system_of(seen, recording, (SPEED,))
         begin, end, steps = own.inputs.start, own.inputs.end, own.inputs.steps
         change = InputStep(begin, 0.0, SPEED, ramp=end - begin)
         inputs = replace(own.inputs, steps=(*steps, change))

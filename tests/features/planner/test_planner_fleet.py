@@ -15,7 +15,7 @@ def test_three_commands_bring_what_was_verified_into_the_planner_s_file(run, emp
               "--step", "0.05", "--base", "efd=1")  # fmt: skip
     assert ran.code == 0, ran.err
     assert len([*Path("cases").glob("*.yaml")]) == len(OWN)
-    ran = run("batch", "cases", "-o", "fleet", "--search", "local", "--workers", "1", "--quiet")
+    ran = run("batch", "cases", "-o", "fleet", "--workers", "1", "--quiet")
     assert ran.code == 0, ran.err
     ran = run("export", "--all", "fleet", "-o", "fitted.dyr")
     assert ran.code == 0, ran.err
