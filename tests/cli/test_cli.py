@@ -500,6 +500,8 @@ def test_a_validation_beyond_its_limit_ends_with_3(run):
     assert ran.code == 3
     assert "not accepted: on down-step rms of the difference, vt: +" in ran.out
     assert "the limit is 1e-12 pu" in " ".join(ran.out.split())
+    assert "\ncriteria: 2 not met\n" in ran.out
+    ran = run("fit", case, "--no-plots", "--verbose")
     assert re.search(r"to fit +rms of the difference, +\S+ +1e-12 +pu +not met", ran.out)
     ran = run("validate", case, "--no-plots")
     assert ran.code == 3
