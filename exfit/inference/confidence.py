@@ -70,6 +70,12 @@ def vagueness(value: float, interval: Interval | None) -> str:
     return f"to +-{digits(0.5 * (high - low))}"
 
 
+def holds(interval: Interval, value: float) -> bool:
+    """Test whether an interval, which may be open, holds a value."""
+    low, high = interval
+    return (low is None or value >= low) and (high is None or value <= high)
+
+
 def closed(interval: Interval | None) -> TypeGuard[tuple[float, float]]:
     """Test whether there is an interval with limits on both sides."""
     return interval is not None and None not in interval

@@ -180,6 +180,11 @@ class PlantKind:
         return self.has_exciter and self.has_machine and not self.plays_back
 
     @property
+    def off_line(self) -> bool:
+        """Flag of an exciter that controls a machine whose breaker is open."""
+        return self.closed_loop and not self.on_load
+
+    @property
     def plays_back(self) -> bool:
         """Flag of a simulation that a record drives, and that cannot be without one."""
         return bool(self.required)

@@ -176,7 +176,7 @@ def _step_features(
     event = _event(setup, time, values)
     if event is None:
         return StepFeatures(None, None)
-    until = event.until if end is None else min(event.until, event.at + end)
+    until = event.until_within(end)
     if read is None or signal != "vt" or end is not None:
         undisturbed = Overlay(whole.measured - (whole.simulated - simulated), simulated)
         read = _measured_features(setup, channel, undisturbed, values, moves, until)

@@ -210,6 +210,10 @@ class Event(NamedTuple):
     until: float
     of_vref: bool
 
+    def until_within(self, seconds: float | None) -> float:
+        """Return when what follows it ends: with the next one, or so many seconds after it."""
+        return self.until if seconds is None else min(self.until, self.at + seconds)
+
 
 @dataclass(frozen=True)
 class JudgedCriterion:

@@ -14,7 +14,7 @@ def speed_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of the speed of a test, and of its change."""
     for key, rated in (("speed", 1.0), ("speed_change", 0.0)):
         node = test.at(key)
-        if key in test and (kind.on_load or not kind.closed_loop):
+        if key in test and not kind.off_line:
             yield node.fault(f"not allowed with plant {kind.name}")
         for place in (node, *map(node.at, ("min", "start", "max"))):
             if place.number is not None and abs(place.number - rated) > FARTHEST:

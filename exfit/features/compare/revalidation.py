@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from exfit.dsp.features import features
-from exfit.inference.confidence import Interval
+from exfit.inference.confidence import Interval, holds
 from exfit.results.comparisons import Comparison, JudgedCriterion, StepFeatures
 from exfit.results.criteria import SignalToJudge, judged_signals
 from exfit.results.model import FitResult
@@ -63,7 +63,7 @@ def _parameters(old: FitResult, new: FitResult) -> Iterator[MovedParameter]:
         first, second = (each[name] for each in values)
         intervals = tuple(None if each is None else each.interval for each in own)
         within = [
-            None if interval is None else _holds(interval, value)
+            None if interval is None else holds(interval, value)
             for interval, value in zip(intervals, (second, first), strict=True)
         ]
         outcome: Literal["moved", "within an interval", "no interval"] = "no interval"
@@ -73,11 +73,6 @@ def _parameters(old: FitResult, new: FitResult) -> Iterator[MovedParameter]:
             outcome = "moved"
         both = intervals[0], intervals[1]
         yield MovedParameter(name, known.unit, (first, second), both, outcome)
-
-
-def _holds(interval: Interval, value: float) -> bool:
-    low, high = interval
-    return (low is None or value >= low) and (high is None or value <= high)
 
 
 def _signals(old: Comparison, new: Comparison) -> Iterator[tuple[str, SignalToJudge]]:
@@ -102,8 +97,7 @@ def _signals(old: Comparison, new: Comparison) -> Iterator[tuple[str, SignalToJu
 def _after(old: Comparison, first: Array, last: Array, end: float | None) -> StepFeatures:
     if old.event is None:
         return StepFeatures(None, None)
-    at, until = old.event.at, old.event.until
-    until = until if end is None else min(until, at + end)
+    window = old.event.at, old.event.until_within(end)
     kept = np.isfinite(first) & np.isfinite(last)
-    read = (features(old.time[kept], samples[kept], at, until) for samples in (first, last))
+    read = (features(old.time[kept], samples[kept], *window) for samples in (first, last))
     return StepFeatures(*read)

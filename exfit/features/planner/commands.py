@@ -359,7 +359,6 @@ def _export_every_unit(
     named = [
         f"{case}: no closed interval{told}: {', '.join(own)}"
         for case, own in fitted.undetermined.items()
-        if own
     ]
     if not fitted.changes:
         reasons = first_texts([*named, *(f"{unit.name}: {unit.reason}" for unit in left)])

@@ -6,6 +6,7 @@ are accepted.
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import isclose
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from exfit.features.planner.records import (
     read_values,
 )
 from exfit.features.planner.units import DynamicsUnits, Unit, read_units
+from exfit.inference.confidence import holds
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.tables import csv_text
@@ -109,13 +111,17 @@ def fitted_file(
                     raise ExfitError(f"several fits of the unit: {names}")
                 unit = _unit_of(place, units, file)
                 parts = [*_parts(fit.result, unit, file)]
-                own = [[*_edits(fit.result, part, prefix, file, whole)] for part, prefix in parts]
+                open_ones = [_undetermined(fit.result, *each) for each in parts]
+                own = [
+                    [*_edits(fit.result, *each, file, () if whole else kept)]
+                    for each, kept in zip(parts, open_ones, strict=True)
+                ]
             except ExfitError as fault:
                 left.append(LeftUnit(fit.name, str(fault), verified=True))
                 continue
-            undetermined[fit.name] = []
+            if any(open_ones):
+                undetermined[fit.name] = [*chain(*open_ones)]
             for (part, prefix), of_part in zip(parts, own, strict=True):
-                undetermined[fit.name] += _undetermined(fit.result, part, prefix)
                 edits += of_part
                 changes += _changes(fit, unit, part, prefix, of_part)
     pieces, end = [], 0
@@ -245,28 +251,28 @@ def _refuse_other_record(result: FitResult, part: Reading, prefix: str, place: s
 
 def _undetermined(result: FitResult, part: Reading, prefix: str) -> list[str]:
     """Fitted values without an interval, or with an open one that holds the value as found."""
-    symbols = list[str]()
-    for symbol in part.definition.symbols:
-        fitted = result.parameters.get(prefix + symbol)
-        if fitted is not None and not fitted.determined:
-            low, high = fitted.interval or (None, None)
-            found = part.values[symbol]
-            if (low is None or found >= low) and (high is None or found <= high):
-                symbols.append(symbol)
-    return symbols
+    fitted = {
+        symbol: result.parameters[prefix + symbol]
+        for symbol in part.definition.symbols
+        if prefix + symbol in result.parameters
+    }
+    return [
+        symbol
+        for symbol, own in fitted.items()
+        if not own.determined and holds(own.interval or (None, None), part.values[symbol])
+    ]
 
 
 def _edits(
-    result: FitResult, part: Reading, prefix: str, file: str, whole: bool
+    result: FitResult, part: Reading, prefix: str, file: str, kept: Container[str]
 ) -> Iterator[_Edit]:
     """Yield the fields of a record that change; raises ExfitError where values cannot be written.
 
     Typical values are not of the unit: their fields stay, and what no field holds is not missed. So
-    do those that are not determined, unless values are written as a ``whole``.
+    do those that are ``kept``.
     """
     definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
-    kept = () if whole else _undetermined(result, part, prefix)
     changed = _changed(result, part, prefix, values, kept)
     fields = fields_of(part)
     of_curve = definition.kind == "exciter" and changed & {*OF_SATURATION}

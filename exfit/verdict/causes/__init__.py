@@ -8,7 +8,7 @@ over.
 """
 
 from collections.abc import Mapping, Sequence
-from math import inf, isfinite
+from math import isfinite
 
 from exfit.case.case import Case
 from exfit.registry import parts
@@ -20,6 +20,7 @@ from exfit.verdict.causes.evidence import (
     Pace,
     Recogniser,
     Suspicion,
+    largest_likelihood,
 )
 from exfit.verdict.causes.levels import unsteady_record, wrong_levels, wrong_voltage
 
@@ -89,7 +90,7 @@ def _credible(
     from exfit.verdict.causes.recorder import averaging
 
     others = [each for recognise, own in found.items() if recognise != averaging for each in own]
-    most = max((each.likelihood for each in others if isfinite(each.likelihood)), default=-inf)
+    most = largest_likelihood(others)
     averages = [each for each in found.get(averaging, ()) if each.likelihood > most]
     return [*others, *averages]
 

@@ -1,10 +1,10 @@
 """What recognisers of causes work with: the evidence of a fit, the pace, and their suspicions."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, log
+from math import inf, isfinite, log
 from typing import NamedTuple
 
 from exfit import estimate
@@ -240,6 +240,12 @@ class Suspicion(NamedTuple):
     cause: Cause
     likelihood: float
     trial: Trial | None = None
+
+
+def largest_likelihood(suspicions: Iterable[Suspicion]) -> float:
+    """Return the largest likelihood of suspicions that are compared by it, -inf without any."""
+    finite = (each.likelihood for each in suspicions if isfinite(each.likelihood))
+    return max(finite, default=-inf)
 
 
 Recogniser = Callable[[Evidence], Iterator[Suspicion]]  # yields the causes of one kind

@@ -19,6 +19,7 @@ from exfit.verdict.causes.evidence import (
     OutOfTime,
     Suspicion,
     Trial,
+    largest_likelihood,
     likelihood,
     suspected,
 )
@@ -39,18 +40,18 @@ def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Susp
     no time for that, or none is better, it stands second if the first leaves much unexplained, else
     last.
     """
-    case = evidence.case
-    if case.kind.has_exciter and (case.kind.finds_rest or evidence.pace.untried):
-        return _with_untried(evidence, suspicions)  # an event takes too long
-    if not case.kind.has_exciter or _explained(evidence, suspicions):
+    kind, others = evidence.case.kind, list[Suspicion]()
+    if not kind.has_exciter:
         return [*suspicions]
-    try:
-        others = [*_better(evidence, suspicions)]
-    except (KeyboardInterrupt, OutOfTime) as ending:
-        evidence.pace.stopped((OTHERS,), isinstance(ending, KeyboardInterrupt))
-        return _with_untried(evidence, suspicions)
+    if not (kind.finds_rest or evidence.pace.untried):  # an event takes too long
+        if _explained(evidence, suspicions):
+            return [*suspicions]
+        try:
+            others += _better(evidence, suspicions)
+        except (KeyboardInterrupt, OutOfTime) as ending:
+            evidence.pace.stopped((OTHERS,), isinstance(ending, KeyboardInterrupt))
     if not others:
-        return _with_untried(evidence, suspicions)
+        return _with_unnamed(evidence, suspicions)
     return sorted([*suspicions, *others], key=lambda each: -each.likelihood)
 
 
@@ -92,9 +93,7 @@ def _better(evidence: Evidence, suspicions: Sequence[Suspicion]) -> Iterator[Sus
         for name, trial in found.items()
     }
     best = sorted(found, key=lambda name: -likelihoods[name])
-    so_far = max(
-        (each.likelihood for each in suspicions if isfinite(each.likelihood)), default=-inf
-    )
+    so_far = largest_likelihood(suspicions)
     named = [
         name
         for name in best[:MOST_NAMED]
@@ -110,7 +109,7 @@ def _better(evidence: Evidence, suspicions: Sequence[Suspicion]) -> Iterator[Sus
         yield from suspected(evidence, trial.cost, numbers, cause)
 
 
-def _with_untried(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
+def _with_unnamed(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
     """Return suspicions with that of a model that is not named."""
     samples = max(1, evidence.residuals.samples)
     noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
@@ -122,6 +121,5 @@ def _with_untried(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[S
         f"the model: the unit may be of another type than {evidence.case.subject}",
         "compare others: exfit rank CASE --models A,B",
     )
-    compared = [each.likelihood for each in suspicions if isfinite(each.likelihood)]
-    place = 1 if max(compared, default=inf) < own else len(suspicions)
+    place = 1 if -inf < largest_likelihood(suspicions) < own else len(suspicions)
     return [*suspicions[:place], Suspicion(cause, own), *suspicions[place:]]

@@ -25,8 +25,7 @@ def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
     for number, _, experiment in evidence.tests:
         own, recording = experiment.simulator, case.recordings[number]
         seen = case.seen_from(recording)
-        is_open = seen.kind.closed_loop and not seen.kind.on_load and case.external is None
-        if not is_open or SPEED in own.system.inputs:
+        if not seen.kind.off_line or case.external is not None or SPEED in own.system.inputs:
             continue
         system = system_of(seen, recording, (SPEED,))
         begin, end, steps = own.inputs.start, own.inputs.end, own.inputs.steps
@@ -52,12 +51,9 @@ def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
             "speed",
             {
                 evidence.place(number, f"test.{key}"): between(
-                    found, rated - FARTHEST, rated + FARTHEST
+                    trial.values[each.nuisance.name], each.low, each.high
                 )
-                for key, found, rated in (
-                    ("speed", speed, 1.0),
-                    ("speed_change", change_of_speed, 0.0),
-                )
+                for key, each in zip(("speed", "speed_change"), opened, strict=True)
             },
         )
         yield from suspected(evidence, trial, len(opened), cause, -RARE)
