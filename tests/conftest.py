@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import Ran
 from oracle import EXCITERS, SATURATED, SURROUNDED
+from settings import LINEAR_ALGEBRA
 from writers import prepare
 
 from exfit import cli
@@ -21,6 +22,7 @@ from exfit.output import figures
 from exfit.util import trust
 from exfit.util.interrupts import ENDING
 
+TESTS = Path(__file__).parent
 CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
 # one of each family: without a plant; commutators; rotating rectifiers; static; compound; a round
 # rotor and salient poles; a stabiliser of one input, one of two; two governors; limiters of each
@@ -40,10 +42,11 @@ hypothesis.settings.register_profile("all", max_examples=100, deadline=None, der
 def pytest_addoption(parser):
     parser.addoption(
         "--models",
-        choices=("few", "others", "long", "all"),
+        choices=("few", "others", "numerical", "long", "all"),
         default="few",
         help="few: one model of each family; others: the laws of models over all the others; "
-        "long: what takes long; all: every law over every model",
+        "numerical: these, and the linear algebra; long: what takes long; all: every law over "
+        "every model",
     )
 
 
@@ -104,6 +107,10 @@ def _is_selected(item, models):
     Over the others run the laws of the models themselves, and drawn inputs once more, in greater
     number.
     """
+    if models == "numerical":
+        of_algebra = any(item.path.is_relative_to(TESTS / folder) for folder in LINEAR_ALGEBRA)
+        also = of_algebra or item.path.name == "test_settings.py"
+        return _is_selected(item, "others") or (also and _is_selected(item, "few"))
     if item.get_closest_marker("every_example"):
         return False
     if (models == "long") != bool(item.get_closest_marker("long")):

@@ -1,7 +1,8 @@
 """Settings under which a machine computes as another would, and how to see that they took effect.
 
 ``python tests/support/settings.py oldest`` runs the numerical part of the tests under one of
-them, ``... oldest tests/cli`` other tests; further arguments go to pytest.
+them, ``... oldest tests/cli`` other tests; further arguments go to pytest. The laws of models
+run over the others: so many need no second look at the few.
 """
 
 import os
@@ -24,12 +25,12 @@ SETTINGS: dict[str, dict[str, str]] = {
 }
 SETTINGS["oldest"] = {**SETTINGS["prescott"], **SETTINGS["numpy"], **SETTINGS["x86-64"]}
 
+# folders whose tests compute by more than the models themselves
 LINEAR_ALGEBRA = (
     *("simulation", "dsp", "estimate", "inference", "fitting", "results/intervals", "verdict"),
     *("workflows", "features/events", "features/translate", "features/design"),
     *("features/programme", "features/compare", "features/rank", "features/external"),
 )
-NUMERICAL = ("engine", "models", "plants", *LINEAR_ALGEBRA)
 
 
 def faults(environment: Mapping[str, str]) -> Iterator[str]:
@@ -58,12 +59,10 @@ def openblas_cores() -> set[str]:
 
 
 def run(name: str, arguments: list[str]) -> None:
-    """Become pytest over the folders whose numbers a setting may change, or over those given."""
-    tests = Path(__file__).parents[1]
+    """Become pytest over the tests whose numbers a setting may change, or over those given."""
     given = any(Path(argument).exists() for argument in arguments)
-    folders = () if given else ("test_settings.py", *NUMERICAL)
-    paths = [str(tests / folder) for folder in folders]
-    command = [sys.executable, "-m", "pytest", *paths, *arguments]
+    which = () if given else (str(Path(__file__).parents[1]), "--models=numerical")
+    command = [sys.executable, "-m", "pytest", *which, *arguments]
     os.execve(sys.executable, command, {**os.environ, **SETTINGS[name]})
 
 
