@@ -129,6 +129,8 @@ def _changed(content: Any, place: Place, value: str) -> Any:
     if isinstance(key, int):
         items = [] if content is None else [*content]
         return [*items[:key], _changed((*items, None)[key], rest, value), *items[key + 1 :]]
+    if isinstance(content, str) and place == ("column",):
+        return _changed(content, (), value)
     entries = {"column": content} if isinstance(content, str) else {**(content or {})}
     if value or (rest and key in entries):
         return {**entries, key: _changed(entries.get(key), rest, value)}
@@ -179,6 +181,8 @@ class _Rewriting:
         while missing and (inner := _entry(node, missing[0])) is not None:
             above, node = node, inner
             del missing[0]
+        if missing == ["column"] and isinstance(node, yaml.ScalarNode):
+            missing = []  # the name of a column stands for the channel
         if value and missing:
             self._add(node, missing, value)
         elif value:

@@ -4,6 +4,7 @@ The unit's response to its recorded voltage depends, in swings, on its machine f
 exciter: where the recorded power swings otherwise by far, the record is not that of the unit.
 """
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import hypot, pi, sqrt
@@ -47,6 +48,7 @@ JUMP_AFTER_HOLD = 4.0  # times the usual change between samples
 LOST_VOLTAGE, LONGEST_LOSS = 0.05, 3  # pu, samples
 BESIDE_SPIKE, BEND = 2, 3.0  # samples; times what most bends stay below
 SCALE = "record.channels.{}.scale"  # the place of a factor
+COLUMN = "record.channels.{}.column"  # the place of a column; the change names its signal
 SPIKE = 8.0  # times the noise
 LEAST_SWING = 1e-3  # pu, rms: with less in record or response nothing can be compared
 LEAST_OVER_NOISE = 4.0  # times the noise of the record: the same
@@ -95,6 +97,8 @@ def _of_record(evidence: Evidence, number: int, changes: Changes) -> Changes:
         factor = getattr(given.channels.get(signal), "scale", 1.0)
         if place == SCALE.format(signal) and isinstance(factor, float):
             text = number_text(factor * float(text))
+        if place == COLUMN.format(signal):
+            text = json.dumps(getattr(given.channels[text], "column", text))
         place = place.replace("mask[0]", f"mask[{len(given.mask)}]")
         own[evidence.place(number, place)] = text
     return own
@@ -201,6 +205,8 @@ def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[C
         yield Cause(
             f"q rests at {q:.3g} pu, above {MOST_REACTIVE:g}, and p at {p:.3g} pu",
             "check whether the columns of p and q are exchanged",
+            "exchanged",
+            {COLUMN.format("p"): "q", COLUMN.format("q"): "p"},
         )
 
 

@@ -112,6 +112,17 @@ def inverted_power(folder):
     return path
 
 
+def exchanged_powers(folder):
+    """Write the case of a grid event whose columns of p and q are exchanged."""
+    path = faulty_events.drawn("H", 4, folder).sound  # p is above 0.75 pu
+    file = folder / yaml.safe_load(path.read_text())["record"]["file"]
+    heads, *rows = file.read_text().splitlines()
+    other = {"p": "q", "q": "p"}
+    heads = ",".join(other.get(each, each) for each in heads.split(","))
+    file.write_text("\n".join([heads, *rows, ""]))
+    return path
+
+
 # what looks for a cause -> what is planted for it
 PLANTED = {
     "iterations": partial(drawn, "too few iterations", COARSE),
@@ -142,6 +153,7 @@ PLANTED = {
     "further step": partial(drawn, "second step", COARSE),
     "recorder that averages": partial(drawn, "averaging recorder", COARSE),
     "record of the event": inverted_power,
+    "columns of p and q": exchanged_powers,
     "equation of the speed": partial(of_event, "dialect andes", 1),
     "governor": partial(of_event, "TGOV1", 1),
     "stabiliser": partial(of_event, "stabiliser", 1),
@@ -149,7 +161,10 @@ PLANTED = {
     "inertia and damping": partial(of_event, "H", 1),
     "transformer": partial(of_event, "transformer", 1),
 }
-OTHER_PLACES = {"polarity of a channel": "base of a channel"}  # one function sees both
+# one function sees both
+OTHER_PLACES = {
+    "polarity of a channel": "base of a channel", "columns of p and q": "record of the event",
+}  # fmt: skip
 
 
 def catalogue():
