@@ -1,9 +1,37 @@
-"""What governors share: limits that a unit at full load starts on or slightly beyond."""
+"""What governors share: limits a unit may start on, the dead band of the speed, the rating.
 
-from exfit.models.blocks import Signal, where
+A form with a dead band (TGOV1D) is no model of its own but the model (TGOV1) with DBH and DBL:
+its equations take ``outside_band(u.dw, p)`` for the speed, its sheet has ``*BAND``, its records are
+``banded``. ``governor`` makes the model: it adds Trate_Mbase to the sheet, makes of what is per
+unit of the turbine what is per unit of the machine, and says both behind the drawing.
+"""
+
+from collections.abc import Callable, Iterable
+from inspect import cleandoc
+from types import SimpleNamespace
+from typing import Any
+
+from exfit.models.blocks import Signal, clip, where
+from exfit.models.sheet import OF_TWO_PROGRAMS, Model, Parameter, Records, documented, record, sheet
 
 # pu: a recorded power is known to about 1 % (transformers of class 0.5), a limit to two decimals
 AT_LIMIT = 0.01
+
+BAND = sheet(
+    ("DBH", 0.0, "pu", (0.0, 1.0), "dead band above the rated speed"),
+    ("DBL", 0.0, "pu", (-1.0, 0.0), "dead band below the rated speed"),
+)
+RATED = sheet(("Trate_Mbase", 1.0, "1", (0.01, 100.0), "turbine rating over the machine's base"))
+OF_BAND = """
+The speed acts as far as it is outside its dead band, from DBL to DBH, which
+0 leaves out; a form with it has a D behind its name in a .dyr file."""
+OF_RATING = """
+All is per unit of the turbine, whose rating is Trate_Mbase times the machine's
+base: 1 where Trate (MW) is 0. A .dyr file does not have that base: an import
+names a Trate."""
+# what records hold that have the rating, or not, and no band
+ON_RATING = {"Trate_Mbase": 1.0}
+PLAIN = {"DBH": 0.0, "DBL": 0.0, **ON_RATING}
 
 
 def in_use(start: Signal, limit: Signal) -> Signal:
@@ -14,3 +42,52 @@ def in_use(start: Signal, limit: Signal) -> Signal:
     """
     near = (start - limit <= AT_LIMIT) & (limit - start <= AT_LIMIT)
     return where(near, start, limit)
+
+
+def outside_band(dw: Signal, p: Signal) -> Signal:
+    """Take the dead band off the change of the speed: without a step, as PowerWorld 24 does.
+
+    A band of 0 is left out: its two edges would be one corner, where nothing changes.
+    """
+    none = (p.DBH <= 0.0) & (p.DBL >= 0.0)
+    within = clip(dw, where(none, -1.0, p.DBL), where(none, 1.0, p.DBH))
+    return where(none, dw, dw - within)
+
+
+def banded(name: str, cons: str, **given: Any) -> Records:
+    """Return the records of a governor and of its form with a dead band, which has its rating."""
+    plain = record(name, cons, held=PLAIN, **given)
+    return (*plain, *with_band(name, cons, **{"doubt": OF_TWO_PROGRAMS, **given}))
+
+
+def with_band(name: str, cons: str, **given: Any) -> Records:
+    """Return the record of the form of a governor with a dead band."""
+    cons = f"{cons} DBH DBL Trate"
+    return record(f"{name}D", cons, held=ON_RATING, ignored="Trate", **given)
+
+
+def governor(
+    equations: Callable[..., Any],
+    rest: Callable[..., Any],
+    rows: Iterable[Parameter],
+    states: str,
+    text: str = "",
+    **given: Any,
+) -> Model:
+    """Return the documented model of a governor whose equations are per unit of its turbine."""
+    rows = (*rows, *RATED)
+    text = f"{text or cleandoc(equations.__doc__ or '')}\n"
+    text += "".join(OF_BAND for row in rows if row.symbol == "DBH") + OF_RATING
+
+    def output(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+        return p.Trate_Mbase * equations(s, of_turbine(u, p), p, d)
+
+    def at_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+        return rest(pm / p.Trate_Mbase, of_turbine(u, p), p, x)
+
+    return documented(output, at_rest, rows, states, text=text, **given)
+
+
+def of_turbine(u: Signal, p: Signal) -> SimpleNamespace:
+    """Return the inputs of a governor with the power per unit of the turbine."""
+    return SimpleNamespace(**{**vars(u), "p": u.p / p.Trate_Mbase})

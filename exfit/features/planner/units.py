@@ -346,19 +346,15 @@ def _attached(
 def _on_its_base(
     governor: Reading, heads: Iterable[Head], warnings: list[DynamicsFault]
 ) -> Reading:
-    """Return a governor with the share of its base in the machine's, or add that it is another."""
+    """Return a governor with the share of its base in the machine's, or add that this is unknown."""
     bases = {head.definition.kind: head.base for head in heads if head.definition is not None}
     own, machine = bases.get("governor"), bases.get("machine")
     if own is None or own == machine:
         return governor
-    if machine is not None and machine > 0.0 and SHARE in governor.values:
+    if machine is not None and machine > 0.0:
         return replace(governor, values={**governor.values, SHARE: own / machine})
-    theirs = "is not in the file" if machine is None else f"is {show(machine)} MVA"
-    name = governor.definition.record.name
-    text = (
-        f"{name}: its values are on {show(own)} MW and not converted; the machine's base {theirs}"
-    )
-    warnings.append(DynamicsFault(governor.line, text))
+    text = f"its values are on {show(own)} MW; the machine's base is not in the file (1 is taken)"
+    warnings.append(DynamicsFault(governor.line, f"{governor.definition.record.name}: {text}"))
     return governor
 
 

@@ -16,7 +16,14 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.governor_parts import in_use
+from exfit.models.governor_parts import (
+    BAND,
+    ON_RATING,
+    banded,
+    governor,
+    in_use,
+    outside_band,
+)
 from exfit.models.sheet import (
     DIVIDING_TIME,
     LONG_TIME,
@@ -24,7 +31,6 @@ from exfit.models.sheet import (
     UP_TO_10,
     UP_TO_100,
     WITHIN_10,
-    documented,
     limits,
     record,
     sheet,
@@ -52,7 +58,7 @@ def gast(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
         in_use(s.VMAX0, p.VMAX),
         in_use(s.AT0, p.AT),
     )
-    demand = smaller(u.pref - u.dw / p.R, allowed + p.KT * (allowed - s.V3))
+    demand = smaller(u.pref - outside_band(u.dw, p) / p.R, allowed + p.KT * (allowed - s.V3))
     v1, d.V1 = limited_lag(demand, s.V1, 1.0, p.T1, low, high)
     v2, d.V2 = lag(v1, s.V2, 1.0, p.T2)
     _, d.V3 = lag(v2, s.V3, 1.0, p.T3)
@@ -66,7 +72,7 @@ def gast_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return pm
 
 
-GAST = documented(
+GAST = governor(
     gast,
     gast_rest,
     sheet(
@@ -78,9 +84,11 @@ GAST = documented(
         ("KT", 3.0, "1", (0.0, 1000.0), "temperature limiter gain"),
         *limits("VMAX", 1.0, 0.0, "the valve", WITHIN_10),
         ("Dturb", 0.18, *UP_TO_100, "turbine damping"),
+        *BAND,
     ),
     "V1 V2 V3",
-    records=record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),
+    aliases="GASTD",
+    records=banded("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),
     setpoints="VMAX0 VMIN0 AT0",
 )
 
@@ -174,9 +182,7 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     time step before and Ka times step times (Aset - acceleration); here that step
     is 10 ms. Ka = 0 leaves the limiter out (there it lets no valve open). Dm < 0
     multiplies wf on its way to fsrt with (1 + dw)^Dm. pref is a speed, R times the
-    droop at rest; where Rselect = 0, it is 0. Trate_Mbase is the turbine's rating
-    over the machine's base, 1 where PSS/E's Trate (MW) is 0. A .dyr file does not
-    have that base: an import names a Trate, by which the valve is that of
+    droop at rest; where Rselect = 0, it is 0. By its Trate the valve is that of
     PowerWorld 24 within 1e-6 pu at rest.
 
     The equations are those of InterPSS, which has compared them with PowerWorld. In
@@ -192,7 +198,7 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
         in_use(s.Ldref0, p.Ldref),
     )
     full = fully_open(p, high)
-    pe, d.PE = lag(u.p / p.Trate_Mbase, s.PE, 1.0, p.Tpelec)
+    pe, d.PE = lag(u.p, s.PE, 1.0, p.Tpelec)
     power_error = p.Kimw * (s.PE0 - pe)
     mw, d.MW = limited_integrator(power_error, s.MW, 1.0, -1.1 * p.R, 1.1 * p.R)
     acceleration, d.ACC = washout(u.dw, s.ACC, 1.0, p.Ta)
@@ -217,14 +223,14 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     velocity = clip((fsr - valve) / p.Tact, p.Rclose, p.Ropen)
     d.VALVE = limited(velocity, s.VALVE, low, high)
     power, d.TURB = lead_lag(p.Kturb * (wf - p.Wfnl), s.TURB, p.Tc, p.Tb)
-    return p.Trate_Mbase * (power - larger(p.Dm, 0.0) * (1.0 + u.dw))
+    return power - larger(p.Dm, 0.0) * (1.0 + u.dw)
 
 
 def ggov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
-    x.PE = x.PE0 = u.p / p.Trate_Mbase
+    x.PE = x.PE0 = u.p
     x.MW = x.DERIV = x.ACC = 0.0
-    x.TURB = pm / p.Trate_Mbase + larger(p.Dm, 0.0)
+    x.TURB = pm + larger(p.Dm, 0.0)
     x.VALVE = x.INTEG = x.TEMP = x.TEMPM = x.TURB / p.Kturb + p.Wfnl
     x.VMAX0, x.VMIN0 = larger(p.VMAX, x.VALVE), smaller(p.VMIN, x.VALVE)
     x.Ldref0 = larger(p.Ldref, x.TURB)
@@ -234,7 +240,7 @@ def ggov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return p.R * where(p.Rselect < -1.5, x.VALVE, droop(x.PE, x.VALVE, p))
 
 
-GGOV1 = documented(
+GGOV1 = governor(
     ggov1,
     ggov1_rest,
     sheet(
@@ -268,7 +274,6 @@ GGOV1 = documented(
         ("db", 0.0, "pu", (0.0, 1.0), "dead band of the speed error"),
         ("Tsa", 4.0, *TIME, "lead of the exhaust temperature"),
         ("Tsb", 5.0, *TIME, "lag of the exhaust temperature"),
-        ("Trate_Mbase", 1.0, "1", (0.01, 100.0), "turbine rating over the machine's base"),
     ),
     "PE MW DERIV INTEG VALVE TURB TEMP TEMPM LOAD ACC FSRA",
     records=record(
@@ -278,7 +283,7 @@ GGOV1 = documented(
         icons={"Rselect": 1, "Flag": 0},
         absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
         ignored="Trate",
-        held={"Trate_Mbase": 1.0},
+        held=ON_RATING,
     ),
     pslf_records=record(
         "ggov1",
@@ -288,7 +293,7 @@ GGOV1 = documented(
         icons={"Rselect": 1, "Flag": 0},
         absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
         ignored="PMWSET",
-        held={"Trate_Mbase": 1.0},
+        held=ON_RATING,
     ),
     setpoints="PE0 VMAX0 VMIN0 Ldref0",
 )

@@ -10,13 +10,21 @@ from exfit.models.blocks import (
     limited_lag,
     smaller,
 )
-from exfit.models.governor_parts import in_use
+from exfit.models.governor_parts import (
+    BAND,
+    PLAIN,
+    banded,
+    governor,
+    in_use,
+    outside_band,
+    with_band,
+)
 from exfit.models.sheet import (
     DIVIDING_TIME,
+    OF_TWO_PROGRAMS,
     TIME,
     UP_TO_100,
     WITHIN_10,
-    documented,
     limits,
     record,
     sheet,
@@ -24,6 +32,8 @@ from exfit.models.sheet import (
 
 # a dead band and a valve's curve, which the model does not have
 NOT_MODELLED = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6"
+CONS = "K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8"
+LOW_PRESSURE = dict.fromkeys(["K2", "K4", "K6", "K8"], 0.0)  # shares of a second machine
 
 
 def ieeeg1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -50,7 +60,7 @@ def ieeeg1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     Typical data are those of IEC 61970-302 (GovSteamIEEE1).
     """
     low, high = in_use(s.PMIN0, p.PMIN), in_use(s.PMAX0, p.PMAX)
-    v1, d.V1 = lead_lag(p.K * u.dw, s.V1, p.T2, p.T1)
+    v1, d.V1 = lead_lag(p.K * outside_band(u.dw, p), s.V1, p.T2, p.T1)
     valve = clip(s.VALVE, low, high)
     velocity = clip((u.pref - v1 - valve) / p.T3, p.UC, p.UO)
     d.VALVE = limited(velocity, s.VALVE, low, high)
@@ -69,7 +79,7 @@ def ieeeg1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return x.VALVE
 
 
-IEEEG1 = documented(
+IEEEG1 = governor(
     ieeeg1,
     ieeeg1_rest,
     sheet(
@@ -88,18 +98,19 @@ IEEEG1 = documented(
         ("K5", 0.5, "1", (0.0, 10.0), "share behind the third boiler pass"),
         ("T7", 0.0, *TIME, "fourth boiler pass lag"),
         ("K7", 0.0, "1", (0.0, 10.0), "share behind the fourth boiler pass"),
+        *BAND,
     ),
     "V1 VALVE V4 V5 V6 V7",
-    records=record(
-        "IEEEG1",
-        "K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8",
-        icons={"JBUS": 0, "M": 0},
-        absent={"K2": 0.0, "K4": 0.0, "K6": 0.0, "K8": 0.0},
+    aliases="IEEEG1D",
+    records=(
+        *record("IEEEG1", CONS, icons={"JBUS": 0, "M": 0}, absent=LOW_PRESSURE, held=PLAIN),
+        *with_band("IEEEG1", CONS, absent=LOW_PRESSURE, doubt=OF_TWO_PROGRAMS),
     ),
     pslf_records=record(
         "ieeeg1",
-        f"K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8 {NOT_MODELLED}",
-        absent=dict.fromkeys(["K2", "K4", "K6", "K8", *NOT_MODELLED.split()], 0.0),
+        f"{CONS} {NOT_MODELLED}",
+        absent={**LOW_PRESSURE, **dict.fromkeys(NOT_MODELLED.split(), 0.0)},
+        held=PLAIN,
     ),
     setpoints="PMAX0 PMIN0",
 )
@@ -125,7 +136,7 @@ def ieesgo(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     there. T1, T4, T5 or T6 = 0 bypasses its block. Typical data are those of a unit
     in a public library (iTesla, REN), with limits of 0 and 1.
     """
-    v1, d.V1 = lag(u.dw, s.V1, p.K1, p.T1)
+    v1, d.V1 = lag(outside_band(u.dw, p), s.V1, p.K1, p.T1)
     v3, d.V3 = lead_lag(v1, s.V3, p.T2, p.T3)
     demand = clip(u.pref - v3, in_use(s.PMIN0, p.PMIN), in_use(s.PMAX0, p.PMAX))
     v4, d.V4 = lag(demand, s.V4, 1.0, p.T4)
@@ -141,7 +152,7 @@ def ieesgo_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return pm
 
 
-IEESGO = documented(
+IEESGO = governor(
     ieesgo,
     ieesgo_rest,
     sheet(
@@ -155,9 +166,11 @@ IEESGO = documented(
         ("K2", 0.7, "1", (0.0, 10.0), "share behind the reheater"),
         ("K3", 1.0, "1", (-10.0, 10.0), "share of that behind the crossover"),
         *limits("PMAX", 1.0, 0.0, "the power demand", WITHIN_10),
+        *BAND,
     ),
     "V1 V3 V4 V5 V6",
-    records=record("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN"),
+    aliases="IEESGOD",
+    records=banded("IEESGO", "T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN"),
     setpoints="PMAX0 PMIN0",
 )
 
@@ -175,7 +188,8 @@ def tgov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     data are those of IEC 61970-302 (GovSteam0).
     """
     low, high = in_use(s.VMIN0, p.VMIN), in_use(s.VMAX0, p.VMAX)
-    v1, d.V1 = limited_lag((u.pref - u.dw) / p.R, s.V1, 1.0, p.T1, low, high)
+    demand = (u.pref - outside_band(u.dw, p)) / p.R
+    v1, d.V1 = limited_lag(demand, s.V1, 1.0, p.T1, low, high)
     v3, d.V3 = lead_lag(v1, s.V3, p.T2, p.T3)
     return v3 - p.Dt * u.dw
 
@@ -187,7 +201,7 @@ def tgov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return p.R * pm
 
 
-TGOV1 = documented(
+TGOV1 = governor(
     tgov1,
     tgov1_rest,
     sheet(
@@ -197,9 +211,11 @@ TGOV1 = documented(
         ("T2", 3.0, *TIME, "reheater lead"),
         ("T3", 10.0, *TIME, "reheater lag"),
         ("Dt", 0.0, *UP_TO_100, "turbine damping"),
+        *BAND,
     ),
     "V1 V3",
-    records=record("TGOV1", "R T1 VMAX VMIN T2 T3 Dt"),
-    pslf_records=record("tgov1", "R T1 VMAX VMIN T2 T3 Dt"),
+    aliases="TGOV1D",
+    records=banded("TGOV1", "R T1 VMAX VMIN T2 T3 Dt"),
+    pslf_records=record("tgov1", "R T1 VMAX VMIN T2 T3 Dt", held=PLAIN),
     setpoints="VMAX0 VMIN0",
 )

@@ -100,13 +100,17 @@ def governed(base, record):
     return read_unit(f"{PSLF_UNIT}{text}\n", "a.dyd", 1)
 
 
-def test_the_base_of_a_governor_is_its_share_of_the_machine_s_or_is_named():
-    assert not [text for _, text in governed(120.0, "tgov1").warnings if "not converted" in text]
-    (warning,) = [text for _, text in governed(90.0, "tgov1").warnings if "on 90 MW" in text]
-    assert warning.endswith("the machine's base is 120 MVA")
-    unit = governed(90.0, "ggov1")
-    assert unit.governor.values["Trate_Mbase"] == 0.75
-    assert not [text for _, text in unit.warnings if "not converted" in text]
+@pytest.mark.parametrize("record", ["tgov1", "ggov1"])
+def test_the_base_of_a_governor_is_its_share_of_the_machine_s_or_is_named(record):
+    for base, share in ((120.0, 1.0), (90.0, 0.75)):
+        unit = governed(base, record)
+        assert unit.governor.values["Trate_Mbase"] == share
+        assert not [text for _, text in unit.warnings if " MW" in text]
+    text = PSLF_UNIT.replace("mva=120.0 ", "")
+    values = dict(typical(DEFINITIONS[record].model.sheet))
+    text += record_text(DEFINITIONS[record], values, 1, "1").replace("#9", "#9 mwcap=90")
+    (warning,) = [text for _, text in read_unit(text, "a.dyd", 1).warnings if "on 90 MW" in text]
+    assert "the machine's base is not in the file" in warning
 
 
 def test_efd_is_multiplied_by_the_speed_where_the_record_says_so():
