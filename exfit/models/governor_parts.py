@@ -6,12 +6,13 @@ its equations take ``outside_band(u.dw, p)`` for the speed, its sheet has ``*BAN
 unit of the turbine what is per unit of the machine, and says both behind the drawing.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from inspect import cleandoc
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
-from exfit.models.blocks import Signal, clip, where
+from exfit.models.blocks import Limited, Signal, clip, inf, limited, where
 from exfit.models.sheet import OF_TWO_PROGRAMS, Model, Parameter, Records, documented, record, sheet
 
 # pu: a recorded power is known to about 1 % (transformers of class 0.5), a limit to two decimals
@@ -91,3 +92,27 @@ def governor(
 def of_turbine(u: Signal, p: Signal) -> SimpleNamespace:
     """Return the inputs of a governor with the power per unit of the turbine."""
     return SimpleNamespace(**{**vars(u), "p": u.p / p.Trate_Mbase})
+
+
+def backlash(x: Signal, y: Signal, width: Signal) -> tuple[Signal, Limited]:
+    """Play: y stays until x is farther than ``width`` from it, and then follows at that distance.
+
+    A width of 0 is none.
+    """
+    none = width <= 0.0
+    low, high = where(none, -inf, x - width), where(none, inf, x + width)
+    return where(none, x, clip(y, low, high)), limited(0.0, y, low, high)
+
+
+def curve(x: Signal, xs: Sequence[Signal], ys: Sequence[Signal]) -> Signal:
+    """Return y on the lines through points (K,) that rise, the first and the last without end.
+
+    Of two points at the same place the second is left out.
+    """
+    points = list(zip(xs, ys, strict=True))
+    y: Signal = 0.0
+    for k, ((x0, y0), (x1, y1)) in enumerate(pairwise(points)):
+        run = x1 - x0
+        line = y0 + (x - x0) * (y1 - y0) / where(run > 0.0, run, 1.0)
+        y = line if k == 0 else where(x > x0, line, y)
+    return y

@@ -346,7 +346,7 @@ def _attached(
 def _on_its_base(
     governor: Reading, heads: Iterable[Head], warnings: list[DynamicsFault]
 ) -> Reading:
-    """Return a governor with the share of its base in the machine's, or add that this is unknown."""
+    """Return a governor with its base as a share of the machine's, or add that this is unknown."""
     bases = {head.definition.kind: head.base for head in heads if head.definition is not None}
     own, machine = bases.get("governor"), bases.get("machine")
     if own is None or own == machine:
