@@ -353,10 +353,11 @@ def record_of_2016(
     switches: str = "",
     places: Mapping[int, str] = NONE,
     doubt: str = "",
+    user: str = "",
 ) -> Records:
     """Return a record whose integers say where limiters act, its flags, and what it switches."""
     icons = dict.fromkeys(f"{flags} {switches}".split(), 1)
-    return record(name, cons, icons=icons, ignored=flags, places=places, doubt=doubt)
+    return record(name, cons, icons=icons, ignored=flags, places=places, doubt=doubt, user=user)
 
 
 # what is not settled about orders of PSLF

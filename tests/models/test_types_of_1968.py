@@ -28,19 +28,21 @@ class Type2:
     def rest(self, u):
         p, efd = self.p, u["efd"]
         vr = p["KE"] * efd + two_points(efd, p["E2"], p["SE2"], p["E1"], p["SE1"])
-        return [u["vt"], vr, efd, vr, 0.0]
+        return [u["vt"], vr, efd, vr, 0.0, vr / p["KA"]]
 
     def slopes(self, x, u):
-        p, (seen, vr, efd, slow, fed) = self.p, x
+        p, (seen, vr, efd, slow, fed, late) = self.p, x
         field = p["KE"] * efd + two_points(efd, p["E2"], p["SE2"], p["E1"], p["SE1"])
         rate = (vr - slow) / p["TF1"]
-        drive = p["KA"] * (u["vref"] - seen - fed)
+        lead = (u["vref"] - seen - fed - late) / p["TB"]
+        drive = p["KA"] * (late + p["TC"] * lead)
         return [
             (u["vt"] - seen) / p["TR"],
             (drive - vr) / p["TA"],
             (vr - field) / p["TE"],
             rate,
             (p["KF"] * rate - fed) / p["TF2"],
+            lead,
         ]
 
 
@@ -75,7 +77,7 @@ class Type3:
 
 VR, EFD = 1, 2
 CASES = {
-    "IEEET2": (Type2, {"TR": 0.02, "KF": 0.05, "VRMAX": 6.0, "VRMIN": 1.5}),
+    "IEEET2": (Type2, {"TR": 0.02, "TB": 0.5, "TC": 0.2, "KF": 0.05, "VRMAX": 6.0, "VRMIN": 1.5}),
     "IEEET3": (Type3, {"TR": 0.02, "VRMAX": 1.0, "VRMIN": 0.2, "KP": 1.5, "VBMAX": 3.6}),
 }
 

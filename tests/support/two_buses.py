@@ -10,13 +10,18 @@ has this network.
 import csv
 import json
 from contextlib import nullcontext
+from itertools import pairwise
 from unittest.mock import patch
 
 import numpy as np
 from places import REFERENCE
 
+from exfit.engine.trace import exp, log
 from exfit.features.planner.units import read_unit
 from exfit.models import GOVERNORS
+from exfit.models.blocks import lag
+from exfit.models.machines import genqec
+from exfit.models.machines.round_rotor import transient_time, unsaturated_q_current
 from exfit.models.speed_multiplier import times_speed
 from exfit.plants import (
     GOVERNOR,
@@ -76,6 +81,24 @@ def without_bus_frequency():
     )
 
 
+def genqec_of_powerworld():
+    """Return GENQEC with a power of the flux as its saturation, and X''d in the slope of E'd.
+
+    PowerWorld 24 has X''d there for X''q, and that saturation where the flag is 0.
+    """
+
+    def saturated(flux, it, p):
+        return p.S10 * exp(log(p.S12 / p.S10) / log(1.2) * log(flux))
+
+    def q_slopes(s, i, p, d):
+        by, i_q = 1.0 + s.SAT, genqec.unsaturated(s, i).q
+        d.EDP = -by * unsaturated_q_current(s, i_q, p.Xppd, p) / transient_time(p)
+        _, d.PSIQ = lag(s.EDP + (p.Xpq - p.Xl) * i_q, s.PSIQ, 1.0, p.Tppq0 / by)
+
+    machine = genqec.machine("GENQEC", genqec.KW, saturated, "")
+    return machine._replace(q_slopes=q_slopes)
+
+
 class TwoBuses:
     """The unit of a case, with the values that its records are imported as, or some changed."""
 
@@ -102,7 +125,9 @@ class TwoBuses:
         exciter = parts.exciter.definition.model.in_dialect(dialect)
         self.unit = UnitOnLoad(
             times_speed(exciter) if "efd_times_speed" in told else exciter,
-            parts.machine.definition.model,
+            genqec_of_powerworld()
+            if "form_of_powerworld" in told
+            else parts.machine.definition.model,
             SATURATION["quadratic"],
             stabiliser,
             governor=governor,
@@ -110,13 +135,14 @@ class TwoBuses:
             limiters=tuple(limiters),
         )
         network = {"f0": 60.0, "R": 0.0, "X": LINE, "Ra": 0.0, "Rc": 0.0, "Xc": 0.0, "P": P, "Q": Q}
-        network |= {"Rs": 0.0, "Xs": SOURCE}
+        network |= {"Rs": 0.0, "Xs": SOURCE} | told.get("compensation", {})
         if "load" in told:
             load = {"PL": LOAD[0], "QL": LOAD[1]}
         else:
             square = abs(1.0 - 1j * LINE * (P - 1j * Q)) ** 2
             load = {"YP": LOAD[0] / square, "YQ": -LOAD[1] / square}
         self.values = values | prefixed(NETWORK, network | load) | {VT0: 1.0} | changes
+        self.step = told.get("step")
         self.load, self.pulse, self.boost = frozenset(load), told.get("vref"), told.get("boost")
         boosted, disturbed = self.boost is not None, not self.pulse
         self.moved = ("vref", *(["vs"] if boosted else []), *(["fault_B"] if disturbed else []))
@@ -150,12 +176,30 @@ class TwoBuses:
         )
 
     def shown(self, times):
-        """Return what the unit shows at some instants."""
+        """Return what the unit shows at some instants, in the steps of a case that has some."""
+        if self.step:
+            return self.stepped(times)
         inputs = self.inputs(max(times) + STEP)
         with without_bus_frequency() if self.unit.hears_frequency else nullcontext():
             simulator = Simulator(self.system, inputs, np.array(times, dtype=float), STEP)
             signals = simulator.response(self.values).signals
         return [{name: x[k] for name, x in signals.items()} for k in range(len(times))]
+
+    def stepped(self, times):
+        """Return the same by Heun's rule, in steps that a switching divides."""
+        system, shown = self.system, {}
+        states, setpoints = system.rest(self.values)
+        ends = np.union1d(np.arange(0.0, max(times) + self.step, self.step), FAULT)
+        for start, end in pairwise(ends):
+            fault = -1.0 / SHUNT if FAULT[0] <= start < FAULT[1] else 0.0
+            inputs = {**dict.fromkeys(self.moved, 0.0), "fault_B": fault}
+            now = system.motion(self.values, setpoints, states, inputs)
+            shown[round(start, 6)] = now.outputs
+            ahead = {x: states[x] + (end - start) * now.slopes[x] for x in states}
+            then = system.motion(self.values, setpoints, ahead, inputs)
+            slopes = {x: 0.5 * (now.slopes[x] + then.slopes[x]) for x in states}
+            states = {x: states[x] + (end - start) * slopes[x] for x in states}
+        return [shown[t] for t in times]
 
 
 class BehindALine(TwoBuses):

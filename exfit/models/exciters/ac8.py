@@ -155,19 +155,32 @@ def ac8c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return at_rest(efd, supply(p.KC1 * vfe, u, p), u, p, x)
 
 
+OF_AC8C = (
+    "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN E1 SE1 E2 SE2 "
+    "KP KI XL THETAP KC1 VBMAX"
+)
 AC8C = documented(
     ac8c,
     ac8c_rest,
     (*AC8B.sheet, *ALTERNATOR_SUPPLY),
     "VC VI VD VR VE",
-    aliases="ESAC8C",
-    records=record_of_2016(
-        "AC8C",
-        "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN E1 SE1 E2 "
-        "SE2 KP KI XL THETAP KC1 VBMAX",
-        switches="VOS SW1",
-        places=TWO_GATES,
-        doubt="PSS/E 36 reads constants in this order as AC8CU1, a user's model of five integers",
+    aliases="ESAC8C AC8CU1",
+    records=(
+        *record_of_2016(
+            "AC8C",
+            OF_AC8C,
+            switches="VOS SW1",
+            places=TWO_GATES,
+            doubt="PSS/E 36 reads constants in this order as AC8CU1",
+        ),
+        *record_of_2016(
+            "AC8CU1",
+            OF_AC8C,
+            flags="OEL UEL SCL",
+            switches="VOS SW1",
+            places=TWO_GATES,
+            user="2 0 5 27 5 3",
+        ),
     ),
 )
 

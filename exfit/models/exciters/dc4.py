@@ -148,6 +148,9 @@ def dc4c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return u.vc1 + error - u.vs
 
 
+OF_DC4C = (
+    "TR KPR KIR KDR TDR VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2 KP KI XL THETAP KC1 VBMAX"
+)
 DC4C = documented(
     dc4c,
     dc4c_rest,
@@ -159,12 +162,17 @@ DC4C = documented(
     ),
     "VC VI VD VR EFD VF",
     doubt="rests on one public diagram for the load of its supply (KC1), that of InterPSS",
-    records=record_of_2016(
-        "DC4C",
-        "TR KPR KIR KDR TDR VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2 KP KI XL THETAP KC1 "
-        "VBMAX",
-        flags="OEL UEL SCL",
-        switches="SW1",
-        doubt="PSS/E 36 reads constants in this order as DC4CU1, a user's model",
+    aliases="DC4CU1",
+    records=(
+        *record_of_2016(
+            "DC4C",
+            OF_DC4C,
+            flags="OEL UEL SCL",
+            switches="SW1",
+            doubt="PSS/E 36 reads constants in this order as DC4CU1",
+        ),
+        *record_of_2016(
+            "DC4CU1", OF_DC4C, flags="OEL UEL SCL", switches="SW1", user="2 0 4 24 6 6"
+        ),
     ),
 )

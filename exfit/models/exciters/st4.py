@@ -20,6 +20,7 @@ from exfit.models.sheet import (
     PID_GAIN,
     SHORT_TIME,
     TWO_GATES,
+    Records,
     documented,
     limits,
     record,
@@ -158,6 +159,19 @@ def st4c_rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return u.vc1 + error - u.vs
 
 
+def record_of_st4c(name: str, user: str = "") -> Records:
+    """Return a record of ST4C, with the integers behind the name of a user's model."""
+    return record(
+        name,
+        "TR KPR KIR VRMAX VRMIN KPM KIM VMMAX VMMIN TA VAMAX VAMIN KG TG VGMAX KP KI XL THETAP KC "
+        "VBMAX",
+        icons={"VOS": 1, "OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+        ignored="OEL UEL SCL",
+        places=TWO_GATES,
+        user=user,
+    )
+
+
 ST4C = documented(
     st4c,
     st4c_rest,
@@ -171,13 +185,6 @@ ST4C = documented(
         *shared(VGMAX=5.8, SW1=1.0),
     ),
     "VC VR VM VA VG",
-    aliases="ESST4C",
-    records=record(
-        "ST4C",
-        "TR KPR KIR VRMAX VRMIN KPM KIM VMMAX VMMIN TA VAMAX VAMIN KG TG VGMAX KP KI XL THETAP KC "
-        "VBMAX",
-        icons={"VOS": 1, "OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-        ignored="OEL UEL SCL",
-        places=TWO_GATES,
-    ),
+    aliases="ESST4C ST4CU1",
+    records=(*record_of_st4c("ST4C"), *record_of_st4c("ST4CU1", user="4 0 5 21 5 0")),
 )

@@ -14,7 +14,7 @@ from exfit.models.machines.machine import (
     saturation_order,
     unsaturated_quadrature,
 )
-from exfit.models.sheet import sheet
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     *of_machine(Tpd0=6.35, H=3.25, D=0.0),
@@ -81,4 +81,5 @@ ONE_AXIS = Machine(
     rest=rest,
     quadrature=unsaturated_quadrature,
     faults=faults,
+    records=record("GENTRA", "Tpd0 H D Xd Xq Xpd S10 S12 AF", ignored="AF"),
 )
