@@ -4,13 +4,15 @@ Each is refused with what it is and with the command, or the file, that was mean
 """
 
 import os
+import re
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 import click
 
-from exfit.errors import ExfitError
+from exfit.errors import CaseError, ExfitError
 from exfit.util.files import refuse_bytes
 
 RECORDS = (
@@ -19,6 +21,8 @@ RECORDS = (
 )  # fmt: skip
 CASES = (".yaml", ".yml")
 DYNAMICS_FILES = (".dyr", ".dyd")  # of PSS/E, of PSLF
+# at the begin of a line, where it is one of the keys at the top
+KEY_OF_CASE = re.compile("^(plant|tests?|record)[ \\t]*:", re.MULTILINE)
 RESULT, PARAMETERS = "result.json", "parameters.yaml"
 
 
@@ -117,6 +121,11 @@ def _kind_of(path: Path) -> Kind | None:
         return Kind.RESULT
     if suffix not in CASES:
         return None
+    from exfit.case.yaml import read_text
+
+    with suppress(CaseError):
+        if KEY_OF_CASE.search(read_text(path)):
+            return Kind.CASE
     from exfit.case.peek import keys_of
 
     keys = keys_of(path)

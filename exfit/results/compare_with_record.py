@@ -61,6 +61,7 @@ def compare_with_record(
         moves = [{parameter.name: 1.0} for parameter in setup.free]
     event = _event(setup, setup.record.time, at)
     stepped = event is not None and event.of_vref
+    # an argument left out would be another key
     step_of = cache(partial(_step_features, setup, overlays, samples, at, moves, measured))
     comparison = Comparison(
         name=setup.name,
@@ -68,7 +69,7 @@ def compare_with_record(
         cost=0.5 * float(errors @ errors),
         accepted=True,
         channels=channels,
-        features=step_of("vt") if stepped else StepFeatures(None, None),
+        features=step_of("vt", None) if stepped else StepFeatures(None, None),
         notes=setup.record.notes,
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
@@ -158,7 +159,7 @@ def _step_features(
     moves: Sequence[Values],
     read: Features | None,
     signal: str,
-    end: float | None = None,
+    end: float | None,
 ) -> StepFeatures:
     """Return the features of a signal without its periodic disturbances, after the first event.
 

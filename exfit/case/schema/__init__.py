@@ -4,7 +4,7 @@ Here is the whole of the file. The descriptions reach editors through
 the JSON Schema, and the documentation of the keys.
 """
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
@@ -49,6 +49,7 @@ from exfit.case.schema.values import (
     FreeSection,
     Frozen,
     GivenAs,
+    Later,
     MachineId,
     MedianSection,
     Number,
@@ -205,7 +206,7 @@ class CriteriaSection(Section):
         description="YAML file with source and limits, relative to the case.",
     )
     source: Text | None = Field(default=None, description="Who set the limits, and where.")
-    limits: tuple[CriterionSection, ...] = Field(
+    limits: tuple[Later[CriterionSection], ...] = Field(
         default=(),
         min_length=1,
         description="The criteria. Without any the report alone judges, by rms 5 %, final value "
@@ -247,41 +248,39 @@ class CaseDocument(Section):
         description="Whether the exciter's output is multiplied by the speed of the machine, as "
         "spdmlt in PSLF; it acts where the speed is simulated or recorded.",
     )
-    plant: Annotated[Plant, Field(discriminator="type")] = Field(
-        description="The plant: what surrounds the exciter during the test."
-    )
-    stabiliser: Stabiliser | None = Field(
+    plant: Plant = Field(description="The plant: what surrounds the exciter during the test.")
+    stabiliser: Later[Stabiliser] | None = Field(
         default=None, description="A power system stabiliser; it acts on load only."
     )
-    governor: Governor | None = Field(
+    governor: Later[Governor] | None = Field(
         default=None,
         description="A turbine with its governor; it acts where the speed follows from the power. "
         "Default: the power of the turbine is constant.",
     )
-    limiters: tuple[Limiter, ...] = Field(
+    limiters: tuple[Later[Limiter], ...] = Field(
         default=(),
         description="Limiters of over- and underexcitation, at most one of each kind; on open "
         "circuit only limiters of the field current act.",
     )
-    further_units: tuple[FurtherUnitSection, ...] = Field(
+    further_units: tuple[Later[FurtherUnitSection], ...] = Field(
         default=(),
         min_length=1,
         description="Further units behind the same PMU, with parameters unit2.KA, unit3.KA ...: p, "
         "q and it are the sums of all; grid-playback only.",
     )
-    test: BumpTest | None = Field(
+    test: Later[BumpTest] | None = Field(
         default=None,
         description="The test; with records, each of them has its own.",
     )
-    record: RecordFile | None = Field(
+    record: Later[RecordFile] | None = Field(
         default=None, description="The measured signals; not required by simulate."
     )
-    records: tuple[Recording, ...] = Field(
+    records: tuple[Later[Recording], ...] = Field(
         default=(),
         min_length=1,
         description="Several tests with their records, fitted together; replaces test and record.",
     )
-    parameters: Parameters = Field(
+    parameters: Later[Parameters] = Field(
         default_factory=Parameters, description="Fixed and free parameters of the exciter."
     )
     given: GivenAs = Field(
@@ -289,22 +288,22 @@ class CaseDocument(Section):
         description="How given values count: uncertain, each with its standard error, by default "
         "that of its kind and source; or exact, but for standard errors of the case.",
     )
-    estimate: Estimate = Field(
+    estimate: Later[Estimate] = Field(
         default_factory=Estimate, description="How the free parameters are estimated."
     )
-    simulation: SimulationSection = Field(
+    simulation: Later[SimulationSection] = Field(
         default_factory=SimulationSection, description="The grid of the simulation."
     )
-    validations: tuple[Recording, ...] = Field(
+    validations: tuple[Later[Recording], ...] = Field(
         default=(),
         alias="validate",
         description="Records on which the result is validated; they are not used in the fit.",
     )
-    criteria: CriteriaSection | None = Field(
+    criteria: Later[CriteriaSection] | None = Field(
         default=None,
         description="Acceptance criteria of all records; where one is not met, the exit code is 3.",
     )
-    as_found: AsFoundSection | None = Field(
+    as_found: Later[AsFoundSection] | None = Field(
         default=None,
         description="The model in the planner's base before the test; default: the start values.",
     )

@@ -14,6 +14,7 @@ from exfit.case.schema.values import (
     FreeSection,
     Frozen,
     Given,
+    Later,
     NotNegative,
     Positive,
     Section,
@@ -52,7 +53,7 @@ class Parameters(Section):
         default_factory=nothing,
         description="Values that are fixed or tied to others: numbers or formulas such as =-VAMAX.",
     )
-    free: Frozen[FreeSection] = Field(
+    free: Frozen[Later[FreeSection]] = Field(
         default_factory=nothing, description="Parameters that are fitted."
     )
     sources: Sources = STATED
@@ -118,7 +119,7 @@ class Iterations(Section):
 
 
 IterationLimit = Annotated[
-    Annotated[Count, Tag("[number]")] | Annotated[Iterations, Tag("[section]")],
+    Annotated[Count, Tag("[number]")] | Annotated[Later[Iterations], Tag("[section]")],
     Discriminator(section_or_number),
 ]
 
@@ -149,10 +150,10 @@ class Estimate(Section):
         description="Largest number of iterations in each phase of the strategy: one number, or "
         "one for each phase, such as {lm: 20, dgn: 20}.",
     )
-    tolerance: Tolerance = Field(
+    tolerance: Later[Tolerance] = Field(
         default_factory=Tolerance, description="Limits at which the search has converged."
     )
-    stop: Limit | None = Field(
+    stop: Later[Limit] | None = Field(
         default=None,
         description="Ends the search, even before a minimum, where the weighted error of no "
         "channel of any record exceeds this; the weight of vt is 1. Default: never.",
@@ -162,11 +163,13 @@ class Estimate(Section):
         description="Share of the promised decrease of the cost that a trial must achieve: "
         "Armijo's constant of dgn; lm uses it, too, unless with update: ratio.",
     )
-    dgn: DgnSection = Field(
+    dgn: Later[DgnSection] = Field(
         default_factory=DgnSection, description="Settings of damped Gauss-Newton."
     )
-    lm: LmSection = Field(default_factory=LmSection, description="Settings of Levenberg-Marquardt.")
-    good_enough: Limit | None = Field(
+    lm: Later[LmSection] = Field(
+        default_factory=LmSection, description="Settings of Levenberg-Marquardt."
+    )
+    good_enough: Later[Limit] | None = Field(
         default=None,
         description="Error below which strategy auto accepts a match. Default: as long as the "
         "residuals are white and no larger than the noise of the record.",

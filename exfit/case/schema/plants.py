@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import PurePath
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from exfit.case.schema.values import (
     STATED,
@@ -14,6 +14,7 @@ from exfit.case.schema.values import (
     Frozen,
     Given,
     Known,
+    Later,
     Number,
     Positive,
     Section,
@@ -57,7 +58,7 @@ class WithData(PlantSection):
     parameters: Frozen[Given] = Field(
         default_factory=nothing, description="Machine data; a missing value is the typical one."
     )
-    free: Frozen[FreeSection] = Field(
+    free: Frozen[Later[FreeSection]] = Field(
         default_factory=nothing,
         description="Machine data that are fitted, as under parameters.free.",
     )
@@ -241,17 +242,25 @@ class FmuPlant(PlantElsewhere):
         return PurePath(self.file).name
 
 
-Plant = (
-    OpenCircuit
-    | InfiniteBus
-    | GridPlayback
-    | Playback
-    | MachinePlayback
-    | MachineOnLoad
-    | NoPlant
-    | ExternalPlant
-    | FmuPlant
-)
+def kind_of_plant(value: Any) -> Any:
+    """Tell kinds of plants apart, for pydantic; what is none has the kind that says so."""
+    if isinstance(value, Mapping):
+        return value.get("type")
+    return getattr(value, "type", "open-circuit")
+
+
+Plant = Annotated[
+    Annotated[Later[OpenCircuit], Tag("open-circuit")]
+    | Annotated[Later[InfiniteBus], Tag("infinite-bus")]
+    | Annotated[Later[GridPlayback], Tag("grid-playback")]
+    | Annotated[Later[Playback], Tag("playback")]
+    | Annotated[Later[MachinePlayback], Tag("machine-playback")]
+    | Annotated[Later[MachineOnLoad], Tag("machine-on-load")]
+    | Annotated[Later[NoPlant], Tag("none")]
+    | Annotated[Later[ExternalPlant], Tag("external")]
+    | Annotated[Later[FmuPlant], Tag("fmu")],
+    Discriminator(kind_of_plant),
+]
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 
@@ -263,7 +272,7 @@ class AddedModel(Section):
         default_factory=nothing,
         description="Its data; a missing value is the typical one.",
     )
-    free: Frozen[FreeSection] = Field(
+    free: Frozen[Later[FreeSection]] = Field(
         default_factory=nothing, description="Parameters that are fitted."
     )
     sources: Sources = STATED
@@ -302,6 +311,14 @@ class AloneOnLoad(WithNetwork):
     sources: Sources = STATED
 
 
+OwnPlant = Annotated[
+    Annotated[Later[OffLine], Tag("open-circuit")]
+    | Annotated[Later[OnLine], Tag("infinite-bus")]
+    | Annotated[Later[AloneOnLoad], Tag("machine-on-load")],
+    Discriminator(kind_of_plant),
+]
+
+
 class Stabiliser(AddedModel):
     """A power system stabiliser; it acts on load only."""
 
@@ -320,10 +337,10 @@ class Governor(AddedModel):
 class FurtherUnitSection(Section):
     """A further unit, the powers of which are recorded together with those of the case's."""
 
-    exciter: AddedModel = Field(description="Its exciter.")
-    machine: AddedModel = Field(description="Its machine.")
-    stabiliser: Stabiliser | None = Field(default=None, description="Its stabiliser.")
-    governor: Governor | None = Field(default=None, description="Its governor.")
+    exciter: Later[AddedModel] = Field(description="Its exciter.")
+    machine: Later[AddedModel] = Field(description="Its machine.")
+    stabiliser: Later[Stabiliser] | None = Field(default=None, description="Its stabiliser.")
+    governor: Later[Governor] | None = Field(default=None, description="Its governor.")
     network: Frozen[Known] = Field(
         description="base: its MVA over those of the case's unit; share_P and share_Q: what it has "
         "of p and q at the start; R, X, Ra, Rc and Xc as of the case's unit. pu on its base."

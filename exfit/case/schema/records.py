@@ -13,7 +13,7 @@ from pydantic import (
     WrapSerializer,
 )
 
-from exfit.case.schema.plants import AloneOnLoad, OffLine, OnLine
+from exfit.case.schema.plants import OwnPlant
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import (
     FILE_NAME,
@@ -21,6 +21,7 @@ from exfit.case.schema.values import (
     Filter,
     Findable,
     Interval,
+    Later,
     NotNegative,
     Positive,
     Section,
@@ -76,8 +77,8 @@ class CurrentPhasor(Section):
 class PhasorsSection(Section):
     """The phasors of a PMU; the power, in per unit, is voltage * conj(current)."""
 
-    voltage: VoltagePhasor = Field(description="The voltage: phasors.vt and phasors.angle.")
-    current: CurrentPhasor | None = Field(
+    voltage: Later[VoltagePhasor] = Field(description="The voltage: phasors.vt and phasors.angle.")
+    current: Later[CurrentPhasor] | None = Field(
         default=None, description="The current: phasors.p, phasors.q and phasors.it."
     )
     kV: Positive | None = Field(
@@ -143,7 +144,7 @@ class Compared(Section):
         "is averaged in the same way. If it averages over the time before the sample, give half "
         "of this length as delay. 0: it does not average.",
     )
-    sine: SineSection | None = Field(
+    sine: Later[SineSection] | None = Field(
         default=None,
         description="A small sine of constant amplitude, such as an oscillation of the grid, added "
         "to the simulated signal.",
@@ -196,7 +197,8 @@ def _kind_of_channel(value: Any) -> str:
 
 
 Entry = Annotated[
-    Annotated[ChannelSection, Tag("[column]")] | Annotated[PhasesSection, Tag("[phases]")],
+    Annotated[Later[ChannelSection], Tag("[column]")]
+    | Annotated[Later[PhasesSection], Tag("[phases]")],
     Discriminator(_kind_of_channel),
 ]
 
@@ -221,12 +223,12 @@ class RecordFile(Section):
         AfterValidator(MappingProxyType),
         WrapSerializer(thawed),
     ] = Field(description="Measured signals: the name of a column, or a mapping.")
-    phasors: PhasorsSection | None = Field(
+    phasors: Later[PhasorsSection] | None = Field(
         default=None,
         description="Voltage and current phasors of a PMU, from which the columns phasors.vt, "
         "phasors.angle, phasors.p, phasors.q and phasors.it are computed.",
     )
-    status: StatusSection | None = Field(
+    status: Later[StatusSection] | None = Field(
         default=None,
         description="Column with the flags of a PMU: rows that are not valid are refused, or left "
         "out with gaps: skip.",
@@ -282,11 +284,11 @@ class Recording(Section):
         max_length=LONGEST_NAME,
         description="Name of letters, digits, - _ . and %; files are named after it.",
     )
-    plant: Annotated[OffLine | OnLine | AloneOnLoad, Field(discriminator="type")] | None = Field(
+    plant: OwnPlant | None = Field(
         default=None, description="Plant of this record, if it differs from that of the case."
     )
-    test: BumpTest = Field(
+    test: Later[BumpTest] = Field(
         default_factory=BumpTest,
         description="The test; only a record of a grid event needs none.",
     )
-    record: RecordFile = Field(description="The measured signals.")
+    record: Later[RecordFile] = Field(description="The measured signals.")

@@ -10,6 +10,7 @@ from pydantic import Discriminator, Field, Tag
 from exfit.case.schema.values import (
     Filter,
     Findable,
+    Later,
     NotNegative,
     Number,
     Positive,
@@ -112,9 +113,9 @@ def _kind_of_reference(value: Any) -> str:
 
 
 Reference = Annotated[
-    Annotated[tuple[FindableStep, ...], Field(min_length=1), Tag("[steps]")]
-    | Annotated[ReferenceTable, Tag("[table]")]
-    | Annotated[ReferenceFile, Tag("[file]")]
+    Annotated[tuple[Later[FindableStep], ...], Field(min_length=1), Tag("[steps]")]
+    | Annotated[Later[ReferenceTable], Tag("[table]")]
+    | Annotated[Later[ReferenceFile], Tag("[file]")]
     | Annotated[Literal["recorded"], Tag("[recorded]")],
     Discriminator(_kind_of_reference),
 ]
@@ -187,8 +188,8 @@ class AngleTable(Section):
 
 
 SourceAngle = Annotated[
-    Annotated[tuple[AngleStep, ...], Field(min_length=1), Tag("[steps]")]
-    | Annotated[AngleTable, Tag("[table]")],
+    Annotated[tuple[Later[AngleStep], ...], Field(min_length=1), Tag("[steps]")]
+    | Annotated[Later[AngleTable], Tag("[table]")],
     Discriminator(lambda given: "[table]" if isinstance(given, dict | AngleTable) else "[steps]"),
 ]
 
@@ -256,7 +257,7 @@ class BumpTest(Section):
         description="The reference of the governor, given like vref: a power, or with TGOV1, "
         "HYGOV and GGOV1 a speed, the droop times a power.",
     )
-    E: tuple[StepSection, ...] = Field(
+    E: tuple[Later[StepSection], ...] = Field(
         default=(),
         min_length=1,
         description="Steps of the voltage of the source; infinite-bus only.",
@@ -266,15 +267,15 @@ class BumpTest(Section):
         description="The angle of the source: steps and ramps in order of time, or a table; "
         "infinite-bus only. Where a line trips it changes with E, R and X.",
     )
-    network: tuple[Switch, ...] = Field(
+    network: tuple[Later[Switch], ...] = Field(
         default=(), min_length=1, description="Switchings of R, X and E; infinite-bus only."
     )
-    fault: tuple[FaultSection, ...] = Field(
+    fault: tuple[Later[FaultSection], ...] = Field(
         default=(),
         min_length=1,
         description="Faults at the terminals, each cleared before the next; infinite-bus only.",
     )
-    breaker: BreakerSection | None = Field(
+    breaker: Later[BreakerSection] | None = Field(
         default=None,
         description="The breaker opens; infinite-bus and machine-on-load only.",
     )

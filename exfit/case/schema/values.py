@@ -11,11 +11,13 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     Strict,
     Tag,
     WrapSerializer,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from exfit.case.ties import is_tie
 from exfit.case.yaml import LONGEST_WHOLE
@@ -171,6 +173,30 @@ class Section(BaseModel):
     )
 
 
+class WhenRead:
+    """Build the schema of a section when one is read: a case has few of all that it may have."""
+
+    def __get_pydantic_core_schema__(
+        self, section: type[Section], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Hand the reading on to the section."""
+        return core_schema.no_info_plain_validator_function(
+            section.model_validate, metadata={"section": section}
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Describe the section, once for all places where it may stand."""
+        section: type[Section] = schema["metadata"]["section"]
+        section.model_rebuild()
+        named: Any = {**section.__pydantic_core_schema__, "ref": section.__qualname__}
+        return handler(core_schema.definitions_schema(named, []))
+
+
+Later = Annotated[Value, WhenRead()]
+
+
 def _no_tie(value: Any) -> Any:
     if is_tie(value):
         raise refusal(f"follows others by {value}: give neither source nor error")
@@ -205,16 +231,16 @@ else:
     Given = Annotated[
         Annotated[Number, Tag("[number]")]
         | Annotated[str, Field(pattern="^="), Tag("[tie]")]
-        | Annotated[StatedNumber, Tag("[section]")],
+        | Annotated[Later[StatedNumber], Tag("[section]")],
         # marks in brackets stand in no file: the messages take them out of the place of a fault
         Discriminator(lambda given: "[tie]" if is_tie(given) else section_or_number(given)),
     ]
     Known = Annotated[
-        Annotated[Number, Tag("[number]")] | Annotated[StatedNumber, Tag("[section]")],
+        Annotated[Number, Tag("[number]")] | Annotated[Later[StatedNumber], Tag("[section]")],
         Discriminator(section_or_number),
     ]
     Sourced = Annotated[
-        Annotated[Number, Tag("[number]")] | Annotated[SourcedNumber, Tag("[section]")],
+        Annotated[Number, Tag("[number]")] | Annotated[Later[SourcedNumber], Tag("[section]")],
         Discriminator(section_or_number),
     ]
 
@@ -251,7 +277,7 @@ class FreeSection(Section):
         description="Scale on which it is fitted: its logarithm, which requires min > 0; its share "
         "of the width of its bounds, or of its start; or the parameter itself.",
     )
-    prior: PriorSection | None = Field(
+    prior: Later[PriorSection] | None = Field(
         default=None, description="Prior knowledge, which adds one residual."
     )
     source: Source | None = Field(
@@ -268,7 +294,7 @@ class Unknown(Section):
 
 
 Findable = Annotated[
-    Annotated[Number, Tag("[number]")] | Annotated[Unknown, Tag("[section]")],
+    Annotated[Number, Tag("[number]")] | Annotated[Later[Unknown], Tag("[section]")],
     Discriminator(section_or_number),
 ]
 
@@ -297,7 +323,8 @@ def _kind_of_filter(value: Any) -> str:
 
 
 Filter = Annotated[
-    Annotated[LowPassSection, Tag("[lowpass]")] | Annotated[MedianSection, Tag("[median]")],
+    Annotated[Later[LowPassSection], Tag("[lowpass]")]
+    | Annotated[Later[MedianSection], Tag("[median]")],
     Discriminator(_kind_of_filter),
 ]
 
@@ -318,6 +345,6 @@ def _kind_of_clock(value: Any) -> str:
 Time = Annotated[
     Annotated[Text, Tag("[name]")]
     | Annotated[tuple[Text, Text], Tag("[pair]")]
-    | Annotated[TimeColumn, Tag("[column]")],
+    | Annotated[Later[TimeColumn], Tag("[column]")],
     Discriminator(_kind_of_clock),
 ]
