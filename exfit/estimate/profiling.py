@@ -58,6 +58,10 @@ CUBICS = 4  # of them, then halves: a jump lets no interpolation come near
 NOTHING = (inf, -inf)  # an interval that holds no value
 
 
+class Spent(Exception):
+    """A side of a profile has taken as many iterations as it may."""
+
+
 class ProfileEnd(Enum):
     """Why one side of a profile ends."""
 
@@ -66,6 +70,7 @@ class ProfileEnd(Enum):
     FLAT = "the cost hardly rises"
     FAILED = "no residuals beyond are finite"
     KNOWN = "the interval about another minimum begins"
+    SPENT = "it took as many iterations as it may"
     INTERRUPTED = "interrupted"
 
 
@@ -91,7 +96,10 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Valley:
-    """What all profiles about one minimum share; ``lowest`` is the cost that rises count from."""
+    """What all profiles about one minimum share.
+
+    ``lowest`` is the cost that rises count from, ``most`` how many iterations a side may take.
+    """
 
     functions: Functions
     box: Box
@@ -99,6 +107,7 @@ class Valley:
     bottom: LinearModel
     lowest: float
     points: int
+    most: float
 
 
 @dataclass(eq=False)
@@ -120,6 +129,7 @@ class Side:
     crossing: float | None = None
     stride: float = 0.0
     failed: float = inf
+    iterations: int = 0
 
     def __post_init__(self) -> None:
         """Begin at the minimum."""
@@ -145,6 +155,8 @@ class Side:
             self.end = end or ProfileEnd.INTERRUPTED
         except KeyboardInterrupt:
             self.end = ProfileEnd.INTERRUPTED
+        except Spent:
+            self.end = ProfileEnd.SPENT
         return self
 
     def go_on(self) -> Steps[ProfileEnd | None]:
@@ -241,7 +253,7 @@ class Side:
         if point.cost == inf:
             self.failed = place
             return None
-        linear, before = (yield from linearise(problem, point, valley.bottom)), None
+        linear, before = (yield from self.linearised(problem, point, valley.bottom)), None
         for _ in range(MOST_CORRECTIONS):
             if not linear.finite or linear.full.promise <= fine:
                 break
@@ -254,10 +266,17 @@ class Side:
             gain = point.cost - trial.cost
             if gain > 0.0:
                 point, before = trial, linear
-                linear = yield from linearise(problem, point, linear)
+                linear = yield from self.linearised(problem, point, linear)
             if gain <= fine:
                 break
         return self.spot(linear)
+
+    def linearised(self, problem: Problem, point: Point, before: LinearModel) -> Steps[LinearModel]:
+        """Linearise at a point; raises Spent where the side may take no further iteration."""
+        if self.iterations >= self.valley.most:
+            raise Spent
+        self.iterations += 1
+        return (yield from linearise(problem, point, before))
 
     def spot(self, linear: LinearModel) -> Spot:
         """Return the point of the profile that a linear model with the parameter held shows."""
@@ -441,6 +460,7 @@ def profiles(
     *,
     beside: LowerMinimum | None = None,
     points: int = POINTS,
+    most: float = inf,
     workers: int | None = None,
     x_scale: ArrayLike | None = None,
     watch: Callable[[Progress], object] = lambda _: None,
@@ -448,11 +468,12 @@ def profiles(
     """Return the profiles of some parameters about the minimum x (N,) of f, half the square sum.
 
     On either side a parameter moves in about ``points`` steps, up to where the cost has risen by
-    its own of ``rises`` or to its bound, and after each the others are fitted anew. All sides are
-    advanced together, in ``workers`` threads (as many as there are processors by default). A rise
-    is s^2 q / 2 for an interval at the level of which q is the quantile of chi^2 with one degree
-    of freedom, or that of t squared. It counts from the cost at x or, where x lies ``beside`` a
-    lower minimum, from the cost there; then a side ends where it enters the interval of that one.
+    its own of ``rises`` or to its bound, and after each the others are fitted anew; it ends open
+    where that would take more than ``most`` Jacobians. All sides are advanced together, in
+    ``workers`` threads (as many as there are processors by default). A rise is s^2 q / 2 for an
+    interval at the level of which q is the quantile of chi^2 with one degree of freedom, or that of
+    t squared. It counts from the cost at x or, where x lies ``beside`` a lower minimum, from the
+    cost there; then a side ends where it enters the interval of that one.
 
     Where a cost lower than that turns up, all begin anew from the minimum there. watch gets the
     Progress, in sides; KeyboardInterrupt, raised there or anywhere, ends it with what is done.
@@ -465,7 +486,7 @@ def profiles(
     for rise in rises.values():
         if not rise > 0.0:
             raise ValueError(f"rise: {rise} is not above 0")
-    valley_at = partial(valley_about, functions, box, x_scale is not None, points)
+    valley_at = partial(valley_about, functions, box, x_scale is not None, points, most=most)
     valley = finish(valley_at(start, inf if beside is None else beside.cost))
     known = {} if beside is None else beside.intervals
     for restarts in range(MOST_MINIMA + 1):
@@ -503,7 +524,13 @@ def profiles(
 
 
 def valley_about(
-    functions: Functions, box: Box, scaled: bool, points: int, x: Array, lowest: float
+    functions: Functions,
+    box: Box,
+    scaled: bool,
+    points: int,
+    x: Array,
+    lowest: float,
+    most: float = inf,
 ) -> Steps[Valley]:
     """Describe a minimum to the profiles about it."""
     problem = Problem(functions, None, box, scaled)
@@ -511,7 +538,7 @@ def valley_about(
     if point.cost == inf:
         raise ValueError("the residuals at x are not finite")
     bottom = yield from linearise(problem, point)
-    return Valley(functions, box, scaled, bottom, min(point.cost, lowest), points)
+    return Valley(functions, box, scaled, bottom, min(point.cost, lowest), points, most)
 
 
 def sides_of(

@@ -48,6 +48,7 @@ def residuals_of(
     fixed = {**(case.values() if start is None else start)}
     for parameter in free:
         fixed.pop(parameter.name, None)
+    limit = case.estimate.most_iterations
     return Residuals(
         [setup.experiment for setup in setups],
         free,
@@ -56,6 +57,7 @@ def residuals_of(
         robust_of(case),
         case.estimate.difference_step,
         case.estimate.differences == "relative",
+        iterations=limit if isinstance(limit, int) else max(limit.values(), default=0),
     )
 
 

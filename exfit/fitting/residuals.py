@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from exfit.case.schema.estimate import MOST_ITERATIONS
 from exfit.case.ties import TieError, Ties
 from exfit.errors import SimulationError
 from exfit.estimate import half_square
@@ -55,6 +56,8 @@ class Robust(NamedTuple):
 
 
 SHORT_RUNS = 5000  # steps, of the simulations of all records together
+WORK_OF_PROFILES = 2e8  # steps of a Jacobian, times its directions: about twenty seconds
+LEAST_OF_SIDE = 15  # iterations: most sides take four to twelve
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,8 @@ class Residuals:
     ``fixed`` holds every value that is neither free nor follows others by ``ties``. A set that
     cannot be simulated has infinite residuals. ``difference_step`` is that of `central`, `forward`
     and `backward` in scaled parameters, or, with ``relative_differences``, as a share of values.
-    ``counter`` counts the simulations that all of it costs.
+    ``counter`` counts the simulations that all of it costs. ``iterations`` are the most of a phase
+    of the search.
     """
 
     experiments: Sequence[Experiment]
@@ -75,6 +79,7 @@ class Residuals:
     difference_step: float | None = None
     relative_differences: bool = False
     counter: SimulationCounter | None = None
+    iterations: int = MOST_ITERATIONS
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
@@ -106,6 +111,14 @@ class Residuals:
         tests = [experiment.simulator for experiment in self.experiments]
         alone = all(test.responder is None for test in tests)
         return 1 if alone and sum(test.steps for test in tests) <= SHORT_RUNS else None
+
+    def iterations_of_side(self, profiles: int) -> int:
+        """Return how many iterations a side of some profiles may take: fewer of long records."""
+        steps = sum(experiment.simulator.steps for experiment in self.experiments)
+        of_one = 2 * profiles * steps * (1 + len(self.free))
+        share = self.iterations / MOST_ITERATIONS
+        usual = min(MOST_ITERATIONS, max(LEAST_OF_SIDE, WORK_OF_PROFILES / of_one))
+        return round(max(1.0, share) * usual)
 
     @property
     def of_records(self) -> dict[str, Nuisance]:

@@ -239,6 +239,23 @@ def test_few_evaluations_are_enough(index):
     assert len(calls) <= 20
 
 
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_side_whose_iterations_are_spent_is_open_and_others_do_not_depend_on_it(index):
+    found = enzyme_minimum()
+    functions = OneByOne(*ENZYME)
+    whole = profiles(functions, found.x, rises_of(found), BOUNDS)[index]
+    ended = []
+    for most in range(1, 12):
+        own = profiles(functions, found.x, rises_of(found), BOUNDS, most=most)[index]
+        sides = zip(own.ends, (own.low, own.high), (whole.low, whole.high), strict=True)
+        for end, limit, of_whole in sides:
+            assert limit == (None if end is ProfileEnd.SPENT else of_whole)
+        ended.append(own.ends.count(ProfileEnd.SPENT))
+    assert ended[0] == 2
+    assert ended[-1] == 0
+    assert ended == sorted(ended, reverse=True)
+
+
 def test_where_the_others_lie_at_a_kink_the_interval_is_that_of_a_search_over_a_grid():
     """The least cost for a given x0 is where |x1 - x0| has its kink, or beside it."""
     rise = 2.0

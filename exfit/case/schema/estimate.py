@@ -148,7 +148,8 @@ class Estimate(Section):
     iterations: IterationLimit = Field(
         default=MOST_ITERATIONS,
         description="Largest number of iterations in each phase of the strategy: one number, or "
-        "one for each phase, such as {lm: 20, dgn: 20}.",
+        "one for each phase, such as {lm: 20, dgn: 20}. More than 100 raise the budget of profiles "
+        "in proportion.",
     )
     tolerance: Later[Tolerance] = Field(
         default_factory=Tolerance, description="Limits at which the search has converged."
@@ -198,7 +199,7 @@ class Estimate(Section):
     causes: NotNegative | None = Field(
         default=None,
         description="Limit of processor time, s, for the search for causes of a misfit. Default: "
-        "30, or three times the time of the fit if that is more.",
+        "30, or the time of the fit if that is more.",
     )
 
     @property

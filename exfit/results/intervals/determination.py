@@ -286,6 +286,7 @@ def profiles_about(
             residuals.bounds,
             beside=known,  # an interval that need not be found again
             points=points,
+            most=residuals.iterations_of_side(len(rises)),
             workers=residuals.threads,
             x_scale=residuals.units,
             watch=progress,
@@ -331,6 +332,7 @@ def reasons(
         estimate.ProfileEnd.BOUND: f"{data_does} not exclude its {{}} {{:.4g}}",
         estimate.ProfileEnd.FAILED: "there is no response beyond",
         estimate.ProfileEnd.FLAT: "the cost hardly rises",
+        estimate.ProfileEnd.SPENT: "its profile ended at its budget (estimate.iterations)",
         estimate.ProfileEnd.INTERRUPTED: "interrupted",
     }
     below, above = (

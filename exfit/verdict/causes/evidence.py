@@ -24,7 +24,6 @@ from exfit.results.intervals.determination import NEEDS_PROFILE
 from exfit.util.arrays import Array
 
 LEAST_TIME = 30.0  # s
-TIMES_SEARCH = 3.0  # times what the search took
 LEAST_GAIN = 10.0  # of the log-likelihood: chi-square 20, beyond what any of twenty trials gains
 LEAST_SHARE = 0.25  # of the error beyond the noise: a cause that explains less is not named
 TINY_COST = 1e-300  # a record without noise may be matched exactly
@@ -37,7 +36,7 @@ class OutOfTime(Exception):
 
 def time_for_causes(given: float | None, search: float) -> float:
     """Return the time (s) for causes: as it is given, or by what the ``search`` took (s)."""
-    return max(LEAST_TIME, TIMES_SEARCH * search) if given is None else given
+    return max(LEAST_TIME, search) if given is None else given
 
 
 class Pace:

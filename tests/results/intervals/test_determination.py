@@ -100,6 +100,12 @@ def test_of_several_minima_the_interval_is_the_hull():
         (None, 260.0, (BOUND, RISE), "has no lower limit: the record does not exclude its min 20"),
         (150.0, None, (RISE, FLAT), "has no upper limit: the cost hardly rises"),
         (
+            150.0,
+            None,
+            (RISE, ProfileEnd.SPENT),
+            "has no upper limit: its profile ended at its budget (estimate.iterations)",
+        ),
+        (
             None,
             None,
             (ProfileEnd.FAILED, BOUND),
