@@ -209,7 +209,7 @@ SHARED = (
         ("EFDN", *UP_TO_100, "field voltage where the feedback gain changes"),
         ("K", *GAIN, "regulator gain", FREE),
         ("KA_FIXED", "pu", (0.0001, 100000.0), "regulator gain"),
-        ("KB", "pu", (0.01, 10000.0), "second stage gain", FREE),
+        ("KB", "pu", (0.01, 10000.0), "second stage gain"),
         ("KC_FREE", *UP_TO_100, "rectifier loading factor", LOADING),
         ("KDR", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
         ("KD_OF_PID", "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TD")),

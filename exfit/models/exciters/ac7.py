@@ -107,7 +107,7 @@ AC7B = documented(
         *shared(TR=0.0, KPR_OF_REGULATOR=4.24, KIR_OF_REGULATOR=4.24),
         ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain of the regulator"),
         *shared(TDR=0.03, VRMAX=5.79, VRMIN=-5.79),
-        ("KPA", 65.36, *PID_GAIN, "proportional gain of the amplifier", FREE),
+        ("KPA", 65.36, *PID_GAIN, "proportional gain of the amplifier"),
         ("KIA", 59.69, *INTEGRAL_GAIN, "integral gain of the amplifier", FREE),
         ("VAMAX", 1.0, *LIMIT, "amplifier ceiling"),
         ("VAMIN", -0.95, *LIMIT, "amplifier floor"),
