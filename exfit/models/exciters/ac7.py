@@ -121,6 +121,7 @@ AC7B = documented(
         *shared(E2=4.725, SE2=0.075),
     ),
     "VC VI VD VF VA VE",
+    aliases="ESAC7B",
     records=record(
         "AC7B",
         "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "

@@ -33,6 +33,7 @@ SHEET = sheet(
     *limits("EFDMAX", 5.0, -5.0, "the field voltage at rated voltage"),
 )
 
+ALIASES = "EXBBC"
 RECORDS = record(
     "BBSEX1",
     "TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN SWITCH",

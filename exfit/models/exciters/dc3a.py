@@ -34,6 +34,7 @@ SHEET = sheet(
     *shared(TE=0.5, KE_SIGNED=1.0, VEMIN=0.0, E1=3.375, SE1=0.267, E2=3.15, SE2=0.068),
 )
 
+ALIASES = "ESDC3A"
 RECORDS = record(
     "DC3A",
     "TR KV VRMAX VRMIN TRH TE KE VEMIN E1 SE1 E2 SE2",

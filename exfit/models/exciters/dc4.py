@@ -86,6 +86,7 @@ DC4B = documented(
         *shared(KF_FIXED=0.0, TF=1.0, VEMIN=0.0, E1=2.33, SE1=0.27, E2=1.75, SE2=0.08),
     ),
     "VC VI VD VR EFD VF",
+    aliases="ESDC4B",
     records=record(
         "DC4B",
         "TR KP KI KD TD VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2",
@@ -162,7 +163,7 @@ DC4C = documented(
     ),
     "VC VI VD VR EFD VF",
     doubt="rests on one public diagram for the load of its supply (KC1), that of InterPSS",
-    aliases="DC4CU1",
+    aliases="ESDC4C DC4CU1",
     records=(
         *record_of_2016(
             "DC4C",

@@ -95,6 +95,7 @@ ST5B = documented(
         *shared(KC=0.004),
     ),
     "VC VL1 VL2 VE",
+    aliases="ESST5B",
     records=record(
         "ST5B",
         "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",

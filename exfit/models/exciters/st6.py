@@ -77,6 +77,7 @@ ST6B = documented(
         ("TG", 0.02, "s", (0.001, 10.0), "feedback lag of the field voltage loop", FREE),
     ),
     "VC VI VD VG",
+    aliases="ESST6B",
     records=record(
         "ST6B",
         "TR KPA KIA KDA TDA VAMAX VAMIN KFF KM KCI KLR ILR VRMAX VRMIN KG TG",

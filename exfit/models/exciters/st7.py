@@ -87,6 +87,7 @@ ST7B = documented(
         ("TIA", 3.0, *POSITIVE_TIME, "feedback time constant, that of the integral", FREE),
     ),
     "VC VG VL VF",
+    aliases="ESST7B",
     records=record(
         "ST7B",
         "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA",
