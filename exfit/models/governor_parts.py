@@ -8,11 +8,10 @@ unit of the turbine what is per unit of the machine, and says both behind the dr
 
 from collections.abc import Callable, Iterable, Sequence
 from inspect import cleandoc
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
-from exfit.models.blocks import Limited, Signal, clip, inf, limited, where
+from exfit.models.blocks import Limited, Signal, clip, inf, limited, rate, where
 from exfit.models.sheet import OF_TWO_PROGRAMS, Model, Parameter, Records, documented, record, sheet
 
 # pu: a recorded power is known to about 1 % (transformers of class 0.5), a limit to two decimals
@@ -107,12 +106,22 @@ def backlash(x: Signal, y: Signal, width: Signal) -> tuple[Signal, Limited]:
 def curve(x: Signal, xs: Sequence[Signal], ys: Sequence[Signal]) -> Signal:
     """Return y on the lines through points (K,) that rise, the first and the last without end.
 
-    Of two points at the same place the second is left out.
+    A point that is not right of all before is left out, as the zeros that end a list in a file.
     """
-    points = list(zip(xs, ys, strict=True))
-    y: Signal = 0.0
-    for k, ((x0, y0), (x1, y1)) in enumerate(pairwise(points)):
-        run = x1 - x0
-        line = y0 + (x - x0) * (y1 - y0) / where(run > 0.0, run, 1.0)
-        y = line if k == 0 else where(x > x0, line, y)
+    (x0, y0), *further = zip(xs, ys, strict=True)
+    y = y0
+    for k, (x1, y1) in enumerate(further):
+        rises = x1 > x0
+        line = y0 + (x - x0) * (y1 - y0) / where(rises, x1 - x0, 1.0)
+        y = where(rises if k == 0 else rises & (x > x0), line, y)
+        x0, y0 = where(rises, x1, x0), where(rises, y1, y0)
     return y
+
+
+def delayed(u: Signal, x: Signal, v: Signal, T: Signal) -> tuple[Signal, Signal, Signal]:
+    """exp(-sT) by its Padé approximant of order two, whose phase errs by (wT)^5 / 720.
+
+    That is (1 - sT/2 + s²T²/12) / (1 + sT/2 + s²T²/12); at rest x is u, and v is 0.
+    """
+    pole = rate(T)
+    return u - v, v * pole, (12.0 * (u - x) - 6.0 * v) * pole

@@ -102,12 +102,14 @@ def test_exact_derivatives_with_a_governor_equal_central_differences(governor):
     )
     _, slopes = simulator.tangents(values, ("p", "speed"), each(free))
     for column, name in enumerate(free):
-        h = 1e-5 * abs(values[name])
-        sets = [values | {name: values[name] + side * h} for side in (1, -1)]
-        up, down = simulator.samples_of_many(sets, ("p", "speed"))[0]
-        difference = (up - down) / (2.0 * h)
-        size = max(np.abs(difference).max(), 1e-3)
-        assert np.abs(slopes[:, :, column] - difference).max() < 1e-5 * size, name
+        misses = []
+        for h in (1e-5 * abs(values[name]), 1e-4 * abs(values[name])):  # one rounds, one bends
+            sets = [values | {name: values[name] + side * h} for side in (1, -1)]
+            up, down = simulator.samples_of_many(sets, ("p", "speed"))[0]
+            difference = (up - down) / (2.0 * h)
+            size = max(np.abs(difference).max(), 1e-3)
+            misses.append(np.abs(slopes[:, :, column] - difference).max() / size)
+        assert min(misses) < 1e-5, name
 
 
 def test_after_a_load_rejection_the_governor_takes_the_power_away(governor):

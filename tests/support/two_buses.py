@@ -22,6 +22,7 @@ from exfit.models import GOVERNORS
 from exfit.models.blocks import lag
 from exfit.models.machines import genqec
 from exfit.models.machines.round_rotor import transient_time, unsaturated_q_current
+from exfit.models.sheet import typical
 from exfit.models.speed_multiplier import times_speed
 from exfit.plants import (
     GOVERNOR,
@@ -115,9 +116,12 @@ class TwoBuses:
             heard = Stabilised(model, part.inputs or model.inputs)
             stabiliser = heard.in_dialect(dialect)
             values |= prefixed(STABILISER, part.values)
+        if (part := parts.governor) is not None:
+            governor = part.definition.model
+            values |= prefixed(GOVERNOR, {**part.values, **told.get("beside_the_record", {})})
         if added := told.get("governor"):
             governor = GOVERNORS[added["model"]]
-            values |= prefixed(GOVERNOR, added["parameters"])
+            values |= prefixed(GOVERNOR, typical(governor.sheet) | added["parameters"])
         limiters = []
         for part in parts.limiters:
             limiters.append(Attached(part.definition.model, part.place))

@@ -3,4 +3,5 @@
 FAMILIES = {  # files that hold several models; any other is named after its own
     "steam": "IEEEG1 IEESGO TGOV1",
     "gas": "GAST GGOV1",
+    "rowen": "GAST2A GASTWD",
 }
