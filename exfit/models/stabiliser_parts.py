@@ -6,6 +6,7 @@ from exfit.models.blocks import Signal, clip, high_pass, lag, lead_lag, limited,
 from exfit.models.sheet import (
     DIVIDING_TIME,
     LONG_TIME,
+    MOST_LAGS,
     TIME,
     WASHOUT_TIME,
     WITHIN_10,
@@ -79,10 +80,10 @@ def limited_inputs(u: Signal, p: Signal) -> tuple[Signal, Signal]:
     return clip(u.vsi1, p.VSI1MIN, p.VSI1MAX), clip(u.vsi2, p.VSI2MIN, p.VSI2MAX)
 
 
-def accelerating(s: Signal, u: Signal, p: Signal, d: Signal, lags: int, N: Signal) -> Signal:
+def accelerating(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Compute the integral of the accelerating power from speed and power.
 
-    Its ramp tracking filter has room for so many ``lags``, N blocks (1 + sT8) / (1 + sT9)^M.
+    Its ramp tracking filter is N blocks (1 + sT8) / (1 + sT9)^M.
     """
     vsi1, vsi2 = limited_inputs(u, p)
     w1, d.W1 = high_pass(vsi1, s.W1, p.TW1)
@@ -92,18 +93,18 @@ def accelerating(s: Signal, u: Signal, p: Signal, d: Signal, lags: int, N: Signa
     w4, d.W4 = high_pass(w3, s.W4, p.TW4)
     v7, d.V7 = lag(w4, s.V7, p.KS2, p.T7)
     ramp = v6 + p.KS3 * v7
-    for k in range(1, lags + 1):
-        lead, slow = where(k <= N, p.T8, 0.0), where(k <= p.M * N, p.T9, 0.0)
+    for k in range(1, MOST_LAGS + 1):
+        lead, slow = where(k <= p.N, p.T8, 0.0), where(k <= p.M * p.N, p.T9, 0.0)
         ramp, slope = lead_lag(ramp, getattr(s, f"R{k}"), lead, slow)
         setattr(d, f"R{k}", slope)
     return ramp - v7
 
 
-def accelerating_rest(u: Signal, p: Signal, x: Signal, lags: int) -> None:
+def accelerating_rest(u: Signal, p: Signal, x: Signal) -> None:
     """Write the states of ``accelerating`` into x that still inputs lead to; it is then 0."""
     x.W1, x.W3 = limited_inputs(u, p)
     x.W2 = x.V6 = x.W4 = x.V7 = 0.0
-    for k in range(1, lags + 1):
+    for k in range(1, MOST_LAGS + 1):
         setattr(x, f"R{k}", 0.0)
 
 

@@ -311,13 +311,8 @@ def test_the_response_is_the_product_of_the_blocks_for_drawn_values(stabiliser):
         assert_is_its_function(stabiliser, moved | (whole if "M" in values else {}))
 
 
-@pytest.mark.parametrize("lags", [1.0, 2.0, 3.0, 4.0, 5.0])
-def test_the_ramp_tracking_filter_has_as_many_lags_as_M(lags):
-    assert_is_its_function(STABILISERS["PSS2B"], lively(STABILISERS["PSS2B"]) | {"M": lags})
-
-
 @pytest.mark.parametrize(("M", "N"), [(1, 1), (5, 1), (2, 4), (4, 2), (2, 3), (1, 4)])
-@pytest.mark.parametrize("name", ["PSS2C", "PSS7C"])
+@pytest.mark.parametrize("name", ["PSS2B", "PSS7C"])
 def test_the_ramp_tracking_filter_is_as_many_blocks_as_N(name, M, N):
     values = lively(STABILISERS[name]) | {"M": float(M), "N": float(N)}
     assert_is_its_function(STABILISERS[name], values)

@@ -3,7 +3,6 @@
 from exfit.models.blocks import Signal, clip, high_pass, lag, washout
 from exfit.models.sheet import (
     DIVIDING_TIME,
-    MOST_LAGS,
     TIME,
     WASHOUT_TIME,
     WITHIN_1000,
@@ -177,14 +176,14 @@ def pss7c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     Typical data are the standard's, as GridKit has them, but for KS2, which is that
     of H = 5.05 s as in PSS2C (there 0.7052).
     """
-    v = accelerating(s, u, p, d, MOST_LAGS, p.N)
+    v = accelerating(s, u, p, d)
     y = canonical(p.KS1 * v, s, p, d)
     return switched(clip(y, p.VSTMIN, p.VSTMAX), s, u, p, d)
 
 
 def pss7c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
     """Write the states into x that still inputs lead to; vs is then 0."""
-    accelerating_rest(u, p, x, MOST_LAGS)
+    accelerating_rest(u, p, x)
     x.X1 = x.X2 = x.X3 = x.X4 = 0.0
     switch_rest(u, p, x)
 

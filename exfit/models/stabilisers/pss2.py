@@ -1,7 +1,7 @@
 """Dual input stabilisers of speed and power: PSS2B, PSS2C and PSSSB."""
 
 from exfit.models.blocks import Signal, clip, lead_lag, where
-from exfit.models.sheet import MOST_LAGS, TIME, documented, limits, record, sheet
+from exfit.models.sheet import TIME, documented, limits, record, sheet
 from exfit.models.stabiliser_parts import (
     ACCELERATING,
     COMPENSATED,
@@ -24,9 +24,6 @@ PSS2A_HELD = {
     **{"VSI1MAX": NO_LIMIT, "VSI1MIN": -NO_LIMIT},
     **{"VSI2MAX": NO_LIMIT, "VSI2MIN": -NO_LIMIT},
 }
-
-
-LAGS = 5  # of the ramp tracking filter: the highest M
 
 
 def shaped(v: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
@@ -54,17 +51,18 @@ def pss2b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
     The first input is the speed, the second the electrical power (KS2 = T7 / 2H).
     TW2 = 0 and TW4 = 0 leave out their washouts; T6, T7, T2, T4 or T11 = 0 bypass
-    their blocks. The ramp tracking filter has N = 1, and M is a whole number from 1
-    to 5. With T10 = T11 = 0 and input limits out of reach this is PSS2A, whose
-    record has no such rows: it is read as PSS2B with these values.
+    their blocks. The ramp tracking filter is N of the blocks that are drawn; M and
+    N are whole numbers, M N at most 8. With T10 = T11 = 0 and input limits out of
+    reach this is PSS2A, whose record has no such rows: it is read as PSS2B with
+    these values.
     """
-    v10 = shaped(accelerating(s, u, p, d, LAGS, 1.0), s, p, d)
+    v10 = shaped(accelerating(s, u, p, d), s, p, d)
     return clip(v10, p.VSTMIN, p.VSTMAX)
 
 
 def pss2b_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
     """Write the states into x that still inputs lead to; vs is then 0."""
-    accelerating_rest(u, p, x, LAGS)
+    accelerating_rest(u, p, x)
     x.V1 = x.V3 = x.V10 = 0.0
 
 
@@ -72,14 +70,13 @@ PSS2B = documented(
     pss2b,
     pss2b_rest,
     sheet(
-        *ACCELERATING[:-2],
-        ("M", 5.0, "1", (1.0, 5.0), "number of lags of the ramp tracking filter"),
+        *ACCELERATING,
         *of_stabiliser(KS1=20.0, T1=0.15, T2=0.025, T3=0.15, T4=0.025, T10=0.0, T11=0.033),
         *limits("VSI1MAX", 0.08, -0.08, "the first input"),
         *limits("VSI2MAX", 1.25, -1.25, "the second input"),
         *of_stabiliser(VSTMAX=0.1, VSTMIN=-0.1),
     ),
-    "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 V1 V3 V10",
+    "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 R6 R7 R8 V1 V3 V10",
     inputs="speed p",
     aliases="PSS2A",
     records=(
@@ -148,14 +145,14 @@ def pss2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     compensated frequency of an input fc. Typical data are a sample of the standard,
     as GridKit has them, with KS2 for H = 5.05 s.
     """
-    v10 = shaped(accelerating(s, u, p, d, MOST_LAGS, p.N), s, p, d)
+    v10 = shaped(accelerating(s, u, p, d), s, p, d)
     v12, d.V12 = lead_lag(v10, s.V12, p.T12, p.T13)
     return switched(clip(v12, p.VSTMIN, p.VSTMAX), s, u, p, d)
 
 
 def pss2c_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
     """Write the states into x that still inputs lead to; vs is then 0."""
-    accelerating_rest(u, p, x, MOST_LAGS)
+    accelerating_rest(u, p, x)
     x.V1 = x.V3 = x.V10 = x.V12 = 0.0
     switch_rest(u, p, x)
 
@@ -210,7 +207,7 @@ def psssb(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     gives by hand, and PowerWorld at the start of a simulation: at rest it is over.
     Typical data are PSS2B's; VCUTOFF is that of a record of InterPSS.
     """
-    v1, d.V1 = lead_lag(p.KS1 * accelerating(s, u, p, d, MOST_LAGS, p.N), s.V1, p.T1, p.T2)
+    v1, d.V1 = lead_lag(p.KS1 * accelerating(s, u, p, d), s.V1, p.T1, p.T2)
     v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
     d.VT0 = 0.0
     return where(s.VT0 - u.vt > p.VCUTOFF, 0.0, clip(v3, p.VSTMIN, p.VSTMAX))
@@ -218,7 +215,7 @@ def psssb(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def psssb_rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
     """Write the states into x that still inputs lead to; vs is then 0."""
-    accelerating_rest(u, p, x, MOST_LAGS)
+    accelerating_rest(u, p, x)
     x.V1 = x.V3 = 0.0
     x.VT0 = u.vt
 
