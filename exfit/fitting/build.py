@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from exfit.case.schema import (
     start_value,
 )
 from exfit.engine.system import System
-from exfit.errors import CaseError
+from exfit.errors import CaseError, SimulationError
 from exfit.fitting.channels import channel_of, filtered_end, with_filter, without_masked
 from exfit.fitting.experiment import (
     Channel,
@@ -31,19 +32,35 @@ from exfit.fitting.recordings import deviation, levels_of, record_of, span_of, s
 from exfit.fitting.system import system_of
 from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, SPEED, VT0
 from exfit.records.record import Record
-from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInput, SplinedInput
+from exfit.simulation.inputs import Inputs, InputStep, RecordedInput, SplinedInput
+from exfit.simulation.memory import RunSize, check_fit
 from exfit.simulation.simulator import LARGEST_STEP, Simulator
 from exfit.util.arrays import Array
 
+MOST_SAMPLES = 1e7
 TWIN_STEP = 1e-3  # s, of what simulates beside another program
 
 
 def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:
-    """Build the tests of a case with the records that it is fitted to; CaseError without any."""
+    """Build the tests of a case with the records that it is fitted to.
+
+    Raises CaseError without any, and where their fit needs more memory than it may take.
+    """
     if not case.recordings:
         raise CaseError(f"{case.path}: record: missing; a fit needs a record")
     values = case.values() if start is None else start
-    return tuple(build_experiment(case, recording, values) for recording in case.recordings)
+    setups, sizes, free = list[ExperimentSetup](), list[RunSize](), len(case.free())
+    for recording in case.recordings:
+        setup = build_experiment(case, recording, values)
+        setups.append(setup)
+        own, free = setup.experiment.simulator, free + len(setup.free)
+        size = RunSize(own.steps, len(own.times), len(own.system.outputs), len(setup.channels))
+        sizes.append(size)
+        try:
+            check_fit(sizes, free, case.simulation.memory)
+        except SimulationError as fault:
+            raise CaseError(f"{case.path}: {fault}") from None
+    return tuple(setups)
 
 
 def build_experiment(case: Case, recording: Recording, values: Values) -> ExperimentSetup:
@@ -275,10 +292,10 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
             for name in missing
         )
     count = max(1.0, duration / case.simulation.output_step)
-    if count > MOST_STEPS:
+    if count > MOST_SAMPLES:
         raise CaseError(
             f"{case.path}: simulation.output_step: {case.simulation.output_step:g} s divides "
-            f"the duration of {duration:g} s into more than {MOST_STEPS:.0e} samples"
+            f"the duration of {duration:g} s into more than {MOST_SAMPLES:.0e} samples"
         )
     times = np.linspace(0.0, duration, round(count) + 1)
     recorded: Mapping[str, RecordedInput] = {}
@@ -293,13 +310,16 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
 
 def _simulator(case: Case, system: System, inputs: Inputs, times: Array) -> Simulator:
     """Simulator on the grid that a case gives, or the first one that is tried for its accuracy."""
-    step = case.simulation.step
-    if step != "auto":
-        return Simulator(system, inputs, times, step)
-    if case.external is not None:  # another program has a step of its own
-        return Simulator(system, inputs, times, TWIN_STEP)
-    accuracy = case.simulation.accuracy
-    return Simulator(system, inputs, times, LARGEST_STEP, located=True, accuracy=accuracy)
+    given = case.simulation
+    try:
+        of_case = partial(Simulator, system, inputs, times, memory=given.memory)
+        if given.step != "auto":
+            return of_case(given.step)
+        if case.external is not None:  # another program has a step of its own
+            return of_case(TWIN_STEP)
+        return of_case(LARGEST_STEP, located=True, accuracy=given.accuracy)
+    except SimulationError as fault:
+        raise CaseError(f"{case.path}: {fault}") from None
 
 
 def planned(case: Case, signals: Sequence[str] = ("vt",)) -> Experiment:

@@ -9,11 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from exfit.errors import SimulationError
 from exfit.simulation.interpolation import ON_GRID, GridSegment
 from exfit.util.arrays import Array, median_step
 
-MOST_STEPS = 1e7  # three hours at 1 ms
 PAUSE = 1e-9  # s: steps and ramps that follow one another sooner are one move
 
 
@@ -293,11 +291,6 @@ def each(names: Iterable[str]) -> tuple[Direction, ...]:
 
 def grid_segments(inputs: Inputs, step: float) -> list[GridSegment]:
     """Divide inputs at their exact steps, which so fall on the grid, into steps of ``step``."""
-    if (inputs.end - inputs.start) / step > MOST_STEPS:
-        raise SimulationError(
-            f"simulation.step: {step:g} s divides {inputs.end - inputs.start:g} s into more than "
-            f"{MOST_STEPS:.0e} steps"
-        )
     exact = (at for change in inputs.steps if not change.smooth for at in (change.at, change.end))
     instants = {at for at in exact if inputs.start < at < inputs.end}
     result = []

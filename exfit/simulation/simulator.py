@@ -3,6 +3,7 @@
 from collections.abc import Callable, Container, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from exfit.signals import OF_STEP
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
 from exfit.simulation.located_test import LocatedTest, SamplePlaces, exact
+from exfit.simulation.memory import DEFAULT_MEMORY, RunSize, check_run
 from exfit.simulation.responder import Counts, Kept, Responder, Values
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
@@ -79,6 +81,7 @@ class Simulator:
     ``responder`` gives the response at these times in place of the equations, not that on the grid.
     ``located``, the crossings of limits are found within a step, which starts anew from there; with
     an ``accuracy`` (pu) the step is one by which signals err by less, see ``with_enough_substeps``.
+    Raises SimulationError where that takes more than so much ``memory``, GB.
     """
 
     def __init__(
@@ -92,8 +95,11 @@ class Simulator:
         responder: Responder | None = None,
         located: bool = False,
         accuracy: float | None = None,
+        memory: float = DEFAULT_MEMORY,
     ) -> None:
-        self.system, self.inputs, self.times = system, inputs, times
+        steps = (inputs.end - inputs.start) / step
+        check_run(RunSize(steps, len(times), len(system.outputs)), step, memory)
+        self.system, self.inputs, self.times, self.memory = system, inputs, times, memory
         self.step, self.least, self.delay, self.responder = step, least, delay, responder
         self.accuracy = accuracy
         self._share = 1.0  # of the inputs
@@ -188,6 +194,7 @@ class Simulator:
         least: int | None = None,
         delay: float | None = None,
         rough: bool = False,
+        memory: float | None = None,
     ) -> "Simulator":
         """Make the simulator by equations of another system, test or grid; the rest stays.
 
@@ -202,6 +209,7 @@ class Simulator:
             self.delay if delay is None else delay,
             located=self.located,
             accuracy=None if rough else self.accuracy,
+            memory=memory or self.memory,
         )
 
     def at_times(self, times: Array) -> "Simulator":
@@ -368,13 +376,13 @@ class Simulator:
 
     def _halved(self, values: Values, outputs: tuple[str, ...]) -> tuple[Array, Array]:
         """Largest change of outputs (ny,) by halving every step, and their largest value."""
-        coarse = self.remade()
+        coarse = self.remade(memory=inf)  # that of a run allows for this
         if not self.located:
             times = distinct(np.concatenate([segment.times for segment in self._grid]))
             for change in self.inputs.steps:
                 if change.smooth and change.signal not in REFERENCES:
                     times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
-            coarse = self.remade(times=times, delay=0.0)
+            coarse = self.remade(times=times, delay=0.0, memory=inf)
         samples, parts = coarse.samples(values, outputs)
         finer = coarse.remade(step=coarse.step / 2.0, least=parts)
         moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)

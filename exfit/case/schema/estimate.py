@@ -232,3 +232,8 @@ class SimulationSection(Section):
     output_step: Positive = Field(
         default=0.005, description="Spacing of the output if there is no record, s."
     )
+    memory: Positive = Field(
+        default=2.0,
+        description="Memory that a command may take for simulations, GB; it is worked out before "
+        "them.",
+    )
