@@ -45,7 +45,7 @@ def lively(model):
         values |= {"K7": 0.2, "T2": 0.5, "T1": 1.0}
     if model.name == "GGOV1":
         values |= {"Kdgov": 0.5, "Tdgov": 0.2, "Kimw": 0.002, "Dm": 0.05, "Flag": 1.0, "Ldref": 2.0}
-        values |= {"Tc": 0.03, "Trate_Mbase": 0.9, "Aset": 9.0}
+        values |= {"Tc": 0.03, "Teng": 0.2, "Trate_Mbase": 0.9, "Aset": 9.0}
     return values | thermal_governors.LIVELY.get(model.name, {})
 
 
@@ -139,6 +139,7 @@ def ggov1(s, p):
     ratio, R, select = p["Trate_Mbase"], p["R"], p["Rselect"]
     pid = p["Kpgov"] + p["Kigov"] / s + p["Kdgov"] * s * lag(s, p["Tdgov"])
     actuator, turbine = lag(s, p["Tact"]), ratio * p["Kturb"] * lead(s, p["Tc"], p["Tb"])
+    turbine *= thermal_governors.pade(s, p["Teng"])
     fed_back = {1.0: 0.0, 0.0: 0.0, -1.0: actuator, -2.0: 1.0}[select]
     valve = pid / (1.0 + R * fed_back * pid) * actuator
     measured = lag(s, p["Tpelec"]) / ratio
@@ -470,10 +471,23 @@ def typed_ieesgo(x, w, pe, ref, p):
 
 
 def typed_ggov1(x, w, pe, ref, p):
-    measured, mw, slow_error, integral, valve, turbine, warm, hot, load, slow_w, allowed = x
+    (
+        measured,
+        mw,
+        slow_error,
+        integral,
+        valve,
+        turbine,
+        warm,
+        hot,
+        load,
+        slow_w,
+        allowed,
+        *engine,
+    ) = x
     base, stiff = p["Trate_Mbase"], p["Kdgov"] / p["Tdgov"]
     pe0 = POWER / base
-    error = ref + mw - w - p["R"] * measured  # Rselect = 1
+    error = ref + mw - felt(w, p) - p["R"] * measured  # Rselect = 1
     error = np.sign(error) * max(abs(error) - p["db"], 0.0)
     error = min(p["maxerr"], max(p["minerr"], error))
     asked = p["Kpgov"] * error + stiff * (error - slow_error) + integral
@@ -481,7 +495,7 @@ def typed_ggov1(x, w, pe, ref, p):
     may = p["Kpload"] * room + load
     fuel = min(p["VMAX"], max(p["VMIN"], min(asked, may, 1.0, allowed)))
     burnt = valve * (1.0 + w)  # Flag = 1
-    into = p["Kturb"] * (burnt - p["Wfnl"])
+    into, *engine = thermal_governors.late(p["Kturb"] * (burnt - p["Wfnl"]), *engine, p["Teng"])
     share, shape = p["Tc"] / p["Tb"], p["Tsa"] / p["Tsb"]
     opening = min(p["Ropen"], max(p["Rclose"], (fuel - valve) / p["Tact"]))
     return [
@@ -496,6 +510,7 @@ def typed_ggov1(x, w, pe, ref, p):
         p["Kiload"] / p["Kpload"] * (fuel - load),
         (w - slow_w) / p["Ta"],
         (fuel - allowed) / 0.01 + p["Ka"] * (p["Aset"] - (w - slow_w) / p["Ta"]),
+        *engine,
     ], base * (share * into + (1.0 - share) * turbine - p["Dm"] * (1.0 + w))
 
 

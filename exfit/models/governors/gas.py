@@ -1,5 +1,7 @@
 """Governors of gas turbines: GAST and GGOV1."""
 
+from typing import Any
+
 from exfit.models.blocks import (
     Signal,
     clip,
@@ -19,7 +21,9 @@ from exfit.models.blocks import (
 from exfit.models.governor_parts import (
     BAND,
     ON_RATING,
+    PLAIN,
     banded,
+    delayed,
     governor,
     in_use,
     outside_band,
@@ -27,6 +31,8 @@ from exfit.models.governor_parts import (
 from exfit.models.sheet import (
     DIVIDING_TIME,
     LONG_TIME,
+    OF_TWO_PROGRAMS,
+    SHORT_TIME,
     TIME,
     UP_TO_10,
     UP_TO_100,
@@ -153,9 +159,9 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
            │                   VMIN  │
            └─────────────────────────┘
 
-    wf ─►(+)─►[Kturb]─►[1 + sTc]─►(+)─► Pm
-          ▲-           [1 + sTb]   ▲-
-         Wfnl                  Dm (1 + dw)
+    wf ─►(+)─►[Kturb]─►[exp(-sTeng)]─►[1 + sTc]─►(+)─► Pm
+          ▲-                          [1 + sTb]   ▲-
+         Wfnl                                 Dm (1 + dw)
 
     Ldref/Kturb + Wfnl ───────────►(+)─►[Kpload + Kiload/s]─► fsrt
                                  -▲
@@ -188,9 +194,11 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     The equations are those of InterPSS, which has compared them with PowerWorld. In
     doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power), the way
     of wf to fsrt where Dm is not negative (InterPSS multiplies it with the speed
-    there) and the input of Kimw/s (pe, or p without its lag). Not modelled: a dead
-    time of a diesel engine (Teng) and limits of rate of the load limiter (Rup,
-    Rdown). Typical data are those of the public libraries (OpenIPSL, InterPSS).
+    there) and the input of Kimw/s (pe, or p without its lag). The delay of a
+    diesel engine, Teng, stands where OpenIPSL and Dynawo have it; it is a Padé
+    approximant of order two (see DEGOV1). Not modelled: limits of rate of the load
+    limiter (Rup, Rdown), which only Dynawo has, at fsrt. Typical data are those of
+    the public libraries (OpenIPSL, InterPSS).
     """
     low, high, Ldref = (
         in_use(s.VMIN0, p.VMIN),
@@ -211,7 +219,7 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     fsrt = p.Kpload * load + s.LOAD
     fsra = where(p.Ka > 0.0, s.FSRA, NEVER)
     least = smaller(smaller(fsrt, full), fsra)
-    error = u.pref + mw - u.dw - p.R * droop(pe, valve, p)
+    error = u.pref + mw - outside_band(u.dw, p) - p.R * droop(pe, valve, p)
     fsr, fsrn, error = fuel_demand(error, least, low, high, s, p)
     _, d.DERIV = washout(error, s.DERIV, 1.0, p.Tdgov)
     d.INTEG = p.Kigov * (error + (fsr - fsrn) / p.Kpgov)
@@ -222,15 +230,16 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     d.FSRA = (fsr - s.FSRA) / STEP + p.Ka * (p.Aset - acceleration)
     velocity = clip((fsr - valve) / p.Tact, p.Rclose, p.Ropen)
     d.VALVE = limited(velocity, s.VALVE, low, high)
-    power, d.TURB = lead_lag(p.Kturb * (wf - p.Wfnl), s.TURB, p.Tc, p.Tb)
+    burnt, d.ENGINE, d.DENGINE = delayed(p.Kturb * (wf - p.Wfnl), s.ENGINE, s.DENGINE, p.Teng)
+    power, d.TURB = lead_lag(burnt, s.TURB, p.Tc, p.Tb)
     return power - larger(p.Dm, 0.0) * (1.0 + u.dw)
 
 
 def ggov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states into x that hold Pm at rest and return pref."""
     x.PE = x.PE0 = u.p
-    x.MW = x.DERIV = x.ACC = 0.0
-    x.TURB = pm + larger(p.Dm, 0.0)
+    x.MW = x.DERIV = x.ACC = x.DENGINE = 0.0
+    x.TURB = x.ENGINE = pm + larger(p.Dm, 0.0)
     x.VALVE = x.INTEG = x.TEMP = x.TEMPM = x.TURB / p.Kturb + p.Wfnl
     x.VMAX0, x.VMIN0 = larger(p.VMAX, x.VALVE), smaller(p.VMIN, x.VALVE)
     x.Ldref0 = larger(p.Ldref, x.TURB)
@@ -240,6 +249,15 @@ def ggov1_rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     return p.R * where(p.Rselect < -1.5, x.VALVE, droop(x.PE, x.VALVE, p))
 
 
+GGOV1_CONS = (
+    "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng Tfload "
+    "Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown"
+)
+OF_GGOV1: dict[str, Any] = {
+    "icons": {"Rselect": 1, "Flag": 0},
+    "absent": {"Rup": 99.0, "Rdown": -99.0},
+    "ignored": "Trate",
+}
 GGOV1 = governor(
     ggov1,
     ggov1_rest,
@@ -260,6 +278,7 @@ GGOV1 = governor(
         ("Wfnl", 0.2, "pu", (0.0, 1.0), "fuel flow at no load"),
         ("Tb", 0.1, *TIME, "turbine lag"),
         ("Tc", 0.0, *TIME, "turbine lead"),
+        ("Teng", 0.0, *SHORT_TIME, "engine delay"),
         ("Tfload", 3.0, *TIME, "lag of the load limiter"),
         ("Kpload", 2.0, "1", (0.0, 1000.0), "proportional gain of the load limiter"),
         ("Kiload", 0.67, "1/s", (0.0, 1000.0), "integral gain of the load limiter"),
@@ -274,16 +293,19 @@ GGOV1 = governor(
         ("db", 0.0, "pu", (0.0, 1.0), "dead band of the speed error"),
         ("Tsa", 4.0, *TIME, "lead of the exhaust temperature"),
         ("Tsb", 5.0, *TIME, "lag of the exhaust temperature"),
+        *BAND,
     ),
-    "PE MW DERIV INTEG VALVE TURB TEMP TEMPM LOAD ACC FSRA",
-    records=record(
-        "GGOV1",
-        "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng "
-        "Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown",
-        icons={"Rselect": 1, "Flag": 0},
-        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
-        ignored="Trate",
-        held=ON_RATING,
+    "PE MW DERIV INTEG VALVE TURB TEMP TEMPM LOAD ACC FSRA ENGINE DENGINE",
+    aliases="GGOV1D",
+    records=(
+        *record("GGOV1", GGOV1_CONS, held=PLAIN, **OF_GGOV1),
+        *record(
+            "GGOV1D",
+            f"{GGOV1_CONS} DBH DBL",
+            held=ON_RATING,
+            doubt=OF_TWO_PROGRAMS,
+            **OF_GGOV1,
+        ),
     ),
     pslf_records=record(
         "ggov1",
@@ -291,9 +313,9 @@ GGOV1 = governor(
         "Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET Aset Ka Ta db Tsa Tsb "
         "Rup Rdown",
         icons={"Rselect": 1, "Flag": 0},
-        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+        absent={"Rup": 99.0, "Rdown": -99.0},
         ignored="PMWSET",
-        held=ON_RATING,
+        held=PLAIN,
     ),
     setpoints="PE0 VMAX0 VMIN0 Ldref0",
 )
