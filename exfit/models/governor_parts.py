@@ -76,7 +76,7 @@ def governor(
 ) -> Model:
     """Return the documented model of a governor whose equations are per unit of its turbine."""
     rows = (*rows, *RATED)
-    text = f"{text or cleandoc(equations.__doc__ or '')}\n"
+    text = f"{(text or cleandoc(equations.__doc__ or '')).rstrip()}\n"
     text += "".join(OF_BAND for row in rows if row.symbol == "DBH") + OF_RATING
 
     def output(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:

@@ -14,7 +14,7 @@ from exfit.engine.system import Rest, System
 from exfit.engine.tangents import TangentKernel
 from exfit.models import GOVERNORS
 from exfit.models.blocks import SHORTEST, Limited
-from exfit.models.governor_parts import AT_LIMIT
+from exfit.models.governor_parts import AT_LIMIT, delayed
 from exfit.models.sheet import crossed_limits, typical
 from exfit.plants.parts import Names, motion, values_named
 from exfit.simulation.inputs import Inputs, RecordedInput
@@ -214,6 +214,17 @@ def test_a_turbine_of_another_rating_is_that_of_its_own_base(governor):
     one = frequency_response(governor, values | {"Trate_Mbase": 1.0}, POWER)
     other = frequency_response(governor, values | {"Trate_Mbase": ratio}, ratio * POWER)
     np.testing.assert_allclose(other, one * [ratio, 1.0, ratio], rtol=1e-6, atol=1e-9)
+
+
+def test_a_delay_errs_by_what_the_sheets_say():
+    """In degrees at 1/T and 2/T rad/s, from the block's own slopes; its gain is 1."""
+    for turn, degrees in ((1.0, 0.0749), (2.0, 1.972)):
+        poles = np.array([[0.0, 1.0], [-12.0, -6.0]])
+        x, v = np.linalg.solve(1j * turn * np.eye(2) - poles, [0.0, 12.0])
+        y, *slopes = delayed(1.0, x, v, 1.0)
+        np.testing.assert_allclose(slopes, [1j * turn * x, 1j * turn * v], atol=1e-12)
+        assert abs(y) == pytest.approx(1.0, abs=1e-12)
+        assert np.degrees(np.angle(y * np.exp(1j * turn))) == pytest.approx(degrees, abs=1e-3)
 
 
 # --- rest -----------------------------------------------------------------------------------------

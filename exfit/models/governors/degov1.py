@@ -14,7 +14,7 @@ and InterPSS it waits while the throttle is beyond one. T1 = 0 bypasses the
 control box with T3.
 
 The delay of the engine is its Padé approximant of order two, as in OPAL-RT's
-library: its phase errs by 0.08 degrees at 1/TD rad/s and 2.5 at 2/TD. Typical
+library: its phase errs by 0.07 degrees at 1/TD rad/s and 2.0 at 2/TD. Typical
 data are those of a unit that PowerSimulationsDynamics.jl compares with PSS/E,
 with limits of 1 and 0 and the delay of OPAL-RT's library.
 """

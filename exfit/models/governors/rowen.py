@@ -58,7 +58,7 @@ where it asks for more than the speed command. Until it begins, its integral
 follows that command within 10 ms; in OPAL-RT's library and InterPSS it is at
 MAX, and set to the command at that instant. MAX and MIN clip the command. The
 three delays are Padé approximants of order two, as in OPAL-RT's library:
-their phase errs by 0.08 degrees at 1/T rad/s. The fuel is multiplied by the
+their phase errs by 0.07 degrees at 1/T rad/s. The fuel is multiplied by the
 speed as there and in PowerWorld 24; in InterPSS it is not."""
 
 STEP = 0.01  # s, in which the idle temperature control follows the speed command

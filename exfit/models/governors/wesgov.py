@@ -17,7 +17,7 @@ at most, and the power is delayed to half of its own (Padé approximant of
 order two, see DEGOV1). When the program samples, no record says: in
 PowerWorld 24 both begin with the simulation, so that a DTP of several DTC is
 late by half of it. Of a swing of Pm by 1e-3 pu there this model misses
-1.4e-5. Typical data are those of OPAL-RT's library.
+1.1e-5. Typical data are those of OPAL-RT's library.
 """
 
 from exfit.models.blocks import Signal, clip, integrator, lag, larger
