@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -73,7 +74,7 @@ class Part:
         """Where the file gives its free parameters; None: it has none."""
         return None if self.values == "network" else (*self.section, "free")
 
-    @property
+    @cached_property
     def symbols(self) -> tuple[str, ...]:
         """Its parameters by symbol."""
         return tuple(row.symbol for row in self.sheet)

@@ -1,6 +1,6 @@
 """The linear model fun(x + d) = fun(x) + J d at a point, and the steps it proposes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, nan, sqrt
 from typing import NamedTuple
@@ -132,6 +132,22 @@ class LinearModel:
         limit = 2.0 * (norms * float(norms @ sizes) + unseen)
         room = np.minimum(self.point.x - self.box.low, self.box.high - self.point.x) > sizes
         return bool(np.any(room & (abs(self.gradient) > limit)))
+
+    def carried_to(self, point: Point) -> "LinearModel":
+        """Return the model at another point whose Jacobian is taken for the same."""
+        gradient = self.jacobian.T @ point.residuals
+        along = self.directions @ (gradient / self.scale)
+        return replace(
+            self,
+            point=point,
+            gradient=gradient,
+            projected=self.box.projected(point.x, gradient),
+            amounts=np.divide(
+                along, self.singular, np.zeros_like(along), where=self.singular > 0.0
+            ),
+            low=self.scale * (self.box.low - point.x),
+            high=self.scale * (self.box.high - point.x),
+        )
 
     @cached_property
     def gradient_norm(self) -> float:

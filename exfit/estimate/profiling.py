@@ -43,6 +43,7 @@ REACH = 1.0  # of a correction, in units of each variable
 FAR = 30.0  # rises that a correction promises: where it fails, take a shorter step instead
 ENOUGH = 0.1  # of what a correction promises: it is not too long
 DAMPINGS = tuple(10.0**-k for k in range(2, 9))  # of the largest squared singular value
+AS_PROMISED = 0.05  # of a gain: the model that promised it still holds where it leads
 LENGTHS = (0.5, 0.2, 0.05)  # of a correction that is too long
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the linear model on the other side of a kink
 LAST = 1.05  # height that the last step aims at: beyond the crossing
@@ -265,6 +266,10 @@ class Side:
                 trial = min(trial, shorter, key=lambda point: point.cost)
             gain = point.cost - trial.cost
             if gain > 0.0:
+                carried = linear.carried_to(trial)
+                holds = abs(gain - linear.full.promise) <= AS_PROMISED * gain
+                if holds and carried.full.promise <= fine:
+                    return self.spot(carried)
                 point, before = trial, linear
                 linear = yield from self.linearised(problem, point, linear)
             if gain <= fine:

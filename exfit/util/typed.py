@@ -59,6 +59,10 @@ def is_named_values(kind: Any) -> bool:
 
 def plain(content: Any, whole: bool = False) -> Any:
     """Return the plain data of a data class and of all in it; ``whole``: what is stored, too."""
+    if isinstance(content, float):
+        return content if isfinite(content) else None
+    if isinstance(content, str | int | None):
+        return content
     if has_entries(content):
         return _plain_entries(content, whole)
     if isinstance(content, Mapping):
@@ -71,7 +75,7 @@ def plain(content: Any, whole: bool = False) -> Any:
         return [content.real, content.imag]
     if isinstance(content, Path):
         return str(content)
-    return None if isinstance(content, float) and not isfinite(content) else content
+    return content
 
 
 def _plain_entries(content: Any, whole: bool) -> dict[str, Any]:
