@@ -57,7 +57,7 @@ class ImportPlan:
         files = (None,) if planned is None else (planned.raw, None)
         found = (self.power_flows.get(file, {}).get(key, NO_RATINGS) for file in files)
         ratings = given
-        for other in (*found, Ratings(unit.kv, unit.mva, ra=unit.ra)):
+        for other in (*found, ratings_of_record(unit)):
             ratings = ratings.over(other)
         return ratings
 
@@ -309,6 +309,11 @@ def path_of(file: str | PathLike[str] | None) -> Path | None:
     return None if file is None else Path(file)
 
 
+def ratings_of_record(unit: Unit) -> Ratings:
+    """Return what the records of a unit state of its ratings."""
+    return Ratings(unit.kv, unit.mva, ra=unit.ra, compensation=unit.compensation)
+
+
 def key_of(unit: Unit) -> UnitKey:
     """Return the bus of a unit and its id in capitals."""
     return UnitKey(unit.bus, unit.id.upper())
@@ -354,7 +359,7 @@ class CaseMaker:
                 raise ExfitError(units)
             unit = _unit_of(case, units, case.dyr)
             planner = unit_data(unit, relative(case.dyr, folder))
-            ratings = Ratings(unit.kv, unit.mva, ra=unit.ra)
+            ratings = ratings_of_record(unit)
             flow = {} if case.raw is None else self.power_flows[case.raw]
             if isinstance(flow, str):
                 raise ExfitError(flow)

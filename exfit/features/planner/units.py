@@ -51,6 +51,7 @@ OTHERS: Mapping[str, str] = {
     for name in names.split()
 }
 
+COMPENSATION = "IEEEVC"  # |vt + (Rc + jXc) it|
 CLASSICAL = {"GENCLS": "a constant voltage behind a reactance, with nothing to verify"}
 
 
@@ -64,8 +65,8 @@ class Unit:
     """A unit; ``warnings`` say, by line, what of the file its models do not represent.
 
     ``unknown`` are the names of its records that exfit has no model of, which are left out; ``kv``,
-    ``mva`` and ``ra``, of the stator, are None, ``bus_name`` is "", where the file does not state
-    them.
+    ``mva``, ``ra``, of the stator, and ``compensation``, Rc and Xc of IEEEVC, are None,
+    ``bus_name`` is "", where the file does not state them.
     """
 
     bus: int
@@ -81,6 +82,7 @@ class Unit:
     mva: float | None = None
     ra: float | None = None
     bus_name: str = ""
+    compensation: tuple[float, float] | None = None
 
     @property
     def added(self) -> tuple[Reading, ...]:
@@ -244,7 +246,13 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     if faults or not parts.keys() >= {MACHINE, ""}:
         return None, faults
     exciter, governor = parts[""], parts.get(GOVERNOR)
-    unknown = [head for head in heads if head.definition is None]
+    of_load = next((head for head in heads if head.name.upper() == COMPENSATION), None)
+    compensation = None if of_load is None else _compensation(of_load)
+    if of_load is not None and compensation is not None:
+        what = f"{of_load.name} acts on load: it is Rc and Xc of a network"
+        warnings.append(DynamicsFault(of_load.line, what))
+    known = None if compensation is None else of_load
+    unknown = [head for head in heads if head.definition is None and head is not known]
     warnings += [DynamicsFault(head.line, _left_out(head.name)) for head in unknown]
     unit = Unit(
         heads[0].bus,
@@ -258,8 +266,18 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
         tuple(head.name for head in unknown),
         *_ratings(heads),
         heads[0].bus_name,
+        compensation,
     )
     return unit, []
+
+
+def _compensation(head: Head) -> tuple[float, float] | None:
+    """Return Rc and Xc of a record of two numbers, None for another."""
+    try:
+        Rc, Xc = map(number, head.fields)
+    except ValueError:
+        return None
+    return Rc, Xc
 
 
 def _ratings(heads: Iterable[Head]) -> tuple[float | None, float | None, float | None]:

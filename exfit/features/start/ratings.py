@@ -29,7 +29,10 @@ class StepUp(NamedTuple):
 
 @dataclass(frozen=True)
 class Ratings:
-    """What is known of a unit; None is not known. ``ra`` is the resistance of its stator, pu."""
+    """What is known of a unit; None is not known.
+
+    ``ra`` is the resistance of its stator, ``compensation`` Rc and Xc of its load compensation, pu.
+    """
 
     kv: float | None = None
     mva: float | None = None
@@ -38,6 +41,7 @@ class Ratings:
     f0: float | None = None
     step_up: StepUp | None = None
     ra: float | None = None
+    compensation: tuple[float, float] | None = None
 
     def over(self, other: "Ratings") -> "Ratings":
         """Return these ratings, and those of another source where there is none."""
@@ -127,6 +131,8 @@ def _with_network(draft: CaseDraft, ratings: Ratings) -> CaseDraft:
         known["X"] = Noted(x, "pu, the step-up transformer's: recorded behind it")
     if ratings.ra:
         known["Ra"] = Noted(ratings.ra, "pu, the stator's")
+    for name, value in zip(("Rc", "Xc"), ratings.compensation or (), strict=False):
+        known[name] = Noted(value, "pu, load compensation")
     plant = {**plant, "network": {**plant["network"], **known}}
     return replace(draft, sections={**draft.sections, "plant": plant})
 

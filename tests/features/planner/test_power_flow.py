@@ -254,6 +254,16 @@ def test_a_channel_that_the_record_does_not_have_is_named(run):
     assert "ifd: Other: no column" in ran.err
 
 
+@pytest.mark.parametrize("values", ["0.015 0.08", "0.0 -0.05"])
+def test_a_load_compensation_is_that_of_the_network(run, values):
+    event()
+    Path("net.raw").write_text(power_flow(33))
+    with Path("units.dyr").open("a") as file:
+        file.write(f"\n9 'IEEEVC' 1 {values} /\n")
+    network = load_case(imported(run, "--raw", "net.raw")).plant.network
+    assert [network["Rc"], network["Xc"]] == [*map(float, values.split())]
+
+
 def test_a_file_of_pslf_answers_kv_and_mva_itself(run):
     from loose_dyd import PSLF_UNIT
 
