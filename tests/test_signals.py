@@ -12,7 +12,7 @@ from exfit.cli.completion import noises
 from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
-from exfit.plants import BREAKER, FAULT, SATURATION, SPEED
+from exfit.plants import BREAKER, FAULT, OF_GOVERNOR, SATURATION, SPEED
 from exfit.plants.alone import alone
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.open_circuit import open_circuit
@@ -24,7 +24,7 @@ from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["quadratic"]
 SYSTEMS = {
     "infinite-bus": system(
-        MACHINE, inputs=(*ALL_INPUTS, *FAULT, "pref"), governor=GOVERNORS["TGOV1"]
+        MACHINE, inputs=(*ALL_INPUTS, *FAULT, *OF_GOVERNOR), governor=GOVERNORS["TGOV1"]
     ),
     "grid-playback": grid_playback(UnitOnLoad(EXCITER, MACHINE, QUADRATIC)),
     "open-circuit": open_circuit(EXCITER, MACHINE, QUADRATIC, ("vref", "vs")),

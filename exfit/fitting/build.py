@@ -30,7 +30,7 @@ from exfit.fitting.experiment import (
 from exfit.fitting.nuisances import TURN, Found, nuisances_of, prefix_from
 from exfit.fitting.recordings import deviation, levels_of, record_of, span_of, speed_at_start
 from exfit.fitting.system import system_of
-from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, SPEED, VT0
+from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, SPEED, SWITCHED, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.memory import RunSize, check_fit
@@ -254,8 +254,8 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
 
 
 def _network_steps(case: Case, test: BumpTest, values: Values) -> Iterator[InputStep]:
-    """Yield the changes of R, X and E; a switch sets a value from then on."""
-    now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
+    """Yield the changes of R, X, E and a load; a switch sets a value from then on."""
+    now = {name: values.get(NETWORK + name) for name in SWITCHED}
     events: list[StepSection | Switch] = [*test.E, *test.network]
     for event in sorted(events, key=lambda event: event.at):
         for name, level in now.items():

@@ -227,8 +227,10 @@ def _source_of(
 
 def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     """Parameters that a record gives: the levels of its signals at the start."""
-    kind, vt0 = case.kind, initial_level(test, record, "vt")
-    low, high = POSSIBLE_VOLTAGES
+    kind = case.kind
+    if "governor" in kind.needs:
+        return {initial(signal): mean_at_rest(test, record, signal) for signal in kind.levels}
+    vt0, (low, high) = initial_level(test, record, "vt"), POSSIBLE_VOLTAGES
     if kind.per_unit and (kind.has_machine or not kind.levels) and not low <= vt0 <= high:
         raise RecordError(
             f"{record.source}: vt rests at {vt0:.4g} pu, outside {low:g} ... {high:g}: its unit, "

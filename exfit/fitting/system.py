@@ -17,6 +17,7 @@ from exfit.plants import (
     REFERENCES,
     SATURATION,
     SPEED,
+    SWITCHED,
     Dialect,
     Equipment,
     SaturationForm,
@@ -76,7 +77,7 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     """
     changed = {"vref"}
     for test in case.tests:
-        changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
+        changed |= {name for name in (*REFERENCES, "E", "angle") if getattr(test, name)}
         changed |= _changed_around(test)
     if case.kind.plays_back:
         records = _record_files(case).values()
@@ -86,12 +87,12 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed.add(BREAKER)
     if recording is not None:
         changed |= {*driving_after_opening(case, recording)}
-    inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", *FAULT, BREAKER, "efd", SPEED)
+    inputs = (*REFERENCES, "angle", *SWITCHED, *FAULT, BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
 
 
 def _changed_around(test: BumpTest) -> set[str]:
-    changed = {n for each in test.network for n in ("R", "X", "E") if getattr(each, n) is not None}
+    changed = {n for each in test.network for n in SWITCHED if getattr(each, n) is not None}
     turning = set() if test.speed is test.speed_change is None else {SPEED}
     return changed | turning | ({*FAULT} if test.fault else set())
 

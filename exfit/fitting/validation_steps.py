@@ -122,7 +122,7 @@ def _stepped(case: Case, test: BumpTest) -> str | None:
     if test.E or test.angle or test.network or test.fault or test.breaker:
         text = (
             "changes the network or opens the breaker: the steps of a record by hand are those of "
-            "vref, vs or pref"
+            "vref, vs, pref or fs"
         )
         raise CaseError(f"{case.path}: test: {text}; give the record under validate")
     if not case.kind.events:

@@ -30,9 +30,13 @@ DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
 MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
 BREAKER, SPEED = "breaker", "speed"  # inputs: 1 from the opening on; the recorded change of speed
 FAULT = ("fault_G", "fault_B")  # inputs: the admittance of a fault at the terminals
+GATE = "gate"  # an output: the opening of the gate, the valve or the fuel valve
+OF_LOAD = ("PL", "QL", "YP", "YQ")  # values of a load that a test may change
+SWITCHED = ("R", "X", "E", *OF_LOAD)
 
-OF_EXCITER = ("vref", "vs")
-REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
+OF_EXCITER, OF_GOVERNOR = ("vref", "vs"), ("pref", "fs")
+# inputs that are given as steps, ramps, tables or records
+REFERENCES = (*OF_EXCITER, *OF_GOVERNOR)
 # what a test may change in any plant, those of features among them
 EVENTS = (*REFERENCES, "E", "angle", "network", "fault", BREAKER)
 # what a stabiliser may listen to: pa is the accelerating power, fc the compensated frequency, none
@@ -43,7 +47,7 @@ STATOR_CURRENT = "scl"  # of the two sides of excitation, with an output for eac
 GATES = {"takeover": "", "takeover-output": "_out"}  # how the inputs of an exciter end
 SUMMING = "summing"
 PLACES = (*GATES, SUMMING)
-Requirement = Literal["exciter", "machine", "network"]
+Requirement = Literal["exciter", "machine", "network", "governor"]
 # whose equations of a unit are solved
 Dialect = Literal["standard", "psse", "powerworld", "andes"]
 PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
@@ -211,9 +215,11 @@ class Kinds(Mapping[str, PlantKind]):
     CORE: Mapping[str, str] = {
         "open-circuit": "open_circuit:OPEN_CIRCUIT",
         "infinite-bus": "infinite_bus:INFINITE_BUS",
+        "isolated": "isolated:ISOLATED",
         "machine-on-load": "machine_on_load:MACHINE_ON_LOAD",
         "playback": "playback:PLAYBACK",
         "machine-playback": "playback:MACHINE_PLAYBACK",
+        "governor-playback": "playback:GOVERNOR_PLAYBACK",
         "none": "alone:ALONE",
         "external": "outside:OUTSIDE",
         "fmu": "outside:FMU",

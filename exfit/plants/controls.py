@@ -4,14 +4,40 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from exfit.engine.system import Signals
+from exfit.engine.trace import Signal
 from exfit.models.blocks import Limited
 from exfit.models.governor_parts import AT_LIMIT
 from exfit.models.sheet import Model
-from exfit.plants import Stabilised
-from exfit.plants.parts import Names
+from exfit.plants import GATE, GOVERNOR, Stabilised
+from exfit.plants.parts import Names, output_of
 from exfit.util.text import show
 
 ROUNDING_AT_REST = 1e-9  # pu/s
+# by governor, the state that is the opening of its gate, its valve or its fuel valve, pu
+GATES = {"GAST": "V1", "GGOV1": "VALVE", "HYGOV": "G", "IEEEG1": "VALVE", "TGOV1": "V1"}
+
+
+def gate(governor: Model | None, state: Signals) -> dict[str, Signal]:
+    """Return the opening of the gate under its name; nothing where no state is one."""
+    own = None if governor is None else GATES.get(governor.name)
+    return {} if own is None else {GATE: state[GOVERNOR + own]}
+
+
+def turbine_power(
+    governor: Model, seen: Names, fs: Signal, p: Signals, state: Signals, d: Names
+) -> Signal:
+    """Write the slopes of a governor into ``d`` and return Pm.
+
+    The signal ``fs`` is added to the speed that the governor measures, and not to the speed by
+    which the turbine's power falls (Dt, Dturb): the output is read at the speed itself. For that
+    the power must wait for the gate, see `case.checks.equipment`.
+    """
+    measured = Names(**{**vars(seen), "dw": seen.dw + fs})
+    power = output_of(GOVERNOR, governor, measured, p, state, d)
+    if isinstance(fs, float):
+        return power
+    return output_of(GOVERNOR, governor, seen, p, state, Names())
 
 
 def why_no_rest(governor: Model, values: Mapping[str, float], power: float) -> str | None:

@@ -12,9 +12,11 @@ currents by Newton's rounds, which begin at the load's admittance of the start.
 
 from typing import NamedTuple
 
+from exfit.engine.system import Signals
 from exfit.engine.trace import Signal, cos, sin, sqrt, where
 from exfit.models.machines import Axes, Source
 from exfit.models.sheet import UP_TO_10, WITHIN_10, Sheet, sheet
+from exfit.plants import OF_LOAD
 from exfit.plants.loaded_machine import Flow
 from exfit.plants.parts import Names
 
@@ -71,6 +73,19 @@ def complex_number(real: Signal, imaginary: Signal) -> Matrix:
     return Matrix(real, -imaginary, imaginary, real)
 
 
+def switched(n: Names, u: Signals) -> Names:
+    """Return the values of a network with the changes that inputs make to its load."""
+    values = vars(n)
+    changed = [name for name in OF_LOAD if name in values and name in u]
+    return Names(**values | {name: values[name] + u[name] for name in changed})
+
+
+def load_power(n: Names, vt: Signal) -> tuple[Signal, Signal]:
+    """Return P and Q of the load at a voltage."""
+    G, B = load_admittance(n, vt * vt)
+    return G * vt * vt, -B * vt * vt
+
+
 def load_admittance(n: Names, square: Signal) -> tuple[Signal, Signal]:
     """Return G and B of the load where the voltage of its bus has this square."""
     size = sqrt(square)
@@ -118,16 +133,28 @@ def machine_current(
     kept = IDENTITY.plus(stator.times(fault)).inverse
     inner, source = kept.of(at.voltage), Axes(E * sin(delta), E * cos(delta))
     towards = kept.times(stator).plus(complex_number(line.R, line.X)).inverse
-    v = source if load is None else far_voltage(inner, towards, source, load, far)
+    v = source
+    if load is not None:
+        beyond = complex_number(load.Rs, load.Xs).inverse
+        v = far_voltage(inner, towards, source, beyond, load, far)
     i = towards.of(Axes(inner.d - v.d, inner.q - v.q))
     drop = stator.of(i)
     drawn = fault.of(kept.of(Axes(at.voltage.d - drop.d, at.voltage.q - drop.q)))
     return Axes(i.d + drawn.d, i.q + drawn.q)
 
 
-def far_voltage(inner: Axes, towards: Matrix, source: Axes, n: Names, far: Signal) -> Axes:
-    """Return the voltage of the far bus between two voltages, ``towards`` the admittance to one."""
-    beyond = complex_number(n.Rs, n.Xs).inverse
+def isolated_current(at: Source, n: Names, vt0: Signal) -> Axes:
+    """Return the current of a machine that feeds the load alone; not a number without solution."""
+    outward = Matrix(at.ra, -at.xq, at.xd, at.ra).inverse
+    still = Axes(0.0, 0.0)
+    v = far_voltage(at.voltage, outward, still, complex_number(0.0, 0.0), n, vt0)
+    return outward.of(Axes(at.voltage.d - v.d, at.voltage.q - v.q))
+
+
+def far_voltage(
+    inner: Axes, towards: Matrix, source: Axes, beyond: Matrix, n: Names, far: Signal
+) -> Axes:
+    """Return the voltage of the load's bus between two voltages, by the admittances to them."""
     both, one, other = towards.plus(beyond), towards.of(inner), beyond.of(source)
     driven = Axes(one.d + other.d, one.q + other.q)
     v = both.plus(complex_number(*load_admittance(n, far * far))).inverse.of(driven)

@@ -13,6 +13,7 @@ from exfit.models.sheet import UP_TO_10, WITHIN_10, Model, Sheet, sheet
 from exfit.plants import (
     BREAKER,
     FAULT,
+    GATE,
     MACHINE,
     MEASURED,
     NETWORK,
@@ -24,7 +25,14 @@ from exfit.plants import (
     Stabilised,
     compared,
 )
-from exfit.plants.far_bus import BEHIND_LOAD, LOAD, FaultedLine, machine_current, source_behind
+from exfit.plants.far_bus import (
+    BEHIND_LOAD,
+    LOAD,
+    FaultedLine,
+    machine_current,
+    source_behind,
+    switched,
+)
 from exfit.plants.limiting import Limiters, signals_of
 from exfit.plants.loaded_machine import Terminals, behind, breaker_of, current, voltage
 from exfit.plants.parts import (
@@ -59,6 +67,7 @@ OFTEN_STILL = (
     "angle",
     "vs",
     "pref",
+    "fs",
     *FAULT,
 )  # inputs that are there where they change
 AT_FAR_BUS = frozenset(row.symbol for row in (*LOAD, *BEHIND_LOAD))
@@ -100,16 +109,17 @@ def infinite_bus(
 ) -> System:
     """Return an exciter on a machine behind R + jX to a stiff source.
 
-    Its power Pm is constant unless there is a governor. 2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as
-    in PSS/E; another ``dialect`` has it otherwise. Parameters are the exciter's, those of
-    machine, network, stabiliser and governor under their prefixes (``network.X``), and the initial
-    voltage ``vt0``. The inputs are changes: of the references ``vref`` and ``pref``, of ``vs``
-    beside the stabiliser, of ``vc1``, the voltage that the exciter measures, of ``E`` and its
-    ``angle`` (rad), of ``R`` and ``X``, of ``fault_G`` and ``fault_B``, the admittance of a fault
-    at the terminals. With the input ``breaker`` a breaker opens where that is 1: p, q and it are
-    zero from then on, delta stays, and vt follows the speed, which is the simulated one, or 1 and
-    the input ``speed``. ``load`` names the given values of a load at the far bus (`far_bus`). All
-    per unit on the machine's base; ``delta``, to the source as it is, in rad, ``speed`` 1 when
+    Its power Pm is constant unless there is a governor. 2H dw/dt = (Pm - D dw) / (1 + dw) - Te,
+    as in PSS/E; another ``dialect`` has it otherwise. Parameters are the exciter's, those of
+    machine, network, stabiliser and governor under their prefixes (``network.X``), and the
+    initial voltage ``vt0``. The inputs are changes: of the references ``vref`` and ``pref``, of
+    ``vs`` beside the stabiliser, of ``fs``, added to the speed that the governor measures, of
+    ``vc1``, the voltage that the exciter measures, of ``E`` and its ``angle`` (rad), of ``R``
+    and ``X``, of ``fault_G`` and ``fault_B``, the admittance of a fault at the terminals. With
+    the input ``breaker`` a breaker opens where that is 1: p, q and it are zero from then on,
+    delta stays, and vt follows the speed, which is the simulated one, or 1 and the input
+    ``speed``. ``load`` names the given values of a load at the far bus (`far_bus`). All per
+    unit on the machine's base; ``delta``, to the source as it is, in rad, ``speed`` 1 when
     rated.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
@@ -131,7 +141,7 @@ def infinite_bus(
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
-        n = named_parameters(p, NETWORK, network)
+        n = switched(named_parameters(p, NETWORK, network), u)
         changed = Names(**{name: u.get(name, 0.0) for name in OFTEN_STILL})
         fluxes = values_named(x, machine.states)
         E, R, X = r["source"] + changed.E, n.R + changed.R, n.X + changed.X
@@ -156,7 +166,7 @@ def infinite_bus(
         terminals = Terminals(fluxes, voltage(at, i, factor), i, dw)
         it = modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]
-        controls = Controls(vref, changed.vs, u.get(MEASURED, 0.0), changed.pref)
+        controls = Controls(vref, changed.vs, u.get(MEASURED, 0.0), changed.pref, changed.fs)
         efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, p, {**r, **x}, n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         if breaker is not None:
@@ -170,7 +180,7 @@ def infinite_bus(
         setpoints=(*unit.setpoints, "source", *far),
         states=unit.states,
         inputs=inputs,
-        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states, *signals_of(unit.limiters)))),
+        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.shown, *signals_of(unit.limiters)))),
         time_constants=unit.time_constants,
         rest=rest,
         motion=equations,
@@ -196,8 +206,8 @@ INFINITE_BUS = PlantKind(
     name="infinite-bus",
     title="on load, behind R + jX to a stiff source",
     needs=("exciter", "machine", "network"),
-    events=("vref", "vs", "pref", "E", "angle", "network", "fault", BREAKER),
-    signals=compared(OUTPUTS),
+    events=("vref", "vs", "pref", "fs", "E", "angle", "network", "fault", BREAKER),
+    signals=(*compared(OUTPUTS), GATE),
     network=lambda given: flow_sheet("E" if "E" in given else "Q", AT_FAR_BUS.intersection(given)),
     network_required=("f0", "X", "P"),
     build=_build,

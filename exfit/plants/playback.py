@@ -9,13 +9,17 @@ from exfit.models.machines import Machine
 from exfit.models.sheet import Model
 from exfit.plants import (
     DRIVING_SCALE,
+    GATE,
+    GOVERNOR,
     MACHINE,
     OF_EXCITER,
+    SPEED,
     VT0,
     Equipment,
     PlantKind,
     SaturationForm,
 )
+from exfit.plants.controls import gate
 from exfit.plants.limiting import (
     Limiters,
     limited_exciter,
@@ -32,10 +36,12 @@ from exfit.plants.parts import (
     initial,
     motion,
     named_parameters,
+    output_of,
     present,
     refuse_taken,
     rest_of,
     seconds,
+    states_at_rest,
     symbols,
 )
 
@@ -185,4 +191,56 @@ MACHINE_PLAYBACK = PlantKind(
     required=("efd",),
     scaled=("efd",),
     build=lambda equipment: machine_playback(present(equipment.machine)),
+)
+
+
+@cache
+def governor_playback(model: Model) -> System:
+    """Return a governor with its turbine that the recorded speed drives.
+
+    The inputs are the changes of the ``speed`` from the start, where it counts as rated, and of the
+    reference ``pref``. The parameter ``p0`` is the power there. The power ``p`` that is shown, and
+    that the governor measures, is that of the turbine: what accelerates the rotor is left out.
+    """
+    names = tuple(GOVERNOR + name for name in (*model.states, *model.setpoints))
+    gates = tuple(gate(model, dict.fromkeys(names, 0.0)))
+    reference, states = GOVERNOR + "pref", names[: len(model.states)]
+
+    def rest(p: Signals) -> Rest:
+        power = p[initial("p")]
+        pref, found = states_at_rest(GOVERNOR, model, power, Names(dw=0.0, p=power), p)
+        kept = {name: found.pop(name) for name in names[len(states) :]}
+        return Rest(found, {reference: pref, **kept})
+
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+        state, d = {**r, **x}, Names()
+        seen = Names(dw=u[SPEED], p=p[initial("p")], pref=r[reference] + u.get("pref", 0.0))
+        # no model has a way from the measured power to its output but through its states
+        seen.p = output_of(GOVERNOR, model, seen, p, state, Names())
+        output_of(GOVERNOR, model, seen, p, state, d)
+        shown = {SPEED: 1.0 + u[SPEED], "p": seen.p, **gate(model, state)}
+        return motion(d, states, {**x, **shown})
+
+    return System(
+        parameters=(*symbols((GOVERNOR, model.sheet)), initial("p")),
+        setpoints=(reference, *names[len(states) :]),
+        states=states,
+        inputs=(SPEED, "pref"),
+        outputs=(SPEED, "p", *gates, *states),
+        time_constants=seconds((GOVERNOR, model.sheet)),
+        rest=rest,
+        motion=equations,
+    )
+
+
+GOVERNOR_PLAYBACK = PlantKind(
+    name="governor-playback",
+    title="the governor alone, driven by the recorded speed",
+    needs=("governor",),
+    events=("pref",),
+    signals=(SPEED, "pref", "p", GATE),
+    driving=(SPEED, "pref"),
+    required=(SPEED, "p"),
+    levels=("p",),
+    build=lambda equipment: governor_playback(present(equipment.governor)),
 )

@@ -9,7 +9,7 @@ from exfit.engine.trace import Signal
 from exfit.models.machines import Axes, Machine, Source
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, STABILISER, Dialect, SaturationForm, Stabilised
-from exfit.plants.controls import listening
+from exfit.plants.controls import gate, listening, turbine_power
 from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
 from exfit.plants.loaded_machine import (
     Flow,
@@ -88,6 +88,11 @@ class UnitOnLoad(NamedTuple):
         return self.stabiliser is not None and "fc" in self.stabiliser.inputs
 
     @property
+    def shown(self) -> tuple[str, ...]:
+        """What it shows beside the signals of its plant: the gate of the governor, the states."""
+        return (*gate(self.governor, dict.fromkeys(self.states, 0.0)), *self.states)
+
+    @property
     def setpoints(self) -> tuple[str, ...]:
         """Setpoints that hold the unit at rest."""
         held = ("vref", *self.exciter.setpoints)
@@ -117,22 +122,23 @@ class UnitOnLoad(NamedTuple):
 class Controls(NamedTuple):
     """Inputs of a unit beside its terminals: reference, vs, and the voltage added to vc1.
 
-    ``pref`` is the change of the governor's reference.
+    ``pref`` is the change of the governor's reference, ``fs`` is added to the speed it measures.
     """
 
     vref: Signal
     vs: Signal = 0.0
     measured: Signal = 0.0
     pref: Signal = 0.0
+    fs: Signal = 0.0
 
 
 class Excited(NamedTuple):
-    """Signals of a unit beside its terminals; the outputs of its limiters by name."""
+    """Signals of a unit beside its terminals; the gate and the outputs of its limiters by name."""
 
     efd: Signal
     ifd: Signal
     vc1: Signal
-    limiters: Signals
+    others: Signals
 
 
 def unit_at_rest(
@@ -204,7 +210,7 @@ def unit_motion(
         Pm = state["Pm"]
     else:
         seen = Names(dw=at.dw, p=power, pref=state[REFERENCE] + controls.pref)
-        Pm = output_of(GOVERNOR, unit.governor, seen, p, state, d)
+        Pm = turbine_power(unit.governor, seen, controls.fs, p, state, d)
     if unit.stabiliser is not None:
         heard = Names(speed=at.dw, p=power, vt=vt, pa=Pm - braking, none=0.0)
         if unit.hears_frequency:
@@ -224,4 +230,4 @@ def unit_motion(
     if unit.speed_in_stator or unit.machine.speed:
         braking = braking / (1.0 + state["dw"])
     d.dw = (driving - braking) / (2.0 * of_machine.H)
-    return Excited(efd, ifd, vc1, signals)
+    return Excited(efd, ifd, vc1, {**signals, **gate(unit.governor, state)})

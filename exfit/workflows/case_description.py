@@ -19,7 +19,7 @@ from exfit.fitting.system import driving_after_opening
 from exfit.inference.confidence import closed
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
-from exfit.plants import GOVERNOR, MACHINE, NETWORK, REFERENCES, STABILISER
+from exfit.plants import GOVERNOR, MACHINE, NETWORK, REFERENCES, STABILISER, SWITCHED
 from exfit.plants.parts import initial
 from exfit.records.reading import file_hash
 from exfit.results.comparisons import Comparison
@@ -213,7 +213,7 @@ def _events(case: Case, recording: Recording, identified: Identified) -> Iterato
             change = f"angle of the source {each.step:+g} {each.unit} at {each.at:g} s"
             yield change + _ramp(each.ramp)
     for switch in test.network:
-        values = {name: getattr(switch, name) for name in ("R", "X", "E")}
+        values = {name: getattr(switch, name) for name in SWITCHED}
         changes = (f"{name} {value:g} pu" for name, value in values.items() if value is not None)
         yield f"network switched at {switch.at:g} s: {', '.join(changes)}"
     for fault in test.fault:

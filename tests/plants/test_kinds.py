@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from sources import ROOT, nodes
 
 from exfit.case import schema
-from exfit.models import MODELS
+from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import EVENTS, KINDS, SATURATION, Equipment
 from exfit.registry import parts
@@ -20,6 +20,7 @@ EQUIPMENT = Equipment(
     SATURATION["quadratic"],
     recorded=frozenset(RECORDED),
     given=frozenset({"Q", "vref"}),
+    governor=GOVERNORS["TGOV1"],
 )
 
 

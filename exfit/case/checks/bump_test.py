@@ -6,7 +6,7 @@ from itertools import pairwise
 from exfit.case.checks.model import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
-from exfit.plants import BREAKER, EVENTS, REFERENCES, SPEED, PlantKind
+from exfit.plants import BREAKER, EVENTS, REFERENCES, SPEED, SWITCHED, PlantKind
 from exfit.util.text import show
 
 AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
@@ -19,7 +19,7 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
     for name in EVENTS:
         yield from _step_faults(test, name)
         yield from _table_faults(test.at(name), duration)
-        for place, at in _moves(test.at(name)):
+        for place, at in moves_of(test.at(name)):
             yield from place_faults(place, at, duration)
         if name not in kind.events and name in test:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
@@ -33,10 +33,12 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
         from exfit.case.checks.speed import speed_faults
 
         yield from speed_faults(test, kind)
-    for switch in test.at("network").entries:
-        if switch.at("E").number is not None and "E" not in network:
-            text = "only where plant.network gives E; test.E changes it by steps"
-            yield switch.at("E").fault(text)
+    there = {row.symbol for row in kind.network(network.content)}
+    for switch in test.at("network").entries if "network" in kind.events else ():
+        for name in SWITCHED:
+            if switch.at(name).number is not None and name not in there:
+                steps = "; test.E changes it by steps" if name == "E" else ""
+                yield switch.at(name).fault(f"only where plant.network gives {name}{steps}")
     if not kind.plays_back and test.content and not {*EVENTS} & test.content.keys():
         yield test.fault(f"no step: give one of {', '.join(kind.events)}")
     yield from _rest_faults(test, kind)
@@ -82,7 +84,7 @@ def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
             at = event.at("at").start
             if at is not None:
                 yield event.at("at"), at
-        yield from _moves(test.at(name))
+        yield from moves_of(test.at(name))
     opens = test.at(BREAKER, "opens")
     if opens.start is not None:
         yield opens, opens.start
@@ -95,7 +97,7 @@ def _rows(given: ContentNode) -> list[tuple[float, float]]:
     return rows if len(rows) == len(pairs) else []
 
 
-def _moves(given: ContentNode) -> Iterator[tuple[ContentNode, float]]:
+def moves_of(given: ContentNode) -> Iterator[tuple[ContentNode, float]]:
     """Yield the instants from which on the lines of a table rise or fall, with their places."""
     for k, ((time, value), (_, then)) in enumerate(pairwise(_rows(given))):
         if then != value:
@@ -127,8 +129,8 @@ def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
     """Yield steps that change nothing, are out of order, or outside the duration."""
     before = ContentNode((), None)
     for step in test.at(name).entries:
-        if name == "network" and step.is_section and not {"R", "X", "E"} & step.content.keys():
-            yield step.fault("changes nothing: give R, X or E")
+        if name == "network" and step.is_section and not {*SWITCHED} & step.content.keys():
+            yield step.fault("changes nothing: give R, X, E or a value of the load")
         at, start, ramp = step.at("at").start, before.at("at").start, before.at("ramp").number
         if at is not None:
             if start is not None and at <= start:
@@ -146,54 +148,6 @@ def place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[F
     """Yield an instant outside a test that begins at 0 and has a known end."""
     if end is not None and not 0 <= at < end:
         yield place.fault(f"{show(at)} s lies outside 0 ... {show(end)} s, the duration")
-
-
-def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
-    """Yield the faults of a breaker that opens, beside the rest of its test and its record."""
-    breaker, channels = test.at(BREAKER), record.at("channels")
-    if test.value == {} and kind.events == (BREAKER,):
-        yield breaker.fault(f"is missing: nothing else acts with plant {kind.name}")
-    if not breaker.is_section:
-        return
-    driving, opens = driving_signals(test, record, kind), breaker.at("opens")
-    if breaker.at("speed").text == "recorded" and SPEED not in channels:
-        yield breaker.at("speed").fault("recorded needs the channel speed in the record")
-    for signal in driving:
-        idle = ("weight", "noise", "filter", "outliers", "sine") if signal == SPEED else ()
-        yield from driving_faults(channels.at(signal), idle)
-    if driving and (record.at("delay").value or 0) != 0:
-        text = f"not allowed where the record's {' and '.join(driving)} drives the simulation"
-        yield record.at("delay").fault(text)
-    if opens.is_section:
-        yield from _free_instant_faults(test, driving)
-    if opens.start is not None:
-        yield from _instant_faults(test, opens, opens.start)
-
-
-def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterator[Fault]:
-    """Refuse an instant of the opening that cannot be found: it shifts the whole response."""
-    opens = test.at(BREAKER, "opens")
-    others = [name for name in (*EVENTS, "begin") if name != BREAKER and name in test]
-    if others:
-        text = f"must be a number where the test has {' and '.join(others)} as well"
-        yield opens.fault(text)
-    if driving:
-        text = f"must be a number: the record's {' and '.join(driving)} drives the simulation"
-        yield opens.fault(text)
-
-
-def _instant_faults(test: ContentNode, opens: ContentNode, start: float) -> Iterator[Fault]:
-    """Refuse an opening outside the test, and switchings of which the machine is parted."""
-    yield from place_faults(opens, start, test.at("duration").number)
-    events = [
-        (event.at("at"), event.at("at").number)
-        for name in ("E", "angle", "network")
-        for event in test.at(name).entries
-    ]
-    for place, at in (*events, *_moves(test.at("angle"))):
-        if at is not None and at >= start:
-            parted = f"the breaker is open from {show(start)} s on"
-            yield place.fault(f"{show(at)} s: no effect, as {parted}")
 
 
 def driving_signals(test: ContentNode, record: ContentNode, kind: PlantKind) -> tuple[str, ...]:
@@ -230,7 +184,9 @@ def reference_faults(
         given, channel = test.at(signal), record.at("channels", signal)
         recorded, elsewhere = channel.value is not None, given.value is not None
         if given.text == RECORDED:
-            yield from _recorded_faults(test, record, signal, kind, has_record)
+            from exfit.case.checks.recorded import recorded_faults
+
+            yield from recorded_faults(test, record, signal, kind, has_record)
         elif recorded and signal in kind.recorded_inputs:
             text = f"drives nothing: give test.{signal}: {RECORDED}"
             if elsewhere:
@@ -245,26 +201,6 @@ def reference_faults(
         if "file" in given and kind.plays_back:
             text = f"not allowed with plant {kind.name}: give the record a channel {signal}"
             yield given.fault(text)
-
-
-def _recorded_faults(
-    test: ContentNode, record: ContentNode, signal: str, kind: PlantKind, has_record: bool
-) -> Iterator[Fault]:
-    """Yield what hinders a test from taking a reference from its record."""
-    given, channel = test.at(signal), record.at("channels", signal)
-    if kind.plays_back:
-        drives = f"record.channels.{signal} drives it without"
-        yield given.fault(f"not allowed with plant {kind.name}: {drives}")
-    elif not has_record:
-        yield given.fault(f"{RECORDED} needs a record")
-    elif channel.value is None:
-        yield channel.fault(f"is missing: test.{signal} is {RECORDED}")
-    if "begin" in test and not kind.plays_back:
-        shown = "the record shows it from its start only"
-        yield test.at("begin").fault(f"not allowed with {signal}: {RECORDED}: {shown}")
-    if "resample" in record:
-        text = f"not allowed with test.{signal}: {RECORDED}: its filter smears the jumps"
-        yield record.at("resample").fault(text)
 
 
 def findable_faults(

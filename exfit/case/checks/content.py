@@ -6,7 +6,6 @@ from typing import Any
 
 from exfit import registry
 from exfit.case.checks.bump_test import (
-    breaker_faults,
     bump_test_faults,
     driving_signals,
     findable_faults,
@@ -25,7 +24,7 @@ from exfit.case.checks.record import (
 from exfit.case.parts import ANY_PLANT, Parts, kind_of, network_part, plants_of_records
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
-from exfit.plants import KINDS, REFERENCES, PlantKind
+from exfit.plants import BREAKER, GATE, KINDS, OF_GOVERNOR, REFERENCES, PlantKind
 from exfit.util.vocabulary import DEFAULT_SEARCH
 
 OF_EXCITER = ("model", "saturation", "efd_times_speed", "stabiliser", "governor")
@@ -119,7 +118,10 @@ def _plant_faults(
             yield content.at("model").fault("is missing")
     else:
         for key in (*OF_EXCITER, "parameters", "limiters"):
-            if key in content:
+            if key in kind.needs:
+                if not content.at(key).content:
+                    yield content.at(key).fault(f"is missing: plant {kind.name} needs it")
+            elif key in content:
                 text = f"not allowed with plant {kind.name}: it has no exciter"
                 yield content.at(key).fault(text)
     for place in plants_of_records(content.content):
@@ -155,20 +157,24 @@ def _recording_faults(
     has_record = "record" in recording
     yield from bump_test_faults(test, network, kind)
     yield from findable_faults(test, record, kind, has_record)
-    yield from breaker_faults(test, record, kind)
+    if BREAKER in test or kind.events == (BREAKER,):
+        from exfit.case.checks.breaker import breaker_faults
+
+        yield from breaker_faults(test, record, kind)
     yield from reference_faults(test, record, kind, has_record)
     for signal in REFERENCES:
         if "file" in test.at(signal):
             yield from channel_faults(signal, test.at(signal), kind.per_unit)
-    if not content.at("governor").content and kind.has_equations:
-        for place in (test.at("pref"), record.at("channels", "pref")):
+    if not content.at("governor").content and "governor" not in kind.needs and kind.has_equations:
+        channels = record.at("channels")
+        for place in (*map(test.at, OF_GOVERNOR), *map(channels.at, (*OF_GOVERNOR, GATE))):
             if place.value is not None:
                 yield place.fault("needs a governor: there is none")
     if not has_record:
         if kind.plays_back:
             yield record.fault(f"is missing: plant {kind.name} plays it back")
         return
-    yield from record_faults(test, record)
+    yield from record_faults(test, record, "governor" not in kind.needs)
     fits = _fits(content)
     yield from channels_faults(record, own, kind, fits or not kind.finds_rest)
     if kind.plays_back and "vs" in record.at("channels") and content.at("stabiliser").content:

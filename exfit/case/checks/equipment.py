@@ -1,15 +1,21 @@
 """What contradicts itself in what is attached to a unit: stabiliser, governor, limiters."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+
+import numpy as np
 
 from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
-from exfit.plants import FURTHER, HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
-from exfit.plants.controls import rests_with_output, why_no_rest
+from exfit.plants import FURTHER, GATE, HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
+from exfit.plants.controls import GATES, rests_with_output, why_no_rest
 from exfit.plants.limiting import inputs_for_limiters
+from exfit.plants.parts import Names
 from exfit.util.text import show, show_value
+
+HALF_LOAD = 0.5  # pu of power: within the limits of any governor
+SMALL = 1e-4  # pu of speed
 
 
 def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
@@ -75,6 +81,12 @@ def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -
     """Yield a governor that does not hold the power at the start."""
     records = (*content.at("records").entries, *content.at("validate").entries)
     values = _start_values(section, model)
+    for recording in (content, *records):
+        channel, added = recording.at("record", "channels", GATE), recording.at("test", "fs")
+        if channel.value is not None and model.name not in GATES:
+            yield channel.fault(f"{model.name} has no state that is the gate")
+        if added.value is not None and values and _passes_speed_at_once(model, values):
+            yield added.fault(f"the power of {model.name} must wait for its gate: give it a lag")
     nodes = (content.at("plant"), *(record.at("plant") for record in records))
     for power in dict.fromkeys(plant.at("network", "P").number for plant in nodes):
         if power is None or values is None:
@@ -82,6 +94,19 @@ def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -
         if why := why_no_rest(model, values, power):
             text = f"{model.name} does not rest at P = {show(power)} pu: {why}"
             yield section.at("parameters").fault(text)
+
+
+def _passes_speed_at_once(governor: Model, values: Mapping[str, float]) -> bool:
+    """Test whether the power of a governor follows its reference without any lag."""
+    p, x = Names(**values), Names()
+    u = Names(dw=0.0, p=np.float64(HALF_LOAD))
+    with np.errstate(all="ignore"):
+        pref = governor.rest(u.p, u, p, x)
+        powers = [
+            governor.equations(x, Names(**{**vars(u), "pref": pref + change}), p, Names())
+            for change in (-SMALL, 0.0, SMALL)
+        ]
+    return bool(np.ptp(powers) > 0.0)
 
 
 def _limiter_faults(content: ContentNode, parts: Parts, off_line: bool) -> Iterator[Fault]:

@@ -21,8 +21,10 @@ COLUMNS_OF_A_PHASOR = (1, 3)
 PER_UNIT = "pu"
 
 
-def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
-    """Check a record, and it against its test."""
+def record_faults(
+    test: ContentNode, record: ContentNode, with_voltage: bool = True
+) -> Iterator[Fault]:
+    """Check a record, and it against its test; ``with_voltage``: that at rest must be known."""
     channels, begin = record.at("channels"), test.at("begin")
     if "duration" in test:
         yield test.at("duration").fault("only without a record; record.window cuts a record")
@@ -33,7 +35,8 @@ def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
     if "vt0" not in test:
         if begin.number is not None:
             yield test.at("vt0").fault("is missing: it must be given with begin")
-        if channels.content and "begin" not in test and "vt" not in channels:
+        known = "begin" in test or "vt" in channels
+        if channels.content and with_voltage and not known:
             text = "is missing, and the record has no vt to take it from"
             yield test.at("vt0").fault(text)
     window = record.at("window").pair

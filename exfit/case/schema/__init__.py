@@ -236,7 +236,7 @@ class CaseDocument(Section):
     model: Text | None = Field(
         default=None,
         description="Name of a model, in upper or lower case, or path of a .py file; none with "
-        "plant machine-playback or machine-on-load.",
+        "plant machine-playback, governor-playback or machine-on-load.",
     )
     saturation: SaturationName = Field(
         default="quadratic",

@@ -38,6 +38,9 @@ DIALECT = (
     "Whose equations are solved: standard, psse, which differs for PSS4B, powerworld, andes; see "
     "[On load](../plants.md#on-load)."
 )
+ISOLATED = Field(
+    description="f0 (Hz); PL, QL, IP, IQ, YP and YQ of the load, Ra, Rc and Xc as of infinite-bus."
+)
 LOAD = Field(description="P and Q until the breaker opens, pu on the base of the machine.")
 
 
@@ -104,6 +107,13 @@ class InfiniteBus(WithMachine, WithNetwork):
     dialect: Dialect = Field(default="standard", description=DIALECT)
 
 
+class Isolated(InfiniteBus):
+    """A unit alone on a load at its terminals."""
+
+    type: Literal["isolated"] = Field(description="Kind of plant.")  # type: ignore[assignment]
+    network: Frozen[Known] = ISOLATED
+
+
 class GridPlayback(WithMachine, WithNetwork):
     """A unit driven by the voltage and the angle or frequency that were recorded in a grid event.
 
@@ -153,6 +163,12 @@ class MachinePlayback(WithMachine):
     """A recorded field voltage drives the machine on open circuit; vt and ifd are compared."""
 
     type: Literal["machine-playback"] = Field(description="Kind of plant; the case has no model.")
+
+
+class GovernorPlayback(PlantSection):
+    """A recorded speed drives the governor; p and the gate are compared."""
+
+    type: Literal["governor-playback"] = Field(description="Kind of plant; the case has no model.")
 
 
 class NoPlant(PlantSection):
@@ -252,9 +268,11 @@ def kind_of_plant(value: Any) -> Any:
 Plant = Annotated[
     Annotated[Later[OpenCircuit], Tag("open-circuit")]
     | Annotated[Later[InfiniteBus], Tag("infinite-bus")]
+    | Annotated[Later[Isolated], Tag("isolated")]
     | Annotated[Later[GridPlayback], Tag("grid-playback")]
     | Annotated[Later[Playback], Tag("playback")]
     | Annotated[Later[MachinePlayback], Tag("machine-playback")]
+    | Annotated[Later[GovernorPlayback], Tag("governor-playback")]
     | Annotated[Later[MachineOnLoad], Tag("machine-on-load")]
     | Annotated[Later[NoPlant], Tag("none")]
     | Annotated[Later[ExternalPlant], Tag("external")]
@@ -279,7 +297,7 @@ class AddedModel(Section):
     std_errors: StdErrors = STD_ERRORS
 
 
-WholePlant = type[OpenCircuit] | type[InfiniteBus] | type[MachineOnLoad]
+WholePlant = type[OpenCircuit] | type[InfiniteBus] | type[Isolated] | type[MachineOnLoad]
 
 
 class OffLine(PlantSection):
@@ -302,6 +320,14 @@ class OnLine(WithNetwork):
     sources: Sources = STATED
 
 
+class AloneOnItsLoad(OnLine):
+    """The unit of the case alone on a load."""
+
+    type: Literal["isolated"] = Field(description="Kind of plant.")  # type: ignore[assignment]
+    whole: ClassVar[WholePlant] = Isolated
+    network: Frozen[Sourced] = ISOLATED
+
+
 class AloneOnLoad(WithNetwork):
     """The machine of the case without its exciter, on load until its breaker opens."""
 
@@ -314,6 +340,7 @@ class AloneOnLoad(WithNetwork):
 OwnPlant = Annotated[
     Annotated[Later[OffLine], Tag("open-circuit")]
     | Annotated[Later[OnLine], Tag("infinite-bus")]
+    | Annotated[Later[AloneOnItsLoad], Tag("isolated")]
     | Annotated[Later[AloneOnLoad], Tag("machine-on-load")],
     Discriminator(kind_of_plant),
 ]

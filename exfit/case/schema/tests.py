@@ -122,11 +122,15 @@ Reference = Annotated[
 
 
 class Switch(Section):
-    """A switching in the network, with the values from then on."""
+    """A switching in the network or of a load, with the values from then on."""
 
     at: Number = Field(description="Time, s.")
     R: NotNegative | None = Field(default=None, description="Resistance to the source, pu.")
     X: NotNegative | None = Field(default=None, description="Reactance to the source, pu.")
+    PL: Number | None = Field(default=None, description="PL of the load, pu.")
+    QL: Number | None = Field(default=None, description="Its QL.")
+    YP: Number | None = Field(default=None, description="Its YP.")
+    YQ: Number | None = Field(default=None, description="Its YQ.")
     E: Positive | None = Field(
         default=None, description="Voltage of the source, pu; only if plant.network gives E."
     )
@@ -257,6 +261,10 @@ class BumpTest(Section):
         description="The reference of the governor, given like vref: a power, or with TGOV1, "
         "HYGOV and GGOV1 a speed, the droop times a power.",
     )
+    fs: Reference = Field(
+        default=(),
+        description="Added to the speed that the governor measures, pu, given like vref.",
+    )
     E: tuple[Later[StepSection], ...] = Field(
         default=(),
         min_length=1,
@@ -268,7 +276,7 @@ class BumpTest(Section):
         "infinite-bus only. Where a line trips it changes with E, R and X.",
     )
     network: tuple[Later[Switch], ...] = Field(
-        default=(), min_length=1, description="Switchings of R, X and E; infinite-bus only."
+        default=(), min_length=1, description="Switchings of R, X and E, or a load."
     )
     fault: tuple[Later[FaultSection], ...] = Field(
         default=(),
@@ -291,7 +299,7 @@ class BumpTest(Section):
         return given if isinstance(given, tuple) else ()
 
     def reference(self, signal: str) -> Reference:
-        """Give vref, vs or pref as the case has it."""
+        """Give vref, vs, pref or fs as the case has it."""
         given: Reference = getattr(self, signal)
         return given
 

@@ -10,6 +10,7 @@ from exfit.models.blocks import modulus
 from exfit.models.machines import Axes
 from exfit.models.sheet import Sheet, sheet
 from exfit.plants import (
+    GATE,
     MACHINE,
     MEASURED,
     NETWORK,
@@ -128,7 +129,8 @@ def in_grid(
     )
     terminals = Terminals(fluxes, voltage(at, i), i, state["dw"])
     vref = state["vref"] + u["vref"]
-    controls = Controls(vref, u.get("vs", 0.0), pref=u.get("pref", 0.0))
+    changed = {name: u.get(name, 0.0) for name in ("vs", "pref", "fs")}
+    controls = Controls(vref, **changed)
     efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, p, state, n, d)
     d.delta = 2.0 * pi * n.f0 * state["dw"]
     measured = terminals
@@ -180,8 +182,8 @@ def grid_playback(
     """Return a unit behind R + jX to a recorded voltage.
 
     Its inputs are the changes of the recorded voltage ``vt`` and its ``angle`` (rad) from what they
-    are at the start, where the angle may grow evenly; and of ``vref``, ``vs`` and ``pref``. The
-    parameters are those of the unit and the network, and the levels at the start: ``vt0`` of
+    are at the start, where the angle may grow evenly; and of ``vref``, ``vs``, ``pref``, ``fs``.
+    The parameters are those of the unit and the network, and the levels at the start: ``vt0`` of
     the recorded voltage, ``p0`` and ``q0`` unless the network has P or Q, ``speed0``. The powers,
     and the current, are those at the recorded voltage or at the ``terminals``. All per unit on the
     machine's base; ``delta``, to the recorded voltage, in rad.
@@ -255,7 +257,7 @@ def grid_playback(
         setpoints=(*unit.setpoints, *(e.prefix + name for e, o in others for name in o.setpoints)),
         states=states,
         inputs=inputs,
-        outputs=tuple(dict.fromkeys((*OUTPUTS, *states, *signals_of(unit.limiters)))),
+        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.shown, *states, *signals_of(unit.limiters)))),
         time_constants=(
             *unit.time_constants,
             *(each.prefix + name for each, other in others for name in other.time_constants),
@@ -287,7 +289,7 @@ GRID_PLAYBACK = PlantKind(
     title="on load, driven by the grid's recorded voltage and angle",
     needs=("exciter", "machine", "network"),
     events=REFERENCES,
-    signals=("vt", *DRIVING_ANGLE, *REFERENCES, "efd", "ifd", "p", "q", "it", "speed"),
+    signals=("vt", *DRIVING_ANGLE, *REFERENCES, "efd", "ifd", "p", "q", "it", "speed", GATE),
     driving=("vt", *DRIVING_ANGLE, *REFERENCES),
     required=("vt",),
     required_one_of=DRIVING_ANGLE,
