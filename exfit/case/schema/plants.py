@@ -39,7 +39,7 @@ DIALECT = (
     "[On load](../plants.md#on-load)."
 )
 ISOLATED = Field(
-    description="f0 (Hz); PL, QL, IP, IQ, YP and YQ of the load, Ra, Rc and Xc as of infinite-bus."
+    description="f0; PL, QL, IP, IQ, YP, YQ of the load, Ra, Rc, Xc: as of infinite-bus."
 )
 LOAD = Field(description="P and Q until the breaker opens, pu on the base of the machine.")
 
