@@ -15,7 +15,14 @@ from exfit.util.text import show
 
 ROUNDING_AT_REST = 1e-9  # pu/s
 # by governor, the state that is the opening of its gate, its valve or its fuel valve, pu
-GATES = {"GAST": "V1", "GGOV1": "VALVE", "HYGOV": "G", "IEEEG1": "VALVE", "TGOV1": "V1"}
+GATES = {
+    "GAST": "V1",
+    "GGOV1": "VALVE",
+    "HYGOV": "G",
+    "IEEEG1": "VALVE",
+    "TGOV1": "V1",
+    "TGOV3": "VALVE",
+}
 
 
 def gate(governor: Model | None, state: Signals) -> dict[str, Signal]:
