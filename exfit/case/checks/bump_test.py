@@ -33,15 +33,20 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
         from exfit.case.checks.speed import speed_faults
 
         yield from speed_faults(test, kind)
+    yield from _switch_faults(test, network, kind)
+    if not kind.plays_back and test.content and not {*EVENTS} & test.content.keys():
+        yield test.fault(f"no step: give one of {', '.join(kind.events)}")
+    yield from _rest_faults(test, kind)
+
+
+def _switch_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield switchings of what the network does not have."""
     there = {row.symbol for row in kind.network(network.content)}
     for switch in test.at("network").entries if "network" in kind.events else ():
         for name in SWITCHED:
             if switch.at(name).number is not None and name not in there:
                 steps = "; test.E changes it by steps" if name == "E" else ""
                 yield switch.at(name).fault(f"only where plant.network gives {name}{steps}")
-    if not kind.plays_back and test.content and not {*EVENTS} & test.content.keys():
-        yield test.fault(f"no step: give one of {', '.join(kind.events)}")
-    yield from _rest_faults(test, kind)
 
 
 def _rest_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:

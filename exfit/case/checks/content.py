@@ -117,13 +117,7 @@ def _plant_faults(
         if "model" not in content:
             yield content.at("model").fault("is missing")
     else:
-        for key in (*OF_EXCITER, "parameters", "limiters"):
-            if key in kind.needs:
-                if not content.at(key).content:
-                    yield content.at(key).fault(f"is missing: plant {kind.name} needs it")
-            elif key in content:
-                text = f"not allowed with plant {kind.name}: it has no exciter"
-                yield content.at(key).fault(text)
+        yield from _faults_without_exciter(content, kind)
     for place in plants_of_records(content.content):
         own = content.at(*place)
         network, own_kind = own.at("network"), kind_of(own.content)
@@ -132,6 +126,17 @@ def _plant_faults(
         elif own_kind.on_load and network.is_section:
             part = network_part(network.content, own_kind, place)
             yield from part_faults(content, part, {}, {})
+
+
+def _faults_without_exciter(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield what such a plant needs, and what it does not allow."""
+    for key in (*OF_EXCITER, "parameters", "limiters"):
+        if key in kind.needs:
+            if not content.at(key).content:
+                yield content.at(key).fault(f"is missing: plant {kind.name} needs it")
+        elif key in content:
+            text = f"not allowed with plant {kind.name}: it has no exciter"
+            yield content.at(key).fault(text)
 
 
 def _kind(recording: ContentNode, kind: PlantKind) -> PlantKind:
@@ -165,11 +170,8 @@ def _recording_faults(
     for signal in REFERENCES:
         if "file" in test.at(signal):
             yield from channel_faults(signal, test.at(signal), kind.per_unit)
-    if not content.at("governor").content and "governor" not in kind.needs and kind.has_equations:
-        channels = record.at("channels")
-        for place in (*map(test.at, OF_GOVERNOR), *map(channels.at, (*OF_GOVERNOR, GATE))):
-            if place.value is not None:
-                yield place.fault("needs a governor: there is none")
+    if not content.at("governor").content and "governor" not in kind.needs:
+        yield from _faults_without_governor(test, record, kind)
     if not has_record:
         if kind.plays_back:
             yield record.fault(f"is missing: plant {kind.name} plays it back")
@@ -180,6 +182,16 @@ def _recording_faults(
     if kind.plays_back and "vs" in record.at("channels") and content.at("stabiliser").content:
         text = "not allowed with a stabiliser, whose output it is: leave one of them out"
         yield record.at("channels", "vs").fault(text)
+
+
+def _faults_without_governor(
+    test: ContentNode, record: ContentNode, kind: PlantKind
+) -> Iterator[Fault]:
+    """Yield what acts on a governor, or shows it, where there is none."""
+    channels = record.at("channels")
+    for place in (*map(test.at, OF_GOVERNOR), *map(channels.at, (*OF_GOVERNOR, GATE))):
+        if place.value is not None and kind.has_equations:
+            yield place.fault("needs a governor: there is none")
 
 
 def _fits(content: ContentNode) -> bool:
