@@ -102,7 +102,13 @@ ROWS = (
         "pref", "load reference", turn=12, words=("pref", "load reference", "load setpoint"),
     ),
     SignalRow("fs", "signal added to the speed that the governor measures", turn=13, words=("fs",)),
-    SignalRow("gate", "gate or valve", noise=1e-3, turn=14, base="fully open", words=("gate",)),
+    SignalRow(
+        "gate", "gate or valve", noise=1e-3, turn=14, base="fully open",
+        words=(
+            "gate", "gate position", "wicket gate", "guide vane", "guide vane opening",
+            "leitapparat", "leitschaufel", "vannage", "directrices", "distribuidor", "distributore",
+        ),
+    ),
     SignalRow("vc1", "measured voltage"),
     SignalRow("breaker", "breaker open", ""),
     SignalRow("E", "source voltage"),

@@ -133,6 +133,7 @@ NO_BASES: Mapping[str, Base] = MappingProxyType({})
 DIGITS = 4
 BASE_ON_LOAD = "; check its base: on load the level does not show whether it is the air-gap line"
 SPEED = "speed"  # which no plant with the breaker open has
+GATE = "gate"  # which needs a governor
 COLUMNS_LISTED = 6  # among which the voltage may be
 
 
@@ -205,7 +206,7 @@ def channels_section(
         if channel is None or (signal in OF_EVENT and signal not in only):
             continue
         drives = channel is inspection.reference
-        compared = signal in only and (signal != SPEED or loaded)
+        compared = signal in only and signal != GATE and (signal != SPEED or loaded)
         base = bases.get(signal)
         scale = None if base is not None else scale_to_find(channel, inspection.channels)
         entry = channel_entry(channel, base, scale, drives)

@@ -23,6 +23,10 @@ NAMES = {
     "p": ("Gen MW", "Puissance active", "Potência ativa", "POWR 1[A 20.0]1", "P_el", "Load (MW)"),
     "q": ("Gen MVAR", "Puissance réactive", "Potencia reactiva", "VARS 1[A 20.0]1", "kVAr"),
     "vref": ("AVR setpoint", "Spannungssollwert", "Consigne tension", "Ug Soll", "rUrefRel"),
+    "gate": (
+        "Gate", "Gate position (%)", "Wicket gate", "Guide vane opening", "Leitapparat", "Vannage",
+        "Distribuidor",
+    ),
     None: (
         "Exciter field current", "Pilot exciter volts", "Bus voltage", "Tension réseau",
         "Netzspannung", "MW setpoint", "VOLT 101[HYDRO 13.800]", "AVR output",
