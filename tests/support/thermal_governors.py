@@ -213,11 +213,20 @@ def typed_wesgov(x, w, pe, ref, p):
     ], power
 
 
-HOT = {"TC": 1.0, "T3": 1.0, "T4": 0.5, "MAX": 0.95, "MIN": 0.6, "BF1": 0.01}
+HOT = {
+    "AF1": 0.5,
+    "TC": 0.9935,
+    "TAUT": 0.05,
+    "T3": 1.0,
+    "T4": 0.5,
+    "MAX": 0.95,
+    "MIN": 0.6,
+    "BF1": 0.01,
+}
 TYPED = {
     "TGOV3": (typed_tgov3, 0.05, {"UO": 0.3, "UC": -0.5, "PMAX": 0.9, "PMIN": 0.5, "PRMAX": 0.4}),
     "DEGOV1": (typed_degov1, 0.05, {"K": 10.0, "TMAX": 0.77, "TMIN": 0.5}),
-    "GAST2A": (typed_gast2a, 0.02, HOT),
-    "GASTWD": (typed_gastwd, 0.08, HOT),
-    "WESGOV": (typed_wesgov, 0.02, {}),
+    "GAST2A": (typed_gast2a, -0.02, HOT),
+    "GASTWD": (typed_gastwd, -0.08, HOT | {"TC": 0.9929}),
+    "WESGOV": (typed_wesgov, 0.02, {"ALIM": 0.02}),
 }
