@@ -56,7 +56,7 @@ shield ─►[   1   ]──┘
 The control of the temperature begins where its error falls below 0, and ends
 where it asks for more than the speed command. Until it begins, its integral
 follows that command within 10 ms; in OPAL-RT's library and InterPSS it is at
-MAX, and set to the command at that instant. MAX and MIN clip the command. The
+MAX, and set to the command at that moment. MAX and MIN clip the command. The
 three delays are Padé approximants of order two, as in OPAL-RT's library:
 their phase errs by 0.07 degrees at 1/T rad/s. The fuel is multiplied by the
 speed as there and in PowerWorld 24; in InterPSS it is not."""
