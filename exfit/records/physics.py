@@ -6,7 +6,7 @@ voltage: T'd0 dE'q/dt = efd - ifd (IEEE 1110, the equation of the field circuit)
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import combinations, permutations, product
+from itertools import combinations, islice, permutations, product
 from math import pi
 
 import numpy as np
@@ -34,6 +34,7 @@ MOST_COLUMNS = 7  # of which three are tried as those of the field
 FIELD_RATE = (0.03, 1.5)  # 1/s: efd/efd0 - ifd/ifd0 moves vt/vt0 by this; 1/T'd0, more on load
 APART = 5.0  # times the noise: relative changes of vt and ifd that are certainly not the same
 JUMP = 0.5  # of all that it moves, between two samples: inertia allows no such move
+MOST_PAIRS = 2000  # of an angle and a frequency that are tried
 ALIKE = 4.0  # times what the best choice leaves unexplained: others that leave less may be meant
 BALANCED = 0.1  # of their amplitude: how far phases may be from a balanced system
 PHASES = 3
@@ -93,7 +94,8 @@ def _turning(
     angles = _named_as(named, "angle") or [
         name for name in names if quantity_of(units.get(name, "deg")) == "angle"
     ]
-    for angle, other in product(angles, near):
+    moving = [name for name in angles if near and _moves_beside_line(time, samples[name])]
+    for angle, other in islice(product(moving, near), MOST_PAIRS):
         least = EXPLAINED if angle in units else CERTAINLY_EXPLAINED
         if unit := _integrates(time, samples[angle], samples[other], least):
             yield from _tied_pair(angle, other, unit, _hertz(samples[other]), names)
@@ -198,11 +200,9 @@ def _integrates(time: Array, angle: Array, frequency: Array, least: float) -> st
     A straight line beside it is the rated frequency, which is not known so well.
     """
     whole = np.isfinite(angle) & np.isfinite(frequency)
-    t, a, f = time[whole], angle[whole], frequency[whole]
+    t, a, f = time[whole], _unwrapped(angle[whole]), frequency[whole]
     if len(t) < FEWEST:
         return None
-    unit = unit_by_range(a)
-    a = np.unwrap(a, period=TURNS[unit]) if unit else a
     hertz = f if _hertz(f) == "Hz" else f * 60.0
     turns = np.concatenate([[0.0], np.cumsum(0.5 * (hertz[1:] + hertz[:-1]) * np.diff(t))])
     slope, explained, spread = _law(t, a, turns)
@@ -213,6 +213,19 @@ def _integrates(time: Array, angle: Array, frequency: Array, least: float) -> st
             if abs(slope / (scale * turn) - 1.0) < SAME_TURN:
                 return name
     return None
+
+
+def _unwrapped(angle: Array) -> Array:
+    """Unwrap an angle (M,) that its range shows to jump by turns."""
+    unit = unit_by_range(angle)
+    return np.unwrap(angle, period=TURNS[unit]) if unit else angle
+
+
+def _moves_beside_line(time: Array, angle: Array) -> bool:
+    """Check that an angle (M,) moves beside a straight line by more than its noise."""
+    whole = np.isfinite(angle)
+    a = _unwrapped(angle[whole])
+    return len(a) >= FEWEST and _law(time[whole], a, a)[2] >= MOVES * noise_of(a)
 
 
 def _law(time: Array, y: Array, x: Array) -> tuple[float, float, float]:

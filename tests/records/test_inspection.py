@@ -25,7 +25,14 @@ from exfit.case.suggestion import (
 from exfit.dsp.step_detection import DetectedStep
 from exfit.errors import RecordError
 from exfit.output import figures as plots
-from exfit.records.channel_names import connection_of, guess_signals, three_phases
+from exfit.records import physics
+from exfit.records.channel_names import (
+    Clarity,
+    NameReading,
+    connection_of,
+    guess_signals,
+    three_phases,
+)
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.steps import combined_steps
@@ -542,3 +549,16 @@ def test_the_stated_error_holds_the_instant_of_synthetic_records(with_reference)
         errors.append(step.error / record.interval)
     assert held >= 14  # at 95 %: fewer by chance once in 23 times; seeded
     assert np.median(errors) <= 2.0  # samples
+
+
+def test_columns_without_names_are_not_tried_pair_by_pair(monkeypatch):
+    tried, integrates = [], physics._integrates
+    monkeypatch.setattr(physics, "_integrates", lambda *of: tried.append(1) or integrates(*of))
+    time, rng = np.arange(200) * 0.01, np.random.default_rng(3)
+    noisy = {f"c{k}": 1.0 + 1e-4 * rng.standard_normal(200) for k in range(60)}
+    named = {name: NameReading(None, Clarity.NONE, "") for name in noisy}
+    physics.readings_by_physics(time, noisy, {}, named)
+    assert not tried  # what does not move integrates nothing
+    waves = {name: samples + 0.1 * np.sin(5.0 * time) for name, samples in noisy.items()}
+    physics.readings_by_physics(time, {**waves, "f": noisy["c0"]}, {}, {**named, "f": named["c0"]})
+    assert len(tried) <= physics.MOST_PAIRS
