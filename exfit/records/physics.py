@@ -94,8 +94,7 @@ def _turning(
     angles = _named_as(named, "angle") or [
         name for name in names if quantity_of(units.get(name, "deg")) == "angle"
     ]
-    moving = [name for name in angles if near and _moves_beside_line(time, samples[name])]
-    for angle, other in islice(product(moving, near), MOST_PAIRS):
+    for angle, other in _pairs(time, samples, angles, near):
         least = EXPLAINED if angle in units else CERTAINLY_EXPLAINED
         if unit := _integrates(time, samples[angle], samples[other], least):
             yield from _tied_pair(angle, other, unit, _hertz(samples[other]), names)
@@ -103,6 +102,14 @@ def _turning(
     if near and near[0] in names:
         yield near[0], _frequency(samples[near[0]], units.get(near[0]), near[1:])
     yield from _angle_alone(samples, units, [name for name in angles if name in names])
+
+
+def _pairs(
+    time: Array, samples: Mapping[str, Array], angles: Sequence[str], near: Sequence[str]
+) -> Iterator[tuple[str, str]]:
+    """Yield so many pairs of an angle that moves beside a line, and what may be its frequency."""
+    moving = [name for name in angles if near and _moves_beside_line(time, samples[name])]
+    return islice(product(moving, near), MOST_PAIRS)
 
 
 def _angle_alone(
