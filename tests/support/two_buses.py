@@ -17,7 +17,7 @@ import numpy as np
 from places import REFERENCE
 
 from exfit.engine.trace import exp, log
-from exfit.features.planner.units import read_unit
+from exfit.features.planner.units import read_unit, with_rating
 from exfit.models import GOVERNORS
 from exfit.models.blocks import lag
 from exfit.models.machines import genqec
@@ -43,6 +43,7 @@ from exfit.simulation.simulator import Simulator
 MACHINE_RECORD = """\
 1 'GENROU' 1 6.0 0.033 0.54 0.078 6.4 0.0 0.8958 0.8645 0.1189 0.1969 0.089 0.0521 0.0 0.0 /
 """
+BASE = 100.0  # MVA of the machine
 P, Q = 0.50001, 0.01251  # at bus 1, whose voltage is 1
 LINE, SOURCE, SHUNT, LOAD = 0.1, 0.05, 0.2, (1.0, 0.5)  # X, X, X, P and Q
 FAULT = (0.05, 0.10)  # s
@@ -107,7 +108,7 @@ class TwoBuses:
         records = told["records"]
         if "GEN" not in records[0]:
             records = [MACHINE_RECORD, *records]
-        parts = read_unit("\n".join(records), "case.dyr")
+        parts = with_rating(read_unit("\n".join(records), "case.dyr"), BASE)
         values = {**parts.exciter.values, **prefixed(MACHINE, parts.machine.values)}
         dialect = {"PowerWorld": "powerworld", "PSS/E": "psse"}[told["program"]]
         stabiliser, governor = None, None

@@ -163,7 +163,7 @@ def odd_file(definition, random):
     for bus in (7, 101, 99_999):
         for own, values in partners(definition, random):
             text += loose(own, values, random, bus=bus, machine_id="G1")
-        text += f"{bus} 'IEEEG2' G1 0 0 0.050 3*1.0 / {bus} governor's\n"
+        text += f"{bus} 'WEHGOV' G1 0 0 0.050 3*1.0 / {bus} governor's\n"
         text += f"{bus}, 'USRMDL', '2', 'OWN' 1 2 3.5000, ,/\n"
     text += str(random.choice(["", "\x1a", "\n\n", "/ the end", "  \t"]))
     text = text.replace("\r\n", "\n").replace("\n", ends)
@@ -178,7 +178,7 @@ def odd_file_of_pslf(definition, random):
     for bus in (7, 101, 99_999):
         for own, values in partners(definition, random):
             text += loose_dyd(own, values, random, bus, "G1")
-        text += f'ieeeg3 {bus} ! ! "G1" : mwcap=9 0.050 3.0 # {bus} governor\'s\n'
+        text += f'wehgov {bus} ! ! "G1" : mwcap=9 0.050 3.0 # {bus} governor\'s\n'
         text += f"imetr {bus} ! ! ! 7 ! ! ! : #9\t0.0,\n"
     ends = str(random.choice(["\n", "\r\n", "\r"]))
     return text.replace("\n", ends).encode(str(random.choice(ENCODINGS[:4])))

@@ -163,6 +163,17 @@ GASTWDD KDROOP KP KI KD ETD TCD Trate T MAX MIN ECR K3 A B C TAUF KF K5 K4 T3 T4
         BF2 CF2 TR K6 TC TD DBH DBL
 WESGOVD DTC DTP DROOP KP TI T1 T2 ALIM TPE DBH DBL Trate
 HYGOVD R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL DBH DBL Trate
+IEEEG3 TG TP UO UC PMAX PMIN Rperm Rtemp TR TW A11 A13 A21 A23
+IEEEG3D TG TP UO UC PMAX PMIN Rperm Rtemp TR TW A11 A13 A21 A23 DBH DBL Trate
+HYGOV2D KP KI KA T1 T2 T3 T4 T5 T6 TR Rtemp R VGMAX GMAX GMIN PMAX DBH DBL Trate
+PIDGOVD Feedback Rperm Treg Kp Ki Kd Ta Tb Dturb G0 G1 P1 G2 P2 P3 GMAX GMIN Atw Tw VELMAX VELMIN
+     DBH DBL Trate
+WPIDHYD Treg Reg Kp Ki Kd Ta Tb VELMAX VELMIN GMAX GMIN Tw PMAX PMIN D G0 G1 P1 G2 P2 P3 DBH DBL
+     Trate
+HYGOVR1 DB1 ERR Td T1 T2 T3 T4 T5 T6 T7 T8 Kp R Tt Kg Tp VELOPEN VELCLOSE PMAX PMIN DB2 Tw At Dturb
+     qNL Trate
+HYG3 Cflag Rgate Relec Tt Td K2 Ki K1 Tf Kg Tp VELOPEN VELCLOSE PMAX PMIN DB2 GV1 PGV1 GV2 PGV2 GV3
+     PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6 H0 qNL Tw At Dturb Trate DB1 EPS DB1L
 """
 # PowerWorld's lists of parameters, without what they say that only PowerWorld has
 POWERWORLD = """
@@ -246,6 +257,8 @@ ORDERS = {
 # typed from the one source that there is: PowerWorld's list, InterPSS's files (ST2C, ST3C), and for
 # ESURRY a record of a plant, with which InterPSS's order gives TD = 400 s and K10 = 1
 OF_ONE_SOURCE = {"ESURRY", "PSS5C", "OEL2C", "OEL3C", "UEL2C", "ST2C", "ST3C"}
+# those without a dead band: the order of the form with one, and of PSS/E's IEEEG2 by its diagram
+OF_ONE_SOURCE |= {"HYGOV2", "PIDGOV", "WPIDHY", "IEEEG2"}
 # of PSLF: files that are not at hand, a list of parameters, or taken to be as in PSS/E
 OF_ONE_SOURCE |= {
     *("gensal", "genqec", "genqej", "exac4", "exst4b", "ieeest", "tgov1", "ieeeg1"),

@@ -410,7 +410,7 @@ def test_what_other_units_and_devices_hold_is_no_fault():
 @pytest.mark.parametrize(
     ("record", "words"),
     [
-        ("1 IEEEG2 1 0 0 /", "governor IEEEG2 is left out"),
+        ("1 WEHGOV 1 0 0 /", "governor WEHGOV is left out"),
         ("1 'MAXEX2' 1 0 0 /", "excitation limiter MAXEX2 is left out"),
         (
             "1 'OEL3C' 1 0 1 1 x /",

@@ -55,7 +55,7 @@ def test_a_record_without_an_end_leaves_the_other_units(damaged):
 
 
 FOREIGN = (
-    "{bus} 'IEEEG2' 1 0 0 0.05 /\n", "{bus} 'USRMDL' 1 'HYG3' 5 0 0 1 2*3.5 /\n",
+    "{bus} 'WEHGOV' 1 0 0 0.05 /\n", "{bus} 'USRMDL' 1 'HYG3' 5 0 0 1 2*3.5 /\n",
     "{bus} TGOV1 1 x y /\n", "{bus} 'PSS1A' 1 1 /\n", "{bus} 'UEL1' 1 -9E9 /\n",
     "{bus} 'OEL9' 1 /\n", "{bus} IEELBL 1 1 0 /\n", "{bus} TGOV1 1 .05 .5 1 0 3 10 0 /\n",
 )  # fmt: skip
@@ -72,9 +72,9 @@ def test_no_record_beside_machine_and_exciter_stops_a_unit_and_each_left_out_is_
     assert ([unit.bus for unit in units.units], units.refused) == ([*BUSES], ())
     for unit in units.units:
         assert unit.governor.values["R"] == 0.05
-        assert {*unit.unknown} == {"IEEEG2", "USRMDL HYG3", "OEL9", "IEELBL"}
+        assert {*unit.unknown} == {"WEHGOV", "USRMDL HYG3", "OEL9", "IEELBL"}
         left = [warning.text for warning in unit.warnings if "is left out" in warning.text]
-        names = ("IEEEG2", "USRMDL HYG3", "OEL9", "IEELBL", "TGOV1", "PSS1A", "UEL1")
+        names = ("WEHGOV", "USRMDL HYG3", "OEL9", "IEELBL", "TGOV1", "PSS1A", "UEL1")
         assert [sum(name in words for words in left) for name in names] == [1] * len(names)
 
 
