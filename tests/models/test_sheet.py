@@ -9,7 +9,7 @@ from oracle import lively_values, system_of
 from exfit.errors import SimulationError
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
-from exfit.models.sheet import SHARED, shared
+from exfit.models.sheet import SHARED, contradictions, shared, typical
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
@@ -97,3 +97,25 @@ def test_a_shared_row_is_of_several_exciters(name):
         if shared_row in [row._replace(typical=0.0) for row in model.sheet]
     ]
     assert len(same) > 1
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "fault"),
+    [
+        ("PIDGOV", {"G1": 0.7}, "G2"),
+        ("PIDGOV", {"P3": 0.8}, "P3"),
+        ("WPIDHY", {"G2": 1.0}, "P3"),
+        ("HYG3", {"PGV2": 0.05}, "GV2"),
+        ("HYG3", {"GV6": 1.1}, "GV6"),
+    ],
+)
+def test_a_curve_over_the_gate_that_does_not_rise_is_a_contradiction(name, change, fault):
+    values = typical(GOVERNORS[name].sheet)
+    assert list(contradictions(values)) == []
+    assert [symbol for symbol, _ in contradictions(values | change)] == [fault]
+
+
+def test_points_of_a_curve_over_the_gate_may_coincide():
+    values = typical(GOVERNORS["HYG3"].sheet)
+    none = {name: 0.0 for name in values if name.startswith(("GV", "PGV"))}
+    assert list(contradictions(values | none)) == []
