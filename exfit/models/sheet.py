@@ -568,7 +568,7 @@ GATE_CURVES = (
 def gate_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) where a curve over the gate does not rise, or ends behind a gate of 1.
 
-    Points may coincide.
+    Points may coincide, and those at (0, 0) are none.
     """
     for gates, heights in GATE_CURVES:
         if not {*gates, *heights} - {""} <= values.keys():
@@ -580,7 +580,7 @@ def gate_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
         names = zip(pairwise(zip(gates, heights, strict=True)), pairwise(points), strict=True)
         for (_, (gate, height)), (before, after) in names:
             rises = before[0] < after[0] and before[1] < after[1]
-            if before != after and not rises:
+            if not rises and after not in (before, (0.0, 0.0)):
                 text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
                 yield gate or height, f"the point {text}, ({before[0]:g}, {before[1]:g})"
         if points[-1][0] > 1.0:

@@ -867,6 +867,7 @@ def test_no_parameter_is_inert(governor):
     rows = {row.symbol: row for row in governor.sheet}
     changes = {"Rselect": -2.0, "db": 0.01, "Dt": 1.0, "Ldref": 0.0}
     changes |= {"PRMAX": 0.01, "MIN": 0.5, "T5": 100.0}
+    changes |= {f"GV{k}": values.get(f"GV{k}", 0.0) + 0.05 for k in range(1, 7)}
     changes |= {"DBL": -0.01, "DBH": 0.01, "Trate_Mbase": 0.5}
 
     def felt(changed):
