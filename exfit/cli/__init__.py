@@ -112,6 +112,13 @@ class Commands(click.Group):
                     echo("Interrupted: what was done until then is kept", err=True)
                 raise SystemExit(code_after(signals, code or 0)) from None
 
+    def make_context(self, *arguments: Any, **settings: Any) -> click.Context:
+        """Read the arguments of the program."""
+        try:
+            return super().make_context(*arguments, **settings)
+        except KeyboardInterrupt:
+            raise Interruption from None  # of which click would make an error
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, and turn what is wrong with its input into a message."""
         try:

@@ -8,6 +8,7 @@ import click
 from exfit.cli.options import ANY_PATH, TRUST
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
+from exfit.util.interrupts import interrupted
 from exfit.util.trust import Code, is_trusted, why_refused
 from exfit.util.trust import all_trusted as known
 from exfit.util.trust import trust as remember
@@ -32,7 +33,7 @@ def permit(ctx: click.Context, code: Code) -> None:
             raise ExfitError(why_refused(code))
         place, digits = code.place.absolute().parent, code.sha256[:HASH_DIGITS]
         echo(f"{code.words} in {place}: code with your rights, SHA-256 {digits}...", err=True)
-        if not click.confirm("Have you read it, or do you trust its author?", err=True):
+        if not _confirmed():
             raise ExfitError(why_refused(code))
     permitted.add(code.sha256)
     try:
@@ -41,6 +42,16 @@ def permit(ctx: click.Context, code: Code) -> None:
         echo(f"Warning: {fault}: trusted this time only", err=True)
     if not silent:
         echo(f"runs {code.words}, trusted from now on", err=True)
+
+
+def _confirmed() -> bool:
+    """Ask; the end of the input, Ctrl-D, is a no."""
+    try:
+        return click.confirm("Have you read it, or do you trust its author?", err=True)
+    except click.Abort:
+        if interrupted():
+            raise KeyboardInterrupt from None
+        return False
 
 
 def _is_read_by_a_program() -> bool:

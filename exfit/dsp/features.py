@@ -187,11 +187,13 @@ def _vertices(t: Array, way: Array, peak: Places) -> tuple[Array, Array]:
     if count < 3:
         return t[peak], way[row, peak]
     before, after = t[middle] - t[middle - 1], t[middle + 1] - t[middle]
-    rise = (way[row, middle] - way[row, middle - 1]) / before
-    fall = (way[row, middle + 1] - way[row, middle]) / after
-    bend = (fall - rise) / (before + after)
-    slope = (rise * after + fall * before) / (before + after)
-    with np.errstate(all="ignore"):
-        shift = np.where(inner & (bend < 0.0), -0.5 * slope / bend, 0.0)
-    height = way[row, peak] + np.where(inner, 0.5 * slope * shift, 0.0)
+    with np.errstate(all="ignore"):  # between times that nearly agree
+        rise = (way[row, middle] - way[row, middle - 1]) / before
+        fall = (way[row, middle + 1] - way[row, middle]) / after
+        bend = (fall - rise) / (before + after)
+        slope = (rise * after + fall * before) / (before + after)
+        shift = -0.5 * slope / bend
+        lift = 0.5 * slope * shift
+    inner &= (bend < 0.0) & np.isfinite(lift)
+    shift, height = np.where(inner, shift, 0.0), way[row, peak] + np.where(inner, lift, 0.0)
     return t[peak] + shift, height

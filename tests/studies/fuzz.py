@@ -13,6 +13,7 @@ import json
 import math
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -29,8 +30,9 @@ from mutant_files import KINDS, mutant
 from mutant_runs import Finding, tried
 
 MUTANTS, SEED = 100_000, 1
-IN_A_PROCESS = 2500  # mutants, then a new one begins with an empty memory
-HANGS = 60.0  # s by the clock of a busy computer; of processor time 20 are allowed
+IN_A_PROCESS = 250  # mutants of a kind in turn, then a new one begins with an empty memory
+HANGS = 600.0  # s by the clock of a busy computer
+MOST_SECONDS = 25  # of processor time for a mutant, then its process ends; 20 are allowed
 MEGABYTE, GIGABYTE = 1 << 20, 1 << 30
 MOST_MEMORY = GIGABYTE  # more than before a mutant
 MOST_ADDRESSES = 4 * GIGABYTE  # then an allocation fails
@@ -42,6 +44,7 @@ def work(kind: str, seed: int, first: int, end: int, log: Path) -> None:
     with tempfile.TemporaryDirectory() as name, log.open("a", buffering=1) as notes:
         for number in range(first, end):
             faulthandler.dump_traceback_later(HANGS, exit=True)
+            limit_time()
             one = mutant(kind, seed, number)
             notes.write(json.dumps({"start": number, "mutant": str(one)[:TAIL]}) + "\n")
             before = limit_memory()
@@ -58,6 +61,19 @@ def work(kind: str, seed: int, first: int, end: int, log: Path) -> None:
             if grown > MOST_MEMORY:
                 break  # its peak hides that of the next
         os.chdir("/")
+
+
+def limit_time() -> None:
+    """End this process, with its traceback, once it has used so much more processor time."""
+    try:
+        import resource
+    except ImportError:
+        return  # this system has no such limit
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    most = math.ceil(used.ru_utime + used.ru_stime + MOST_SECONDS)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (most, hard))
+    faulthandler.register(signal.SIGXCPU, chain=True)
 
 
 def limit_memory() -> int:
@@ -87,8 +103,7 @@ def worked(kind: str, seed: int, first: int, end: int, folder: Path) -> Iterator
     """Yield what workers note about the mutants of a kind; one that dies is a note of its own."""
     while first < end:
         log, errors = folder / f"{kind}-{first}.jsonl", folder / f"{kind}-{first}.txt"
-        stop = min(first + IN_A_PROCESS, end)
-        arguments = [sys.executable, __file__, "--work", kind, *map(str, (seed, first, stop, log))]
+        arguments = [sys.executable, __file__, "--work", kind, *map(str, (seed, first, end, log))]
         with errors.open("wb") as stream:
             code = subprocess.run(arguments, stderr=stream, stdout=stream, check=False).returncode
         lines = log.read_text().splitlines() if log.exists() else []
@@ -99,7 +114,7 @@ def worked(kind: str, seed: int, first: int, end: int, folder: Path) -> Iterator
         tail = errors.read_text(errors="replace")
         if code:
             yield {
-                "kind": "hang" if "Timeout" in tail else "death",
+                "kind": "hang" if "Timeout" in tail or code == -signal.SIGXCPU else "death",
                 "place": place_of_death(tail),
                 "text": f"exit code {code}\n{tail[:TAIL]}",
                 "number": last,
@@ -186,24 +201,27 @@ def main() -> None:
 
 
 def study(kinds: list[str], mutants: int, seed: int, first: int) -> None:
-    """Run mutants of all kinds alike, and print what is wrong and the table."""
+    """Run mutants of all kinds in turn; print what is wrong, and the table after each turn."""
     tallies, began = {kind: Tally() for kind in kinds}, time.monotonic()
+    end = first + math.ceil(mutants / len(kinds))
     with tempfile.TemporaryDirectory() as folder:
-        for kind, tally in tallies.items():
-            end = first + math.ceil(mutants / len(kinds))
-            for note in worked(kind, seed, first, end, Path(folder)):
-                tally.add(note)
-            minutes = (time.monotonic() - began) / 60.0
-            print(f"{minutes:6.1f} min  {tally.row(kind)}", flush=True)
-            show(kind, tally.wrong)
-    print("| kind | mutants | refused | longest | most memory | findings |")
-    print("|---|---|---|---|---|---|")
-    for kind, tally in tallies.items():
-        print(tally.row(kind))
-    used = os.times()
-    seconds = used.user + used.system + used.children_user + used.children_system
-    total = sum(tally.mutants for tally in tallies.values())
-    print(f"{total:,} mutants, {seconds / 60.0:.1f} min of processor time")
+        for start in range(first, end, IN_A_PROCESS):
+            for kind, tally in tallies.items():
+                turn = Tally()
+                for note in worked(kind, seed, start, min(start + IN_A_PROCESS, end), Path(folder)):
+                    tally.add(note)
+                    turn.add(note)
+                minutes = (time.monotonic() - began) / 60.0
+                print(f"{minutes:6.1f} min  {tally.row(kind)}", flush=True)
+                show(kind, turn.wrong)
+            print("| kind | mutants | refused | longest | most memory | findings |")
+            print("|---|---|---|---|---|---|")
+            for kind, tally in tallies.items():
+                print(tally.row(kind))
+            used = os.times()
+            seconds = used.user + used.system + used.children_user + used.children_system
+            total = sum(tally.mutants for tally in tallies.values())
+            print(f"{total:,} mutants, {seconds / 60.0:.1f} min of processor time", flush=True)
 
 
 if __name__ == "__main__":

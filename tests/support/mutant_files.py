@@ -3,6 +3,7 @@
 The files that a fit or a programme leaves are made by one, once for each process.
 """
 
+import hashlib
 import io
 import json
 import math
@@ -19,14 +20,17 @@ import yaml
 from mutants import (
     Mutant,
     Table,
+    at_place,
     json_bytes,
     mutated_bytes,
     mutated_table,
     mutated_tree,
+    places_of,
     randomness,
     yaml_bytes,
 )
 from places import CONFIGS, ROOT
+from power_flow_files import power_flow
 
 Files = dict[str, bytes]
 Changes = list[str]
@@ -120,8 +124,88 @@ def _programme(rng: Random, changes: Changes) -> Files:
     return {"programme.yaml": _yaml(rng, sources, changes)}
 
 
+def _run_programme(rng: Random, changes: Changes) -> Files:
+    files = {"programme.yaml": PROGRAMME_AT_REST}
+    if rng.random() < 0.5:
+        return {"programme.yaml": _yaml(rng, (PROGRAMME_AT_REST,), changes)}
+    for key in ("programme_saturation.csv", "programme_v_curve.csv"):
+        data = (ROOT / "sample_data" / key).read_bytes()
+        files[key] = mutated_bytes(rng, data, data, changes, text=True)
+    files["programme.yaml"] = PROGRAMME_AT_REST.replace(b"../sample_data/", b"")
+    return files
+
+
+def _with_numbers(rng: Random, tree: Any, changes: Changes) -> Any:
+    """Change one to three numbers of a tree by powers of ten, as a slip of the keyboard does."""
+    numbers = [
+        place
+        for place in places_of(tree)
+        if type(at_place(tree, place)) in (int, float) and place[-1] not in ("number", "Unit")
+    ]
+    for place in rng.choices(numbers, k=rng.choice((1, 1, 2, 3))):
+        holder, key, power = at_place(tree, place[:-1]), place[-1], rng.choice((1, 2, 3, 6, 9, 12))
+        factor = rng.choice((10.0, 0.1)) ** rng.uniform(0.1, power)
+        whole = isinstance(holder[key], int) and rng.random() < 0.7
+        value = (holder[key] or 1.0) * factor * rng.choice((1, 1, 1, -1))
+        holder[key] = round(value) if whole else value
+        changes.append(f"{place}: {holder[key]:g}")
+    return tree
+
+
+def _extremes(rng: Random, changes: Changes) -> Files:
+    """Return a case whose numbers are numbers, but extreme."""
+    configs = dict(_configs(""))
+    few = configs["ac1a_good.yaml"], configs["grid_event.yaml"], RICH  # which take longer
+    sources = few if rng.random() < 0.03 else (FITTED, UNIT)
+    tree = _with_numbers(rng, yaml.safe_load(rng.choice(sources)), changes)
+    record = csv(recorded())
+    return {"case.yaml": yaml_bytes(tree), "record.csv": record, "again.csv": record}
+
+
+def _criteria(rng: Random, changes: Changes) -> Files:
+    sources = tuple(path.read_bytes() for path in sorted((CONFIGS / "criteria").glob("*.yaml")))
+    if rng.random() < 0.4:
+        limits = yaml_bytes(_with_numbers(rng, yaml.safe_load(rng.choice(sources)), changes))
+    else:
+        limits = _yaml(rng, (*sources, CRITERIA), changes)
+    record = csv(recorded())
+    case = FITTED + b"criteria: {file: limits.yaml}\n"
+    return {"limits.yaml": limits, "case.yaml": case, "record.csv": record, "again.csv": record}
+
+
+def _power_flow_file(rng: Random, changes: Changes) -> Files:
+    flow = power_flow(version=rng.choice((33, 34, 35)), buses=(101, 7)).encode()
+    data = mutated_bytes(rng, flow, POWER_FLOW, changes, text=True)
+    return {"net.raw": data, "unit.dyr": UNITS}
+
+
+def _trust(rng: Random, changes: Changes) -> Files:
+    """Return what is trusted, and a model that is, of which one is damaged."""
+    source = (ROOT / "exfit" / "models" / "exciters" / "first_order.py").read_bytes()
+    key = hashlib.sha256(source).hexdigest()
+    entry = {"words": "own.py", "place": "own.py", "sha256": key}
+    case = FITTED.replace(b"FIRST_ORDER", b"own.py")
+    record = csv(recorded())
+    files = {f"configuration/trusted/{key}.json": json_bytes(entry), "own.py": source}
+    damaged = rng.choice([*files])
+    changes.append(damaged)
+    if damaged == "own.py":
+        files[damaged] = mutated_bytes(rng, source, source, changes, text=True)
+    else:
+        files[damaged] = _json(rng, files[damaged], files[damaged], changes)
+    return {"own.yaml": case, **files, "record.csv": record, "again.csv": record}
+
+
+def _options(rng: Random, changes: Changes) -> Files:
+    from mutant_options import arguments, files, words
+
+    given = arguments(rng)
+    changes.append(words(given))
+    return {"arguments.json": json_bytes(given), **files()}
+
+
 def _parameters(rng: Random, changes: Changes) -> Files:
-    fitted = (_of_a_fit()["parameters.yaml"], _of_a_fit("ac1a_good")["parameters.yaml"])
+    fitted = (of_a_fit()["parameters.yaml"], of_a_fit("ac1a_good")["parameters.yaml"])
     case = dict(_configs(""))["ac1a_good.yaml"]
     return {"parameters.yaml": _yaml(rng, fitted, changes), "case.yaml": case}
 
@@ -129,8 +213,20 @@ def _parameters(rng: Random, changes: Changes) -> Files:
 # ---- what exfit itself writes
 
 
+def _programme_at_rest() -> bytes:
+    """Return a programme of two tests at rest, which takes no simulation."""
+    content = yaml.safe_load(dict(_configs("programmes"))["ac8b_unit1.yaml"])
+    content["tests"] = content["tests"][:2]
+    del content["parameters"]["free"]
+    content["parameters"]["fixed"] |= {"KPR": 84, "KIR": 5, "KDR": 10, "TDR": 0.1, "TE": 1.3}
+    return yaml_bytes(content)
+
+
+PROGRAMME_AT_REST = _programme_at_rest()
+
+
 @cache
-def _of_a_fit(name: str = "first_order") -> Mapping[str, bytes]:
+def of_a_fit(name: str = "first_order") -> Mapping[str, bytes]:
     """Return the numbers that a fit of a case leaves."""
     from exfit import fit
     from exfit.output.run_folder import write_fit
@@ -149,14 +245,11 @@ def _of_a_programme() -> Mapping[str, bytes]:
     from exfit.features.programme.programme import load_programme
     from exfit.features.programme.run import run
 
-    content = yaml.safe_load((CONFIGS / "programmes" / "ac8b_unit1.yaml").read_bytes())
-    content["tests"] = content["tests"][:2]
-    del content["parameters"]["free"]
-    content["parameters"]["fixed"] |= {"KPR": 84, "KIR": 5, "KDR": 10, "TDR": 0.1, "TE": 1.3}
+    content = yaml.safe_load(PROGRAMME_AT_REST)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for test in content["tests"]:
-            test["file"] = str(CONFIGS / "programmes" / test["file"])
+            test["file"] = str(ROOT / test["file"].removeprefix("../"))
         (folder / "unit.yaml").write_bytes(yaml_bytes(content))
         result = run(load_programme(folder / "unit.yaml"), folder, keep=write_test)
         write_programme(result, folder)
@@ -182,7 +275,7 @@ def _of_a_batch() -> Mapping[str, bytes]:
     done, failed = "0" * 31 + "1", "0" * 31 + "2"
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        text = _of_a_fit()["result.json"]
+        text = of_a_fit()["result.json"]
         (folder / "result.json").write_bytes(text)
         summary = summary_of(load_result(folder), done, 1.0)
         (folder / "result.json").unlink()
@@ -213,7 +306,7 @@ def _json(rng: Random, one: bytes, other: bytes, changes: Changes) -> bytes:
 
 
 def _result(rng: Random, changes: Changes) -> Files:
-    results = [_of_a_fit(name)["result.json"] for name in ("first_order", "ac1a_good")]
+    results = [of_a_fit(name)["result.json"] for name in ("first_order", "ac1a_good")]
     return {"result.json": _json(rng, rng.choice(results), rng.choice(results), changes)}
 
 
@@ -229,7 +322,7 @@ def _programme_result(rng: Random, changes: Changes) -> Files:
 
 
 @cache
-def _recorded(phases: bool = False) -> Table:
+def recorded(phases: bool = False) -> Table:
     """Return a bump test of vt and ifd in pu, or the waveforms of three phases."""
     noise = random.Random(0)
     step = 0.001 if phases else 0.025
@@ -251,7 +344,7 @@ def _recorded(phases: bool = False) -> Table:
 
 
 def _table(rng: Random, changes: Changes) -> Table:
-    return mutated_table(rng, _recorded(rng.random() < 0.1), changes)
+    return mutated_table(rng, recorded(rng.random() < 0.1), changes)
 
 
 def _cell(value: Any) -> str:
@@ -313,7 +406,7 @@ validate:
 
 def _fitted_record(rng: Random, changes: Changes) -> Files:
     """Return a case with a record whose samples are damaged, but numbers in a table still."""
-    table = _recorded()
+    table = recorded()
     time, columns = [*table.columns[0]], [[*column] for column in table.columns[1:]]
     for _ in range(rng.randint(1, 3)):
         column = rng.choice([time, *columns, *5 * [columns[0]]])
@@ -327,11 +420,12 @@ def _fitted_record(rng: Random, changes: Changes) -> Files:
     damaged = Table(table.names, [time, *columns], table.units)
     both = [damaged, table] if rng.random() < 0.7 else [table, damaged]
     return {"case.yaml": FITTED} | dict(
-        zip(("record.csv", "again.csv"), map(_csv, both), strict=True)
+        zip(("record.csv", "again.csv"), map(csv, both), strict=True)
     )
 
 
-def _csv(table: Table) -> bytes:
+def csv(table: Table) -> bytes:
+    """Return a table as text with commas."""
     rows = [table.names, *_rows(table)]
     return "\n".join(",".join(map(_cell, row)) for row in rows).encode()
 
@@ -348,6 +442,28 @@ SAMPLE_CHANGES: Mapping[str, Callable[[float, Random], float | None]] = {
     "noise": lambda value, rng: value + rng.gauss(0.0, 0.1),
     "coarse": lambda value, rng: round(value, 1),
 }
+
+
+UNIT = b"""model: SEXS
+plant:
+  type: open-circuit
+  machine: GENSAL
+  parameters: {Tpd0: 5.0, Xd: 1.1, Xq: 0.7, Xpd: 0.25, Xppd: 0.2, Xl: 0.15, S10: 0.11, S12: 0.4}
+test: {vt0: 1.0, vref: [{at: 1.0, step: 0.05}]}
+record: {file: record.csv, time: t, channels: {vt: vt, ifd: ifd}}
+parameters: {fixed: {TE: 0.05}, free: {K: {start: 50, min: 5, max: 500}}}
+estimate: {search: local, iterations: 10}
+"""
+CRITERIA = b"""source: a planner
+limits:
+  - {quantity: rms, limit: 1.5e-4}
+  - {quantity: largest, percent: 8, from: 0.02, to: 5}
+  - {quantity: mean, limit: 1.0e-3}
+  - {quantity: final_value, percent: 2}
+  - {quantity: rise_time, percent: 10, limit: 0.02}
+  - {signals: [vt], quantity: damping_ratio, limit: 0.03}
+  - {quantity: peak, percent: 10}
+"""
 
 
 def _damaged(rng: Random, data: bytes, changes: Changes, text: bool = False) -> bytes:
@@ -517,7 +633,7 @@ def _mat(rng: Random, changes: Changes) -> Files:
         except (TypeError, ValueError):  # of what a version cannot hold
             changes.append("whole")
             buffer = io.BytesIO()
-            savemat(buffer, _arrays(_recorded()), format="5")
+            savemat(buffer, _arrays(recorded()), format="5")
     data = buffer.getvalue()
     if data.startswith(b"MATLAB"):  # its head names the time of writing
         data = b"MATLAB 5.0 MAT-file".ljust(116) + data[116:]
@@ -667,11 +783,15 @@ def _dyd(rng: Random, changes: Changes) -> Files:
     return {"unit.dyd": data}
 
 
+EVENT = "\n".join(
+    f"{k / 60.0:.6f}, {1.0 - 0.02 * (k > 120):.6f}, {60.0 - 0.1 * (k > 120):.6f}"
+    for k in range(300)
+).encode()
+POWER_FLOW = power_flow(buses=(101, 7)).encode()
+
+
 def _play_in(rng: Random, changes: Changes) -> Files:
-    times = [number / 60.0 for number in range(300)]
-    rows = (f"{t:.6f}, {1.0 - 0.02 * (t > 2.0):.6f}, {60.0 - 0.1 * (t > 2.0):.6f}" for t in times)
-    data = "\n".join(rows).encode()
-    return {"event.plb": mutated_bytes(rng, data, data, changes, text=True)}
+    return {"event.plb": mutated_bytes(rng, EVENT, EVENT, changes, text=True)}
 
 
 TESTS = b"""file,at,step,base,validates
@@ -714,6 +834,12 @@ KINDS: Mapping[str, Callable[[Random, Changes], Files]] = {
     "tests": _table_of_tests,
     "cases": _table_of_cases,
     "batch": _batch,
+    "options": _options,
+    "extremes": _extremes,
+    "criteria": _criteria,
+    "power-flow": _power_flow_file,
+    "programme-run": _run_programme,
+    "trust": _trust,
 }
 
 

@@ -32,8 +32,8 @@ MOST_SECONDS = 20.0  # of processor time
 # what moves a cursor, names a window or turns text around: C0 but newline and tab, C1, bidi
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 PLOTTED = 40  # one of so many records is drawn, too: figures take longer than all else
-RECORDS = ("text", "workbook", "mat", "parquet", "comtrade")
 OUT = "out"
+CONFIGURATION = "configuration"  # of the user: what is trusted comes and goes there
 READ_FLEET = "read_fleet"  # of Python: no command reads the folder of a batch alone
 CASE_OF_RECORD = """model: FIRST_ORDER
 plant: {type: none}
@@ -64,46 +64,95 @@ class Ran(NamedTuple):
 
 def commands(mutant: Mutant, folder: Path) -> Iterator[tuple[str, ...]]:
     """Yield the commands that are given a mutant whose files lie in a folder."""
-    main = mutant.main
-    plots = "--plots" if mutant.number % PLOTTED == 1 else "--no-plots"
-    if mutant.kind == "case":
-        yield ("simulate", main, "-o", OUT, plots)
-        if mutant.number % 4 == 0:
+    main, number = mutant.main, mutant.number
+    plots = "--plots" if number % PLOTTED == 1 else "--no-plots"
+    to = ("-o", OUT, plots)
+    match mutant.kind:
+        case "case":
+            yield ("simulate", main, *to)
+            if number % 4 == 0:
+                yield ("check", main)
+        case "extremes":
+            yield from of_case(main, number, to)
+        case "samples":
+            (folder / "values.yaml").write_text("parameters: {k: 2.5, a: 2.5}\n")
+            yield from of_case(main, number, to)
+        case "criteria":
+            (folder / "values.yaml").write_text("parameters: {k: 2.5, a: 2.5}\n")
+            yield ("validate", "case.yaml", "--parameters", "values.yaml", *to)
+        case "programme":
             yield ("check", main)
-    elif mutant.kind == "programme":
-        yield ("check", main)
-    elif mutant.kind == "parameters":
-        yield ("simulate", "case.yaml", "--parameters", main, "-o", OUT, "--no-plots")
-    elif mutant.kind == "result":
-        yield ("report", main, "-o", f"{OUT}/report.html")
-        yield ("export", main, "-o", f"{OUT}/unit.dyr")
-    elif mutant.kind == "programme-result":
-        yield ("report", ".", "-o", f"{OUT}/report.html")
-    elif mutant.kind == "samples":
-        command = ("validate", "identify", "profile", "fit")[mutant.number % 4]
-        values = ("--parameters", "values.yaml") if command == "validate" else ()
-        (folder / "values.yaml").write_text("parameters: {k: 2.5, a: 2.5}\n")
-        yield (command, main, *values, "-o", OUT, plots)
-    elif mutant.kind in RECORDS:
-        yield ("inspect", main, "-o", OUT, plots)
-        yield ("new", "--model", "AC1A", "--record", main, "-o", f"{OUT}/new.yaml")
-        (folder / "record.yaml").write_text(CASE_OF_RECORD % main)
-        yield ("simulate", "record.yaml", "-o", OUT, "--no-plots")
-    elif mutant.kind == "play-in":
-        yield ("inspect", main, "-o", OUT, plots)
-        (folder / "event.yaml").write_text(CASE_OF_EVENT)
-        yield ("simulate", "event.yaml", "-o", OUT, "--no-plots")
-    elif mutant.kind in ("dyr", "dyd"):
-        yield ("import", main, "-o", f"{OUT}/unit.yaml")
-        bus, machine = ("101", "1") if mutant.number % 2 else ("7", "G2")
-        yield ("import", main, "--bus", bus, "--id", machine, "-o", f"{OUT}/unit_{bus}.yaml")
-        yield ("import", main, "--all", "-o", f"{OUT}/cases")
-    elif mutant.kind == "cases":
-        yield ("import", "unit.dyr", "--all", "--records", main, "-o", f"{OUT}/cases")
-    elif mutant.kind == "batch":
-        yield (READ_FLEET, ".")
-    elif mutant.kind == "tests":
-        yield ("new", "--model", "AC1A", "--tests", main, "-o", f"{OUT}/new.yaml")
+        case "programme-run":
+            yield ("run", main, *to)
+            yield ("report", OUT, "-o", f"{OUT}/report.html")
+        case "parameters":
+            yield ("simulate", "case.yaml", "--parameters", main, "-o", OUT, "--no-plots")
+        case "result":
+            yield ("report", main, "-o", f"{OUT}/report.html")
+            yield ("export", main, "-o", f"{OUT}/unit.dyr")
+            yield ("show", main, *([], ["--all"], ["--history"])[number % 3])
+            if number % 10 == 0:
+                yield ("translate", main, "--model", "SEXS", *to)
+                yield ("compare", main, main, *to)
+        case "programme-result":
+            yield ("report", ".", "-o", f"{OUT}/report.html")
+        case "text" | "workbook" | "mat" | "parquet" | "comtrade":
+            yield ("inspect", main, *to)
+            yield ("new", "--model", "AC1A", "--record", main, "-o", f"{OUT}/new.yaml")
+            (folder / "record.yaml").write_text(CASE_OF_RECORD % main)
+            yield ("simulate", "record.yaml", "-o", OUT, "--no-plots")
+            yield ("compare", main, main, "-o", f"{OUT}/compared", "--no-plots")
+        case "play-in":
+            yield ("inspect", main, *to)
+            (folder / "event.yaml").write_text(CASE_OF_EVENT)
+            yield ("simulate", "event.yaml", "-o", OUT, "--no-plots")
+        case "dyr" | "dyd":
+            yield ("import", main, "-o", f"{OUT}/unit.yaml")
+            bus, machine = ("101", "1") if number % 2 else ("7", "G2")
+            yield ("import", main, "--bus", bus, "--id", machine, "-o", f"{OUT}/unit_{bus}.yaml")
+            yield ("import", main, "--all", "-o", f"{OUT}/cases")
+        case "power-flow":
+            yield ("import", "unit.dyr", "--all", "--raw", main, "-o", f"{OUT}/cases")
+        case "cases":
+            yield ("import", "unit.dyr", "--all", "--records", main, "-o", f"{OUT}/cases")
+        case "batch":
+            yield (READ_FLEET, ".")
+        case "tests":
+            yield ("new", "--model", "AC1A", "--tests", main, "-o", f"{OUT}/new.yaml")
+        case "trust":
+            yield from ((("trust",), ("trust", "own.py"), ("trust", "--withdraw"))[number % 3],)
+            yield ("simulate", main, "-o", OUT, "--no-plots", *(["--trust"] * (number % 2)))
+        case "options":
+            yield tuple(json.loads((folder / main).read_text(encoding="utf-8")))
+
+
+def of_case(case: str, number: int, to: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """Yield one of the commands of a case, in turn; of a fit what shows it, too."""
+    match number % 8:
+        case 0:
+            values = Path("values.yaml")
+            given = ("--parameters", str(values)) if values.exists() else ("--as-found",)
+            yield ("validate", case, *given, *to)
+        case 1:
+            yield ("identify", case, *to)
+        case 2:
+            yield ("profile", case, *to)
+        case 3:
+            yield ("rank", case, "--models", "FIRST_ORDER,SEXS", "--search", "local", *to)
+        case 4:
+            yield ("simulate", case, *to)
+            yield ("check", case)
+        case 5:
+            yield ("fit", case, "--search", "local", "--json", *to)
+            yield ("translate", OUT, "--model", "SEXS", "-o", f"{OUT}/other", "--no-plots")
+        case 6:
+            yield ("fit", case, "--search", "local", "-v", *to)
+            yield ("report", OUT, "-o", f"{OUT}/report.html")
+            yield ("show", OUT, "--all")
+        case 7:
+            yield ("fit", case, "--search", "local", "-q", *to)
+            yield ("export", OUT, "-o", f"{OUT}/unit.dyr")
+            yield ("compare", OUT, "record.csv", "-o", f"{OUT}/compared", "--no-plots")
 
 
 CASE_OF_EVENT = """\
@@ -138,6 +187,7 @@ def tried(mutant: Mutant, workplace: Path) -> Tried:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     os.chdir(folder)
+    os.environ["EXFIT_CONFIG"] = str(folder / CONFIGURATION)
     wrong: list[Finding] = []
     codes, seconds = [], 0.0
     for arguments in commands(mutant, folder):
@@ -230,7 +280,11 @@ def place_of(fault: BaseException) -> str:
 
 def _listing(folder: Path) -> dict[str, int]:
     """Return the files below a folder, by name, with the time when each was changed."""
-    files = (path for path in folder.rglob("*") if path.is_file())
+    files = (
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and path.relative_to(folder).parts[0] != CONFIGURATION
+    )
     return {path.relative_to(folder).as_posix(): path.stat().st_mtime_ns for path in files}
 
 
@@ -238,7 +292,8 @@ def written(ran: Ran, folder: Path, before: dict[str, int]) -> Iterator[Finding]
     """Yield files that a command has left by halves, or in spite of a refusal."""
     after = _listing(folder)
     changed = [name for name in after if after[name] != before.get(name)]
-    if ran.code in REFUSED and changed and "--all" not in ran.arguments:
+    of_several = ran.arguments[0] in ("run", "batch") or "--all" in ran.arguments
+    if ran.code in REFUSED and changed and not of_several:
         yield Finding("written in spite of a refusal", ran.arguments[0], ", ".join(changed))
     lost = [name for name in before if name not in after]
     if lost:

@@ -54,3 +54,23 @@ def prepare(place: Path) -> None:
 
 
 FIT_BEFORE = ("fit", "unit.yaml", "--no-plots", "-o", "fit")  # which others read
+
+# every command: those that write, what else they write, and those that only show
+EVERY = WRITERS | {
+    "batch": (*WRITERS["batch"], "--reports"),
+    "verify": ("verify", "record.csv", "--model", "AC1A", "--step", "0.05", "--force",
+               "-o", "verified.html"),
+    "models": ("models", "AC1A", "--plot", "drawn"),
+    "check": ("check", "old.yaml", "--write"),
+    "show": ("show", "fit"),
+    "schema": ("schema",),
+    "trust": ("trust", "."),
+    "fit --apply": ("fit", "slow.yaml", "--apply", "1", "--no-plots", "-q"),
+    "export --plb": ("export", "fit", "--plb", "unit.plb"),
+}  # fmt: skip
+READS_A_FIT = ("fit", "fit/parameters.yaml")
+
+
+def needs_a_fit(name: str) -> bool:
+    """Whether a command reads the fit that FIT_BEFORE makes."""
+    return not {*READS_A_FIT}.isdisjoint(EVERY[name][1:])

@@ -1,0 +1,131 @@
+"""Interruptions of a command at an entry into a module of exfit, and what is wrong after them.
+
+The entries are counted, so that a run can be interrupted again at the same one. A module is
+interrupted when a command enters it for the first time and for the last.
+"""
+
+import contextlib
+import inspect
+import io
+import os
+import signal
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from ended_commands import TEMPORARY, contents
+
+from exfit import __main__
+from exfit.util import interrupts
+
+OWN = str(Path(__main__.__file__).parent) + os.sep
+CODES = (3, 130)
+
+
+class Entry(NamedTuple):
+    """The n-th call of a function of a module, from 1 on."""
+
+    module: str
+    number: int
+
+
+class _Again:
+    """Calls a function once the exception that has it is handled and gone."""
+
+    def __init__(self, function: Callable[[], None]) -> None:
+        self.function = function
+
+    def __del__(self) -> None:
+        self.function()
+
+
+class Injection:
+    """Counts the entries while a command runs, and interrupts at one, and perhaps once more.
+
+    ``gap``: the second interruption comes so many entries after the first has been caught.
+    """
+
+    def __init__(self, at: Entry | None = None, gap: int = 0) -> None:
+        self.at, self.gap = at, gap
+        self.counts, self.since = Counter[str](), 0
+        self.sent: list[float] = []  # s of processor time, at each that was sent
+
+    def __call__(self, frame, event: str, _) -> None:
+        code = frame.f_code
+        listening = event == "call" and interrupts._received
+        if not listening or not code.co_filename.startswith(OWN) or code.co_name[0] == "<":
+            return
+        if code.co_flags & inspect.CO_GENERATOR:  # its last lines would be skipped
+            return
+        module = code.co_filename[len(OWN) :]
+        self.counts[module] += 1
+        first = not self.sent and self.at == (module, self.counts[module])
+        if self.sent:
+            self.since += 1
+        if first or (len(self.sent) == 1 and self.gap and self.since == self.gap):
+            self.sent.append(time.process_time())
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt as interruption:  # which takes this function away
+                interruption.again = _Again(lambda: sys.setprofile(self))
+                raise
+
+
+class Ran(NamedTuple):
+    """How a command ended, what it wrote to standard error, and what it was given."""
+
+    code: int | None
+    err: str
+    seconds: float  # of processor time since the first interruption
+
+
+def run(arguments: tuple[str, ...], injection: Injection) -> Ran:
+    """Run a command in this process as the program does, with an injection."""
+    out, err, code = io.StringIO(), io.StringIO(), None
+    given, sys.argv = sys.argv, ["exfit", *arguments]
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            sys.setprofile(injection)
+            try:
+                __main__.main()
+            except SystemExit as ended:
+                code = int(ended.code or 0)
+            finally:
+                sys.setprofile(None)
+    finally:
+        sys.argv = given
+    since = time.process_time() - injection.sent[0] if injection.sent else 0.0
+    injection.gap = 0
+    return Ran(code, err.getvalue(), since)
+
+
+def entries(arguments: tuple[str, ...]) -> list[Entry]:
+    """Return the first and the last entry into each module, in no order of time."""
+    counting = Injection()
+    ran = run(arguments, counting)
+    assert ran.code in (0, 3), (arguments, ran.err)
+    ends = ((module, number) for module, n in counting.counts.items() for number in {1, n})
+    return [Entry(*end) for end in ends]
+
+
+def faults(arguments: tuple[str, ...], at: Entry, gap: int, folder: Path) -> Iterator[str]:
+    """Yield what is wrong after one or two interruptions of a command, which has run before."""
+    before = {*contents(folder)}
+    injection = Injection(at, gap)
+    ran = run(arguments, injection)
+    if not injection.sent:
+        return
+    if ran.code not in CODES:
+        yield f"exit code {ran.code}: {ran.err}"
+    if "nterrupted" not in ran.err:
+        yield f"not said: {ran.code} {ran.err!r}"
+    if "Traceback" in ran.err:
+        yield ran.err
+    left = {*contents(folder)}
+    if any(path.name.startswith(TEMPORARY) for path in left) or left - before:
+        yield f"files: {sorted(map(str, left - before))}"
+    if interrupts._received:
+        yield "still listening"
