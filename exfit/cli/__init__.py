@@ -103,24 +103,22 @@ class Commands(click.Group):
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
         """Run as a program: no output that fails keeps a command from its files."""
+        self.began = False
         with unfailing_output() as exit_code, endings_as_interruptions() as signals:
             try:
                 return super().main(*arguments, obj=signals, **settings)
             except SystemExit as ended:
                 code = exit_code(ended.code)
-                if signals and code != Interruption.exit_code:
+                if signals and not self.began:  # click makes an error of it
+                    code = Interruption.exit_code
+                    echo("Interrupted", err=True)
+                elif signals and code != Interruption.exit_code:
                     echo("Interrupted: what was done until then is kept", err=True)
                 raise SystemExit(code_after(signals, code or 0)) from None
 
-    def make_context(self, *arguments: Any, **settings: Any) -> click.Context:
-        """Read the arguments of the program."""
-        try:
-            return super().make_context(*arguments, **settings)
-        except KeyboardInterrupt:
-            raise Interruption from None  # of which click would make an error
-
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, and turn what is wrong with its input into a message."""
+        self.began = True
         try:
             with guarded(lambda code: LazyPart("exfit.cli.trusting:permit").load()(ctx, code)):
                 return super().invoke(ctx)

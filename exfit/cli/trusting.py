@@ -31,10 +31,8 @@ def permit(ctx: click.Context, code: Code) -> None:
     if not ctx.meta.get(TRUST):
         if silent or not all(stream and stream.isatty() for stream in (sys.stdin, sys.stderr)):
             raise ExfitError(why_refused(code))
-        place, digits = code.place.absolute().parent, code.sha256[:HASH_DIGITS]
-        echo(f"{code.words} in {place}: code with your rights, SHA-256 {digits}...", err=True)
-        if not _confirmed():
-            raise ExfitError(why_refused(code))
+        if not _confirmed(code):
+            raise ExfitError(f"{code.words}: not run: you do not trust it")
     permitted.add(code.sha256)
     try:
         remember(code)
@@ -44,13 +42,17 @@ def permit(ctx: click.Context, code: Code) -> None:
         echo(f"runs {code.words}, trusted from now on", err=True)
 
 
-def _confirmed() -> bool:
+def _confirmed(code: Code) -> bool:
     """Ask; the end of the input, Ctrl-D, is a no."""
+    echo("This would run with your rights, and is not trusted yet:", err=True)
+    echo(f"  {code.words}\n  in {code.folder}", err=True)
+    echo(f"  SHA-256 {code.sha256[:HASH_DIGITS]}...", err=True)
     try:
-        return click.confirm("Have you read it, or do you trust its author?", err=True)
+        return click.confirm("Do you trust it, having read it or knowing its author?", err=True)
     except click.Abort:
         if interrupted():
             raise KeyboardInterrupt from None
+        echo("", err=True)
         return False
 
 
@@ -76,7 +78,8 @@ def trust(places: tuple[Path, ...], withdraw: bool) -> None:
         for code in known():
             forget(code)
     for code in known():
-        echo(f"{code.sha256[:HASH_DIGITS]}  {code.place}  ({code.words})")
+        words = "" if code.words == code.place.name else f"  ({code.words})"
+        echo(f"{code.sha256[:HASH_DIGITS]}  {code.place}{words}")
 
 
 def _at(place: Path, withdraw: bool) -> list[Code]:

@@ -141,7 +141,8 @@ def _damping_ratios(swing: Array, tail: Mask) -> Array:
     read = (size[row, first] > BAND * np.ptp(swing, axis=1)) & (second > 0) & (smaller > 0.0)
     with np.errstate(all="ignore"):
         decrement = np.log(larger / smaller)
-    return np.where(read, decrement / np.hypot(np.pi, decrement), np.nan)
+        ratio = decrement / np.hypot(np.pi, decrement)
+    return np.where(read, ratio, np.nan)
 
 
 def _first_crossings(t: Array, way: Array, level: float) -> Array:

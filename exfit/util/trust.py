@@ -27,6 +27,12 @@ class Code(NamedTuple):
     place: Path
     sha256: str
 
+    @property
+    def folder(self) -> Path:
+        """The folder that a file is in, or a command runs in."""
+        place = self.place.absolute()
+        return place if place.is_dir() else place.parent
+
     @classmethod
     def of_file(cls, path: Path, content: bytes) -> "Code":
         """A file of Python, or an FMU."""
@@ -58,11 +64,9 @@ def why_refused(code: Code) -> str:
     """Say why code is not run, and what its user does next."""
     from shlex import quote
 
-    place = code.place.absolute()
-    folder = place if place.is_dir() else place.parent
     return (
         f"{code.words}: not run: it has your rights, and you have not trusted it yet; read it, "
-        f"then use --trust, or trust all below its folder: exfit trust {quote(str(folder))}"
+        f"then use --trust, or trust all below its folder: exfit trust {quote(str(code.folder))}"
     )
 
 

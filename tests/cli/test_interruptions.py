@@ -1,11 +1,14 @@
-"""An interruption at any stage that a command announces reaches its message and its exit code."""
+"""An interruption at any stage of a command reaches its message and its exit code."""
 
 import contextlib
 import json
+import random
 import signal
 
+import injected
 import pytest
 from ended_commands import contents
+from writers import EVERY, prepare_every
 
 from exfit.output import events
 from exfit.util import files
@@ -20,6 +23,10 @@ COMMANDS = {  # that announce their stages
 }
 FEW = ("profile", "fit")  # the others take longer
 OPTIONS = ("--no-plots", "--progress", "json", "-q", "-o", "folder")
+
+GAPS = (0, 1, 10, 40, 200)  # entries until the second one; 0: none
+QUICK = ("simulate", "check", "show", "import", "trust", "new", "export --plb")
+DRAWN = {"verify": 2, "rank": 4}  # which take seconds for each
 
 pytestmark = pytest.mark.usefixtures("in_prepared_folder")
 
@@ -88,3 +95,30 @@ def test_an_interruption_that_something_swallows_is_an_exit_code(run, monkeypatc
     ran = run("simulate", "case.yaml", "--no-plots", "-q", "-o", "folder")
     assert ran.code == 3
     assert ran.err == "Interrupted: what was done until then is kept\n"
+
+
+@pytest.fixture(scope="module")
+def place_of_every(tmp_path_factory):
+    """Return a folder with all that any command reads."""
+    place = tmp_path_factory.mktemp("every")
+    with contextlib.chdir(place):
+        prepare_every(place, lambda *arguments: injected.run(arguments, injected.Injection()))
+    return place
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in EVERY],
+)
+def test_an_interruption_at_any_module_of_any_command_is_never_swallowed(
+    place_of_every, tmp_path, monkeypatch, name
+):
+    """One or two at some of the entries; tests/studies/interrupts.py has them at all."""
+    monkeypatch.chdir(place_of_every)
+    monkeypatch.setenv("EXFIT_CONFIG", str(tmp_path))
+    entries = injected.entries(EVERY[name])
+    whole, rng = {*contents(place_of_every)}, random.Random(name)
+    for at in rng.sample(entries, min(DRAWN.get(name, 8), len(entries))):
+        gap = rng.choice(GAPS)
+        ended = injected.interrupted(EVERY[name], at, gap, whole, place_of_every)
+        assert ended.faults == [], (at, gap)

@@ -1,7 +1,9 @@
 """Code that a case names runs only once its user has trusted it, whichever command meets it."""
 
+import contextlib
 import json
 import shutil
+import signal
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -165,9 +167,28 @@ def test_a_terminal_is_asked(run, stranger, monkeypatch, answer):
     monkeypatch.setattr(trusting, "sys", SimpleNamespace(stdin=stream, stderr=stream))
     monkeypatch.setattr(click, "confirm", lambda *_, **__: answer)
     ran = run("simulate", "own.yaml", *OPTIONS)
-    assert "own.py in " in ran.err
+    assert f"  own.py\n  in {Path.cwd()}\n  SHA-256 " in ran.err
     assert ran.code == (0 if answer else 1)
     assert stranger.exists() == answer
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_ctrl_c_at_the_question_is_an_interruption_and_ctrl_d_a_no(
+    run, stranger, monkeypatch, interrupted
+):
+    def ended(*_, **__):
+        with contextlib.suppress(KeyboardInterrupt):  # which click turns into the other
+            if interrupted:
+                signal.raise_signal(signal.SIGINT)
+        raise click.Abort
+
+    stream = SimpleNamespace(isatty=lambda: True)
+    monkeypatch.setattr(trusting, "sys", SimpleNamespace(stdin=stream, stderr=stream))
+    monkeypatch.setattr(click, "confirm", ended)
+    ran = run("simulate", "own.yaml", *OPTIONS)
+    assert ran.code == (130 if interrupted else 1)
+    assert ("Interrupted" if interrupted else "not run: you do not trust it") in ran.err
+    assert not stranger.exists()
 
 
 def test_events_for_programs_stay_json(run, stranger):

@@ -8,8 +8,14 @@ left temporary files, the next fit runs there to its end, and those that it leav
 
 Then as many signals as COMMANDS says, of each kind, meet each of some other commands: a fault is
 an exit code that is none of such an end, a traceback, or a file too many or too few.
+
+``--entries [SHARE [NAME,...]]`` instead interrupts every command, once and twice, where it enters a
+module of exfit for the first time and for the last, and lists what is wrong and the longest time,
+s of the processor, that one went on; of a SHARE of the entries, drawn.
 """
 
+import contextlib
+import os
 import random
 import signal
 import subprocess
@@ -20,13 +26,15 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from ended_commands import ENDS, WITH_SIGNALS, fault_of, undisturbed
+import injected
+from ended_commands import ENDS, WITH_SIGNALS, contents, fault_of, undisturbed
 from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by, seconds_of_fit
-from writers import FIT_BEFORE, prepare
+from writers import EVERY, FIT_BEFORE, prepare, prepare_every
 
 INTERRUPTIONS, KILLS, COMMANDS, SEED = 200, 100, 10, 2026
 WRITING = 0.06  # s: about how long the numbers take
 TIMED = 10  # runs until a fit is timed again: other work on the machine slows it down
+SECOND = (1, 10, 40, 200)  # entries from one interruption to the next
 LATE = 1.1  # of the time of a fit: some signals come too late
 
 
@@ -69,8 +77,33 @@ def study_commands(count, place):
             print(f"{count} {kind} to {name}: {len(faults)} faults", *faults[:3], flush=True)
 
 
+def study_entries(share, names):
+    """Interrupt commands at entries into modules, and print what is wrong."""
+    for name in names:
+        entries, wrong, longest = injected.entries(EVERY[name]), [], (0.0, None)
+        whole, rng = {*contents(Path.cwd())}, random.Random(f"{SEED} {name}")
+        drawn = rng.sample(entries, max(round(share * len(entries)), 1))
+        for at in drawn:
+            for gap in (0, rng.choice(SECOND)):
+                ended = injected.interrupted(EVERY[name], at, gap, whole, Path.cwd())
+                wrong += [(at, gap, fault) for fault in ended.faults]
+                longest = max(longest, (ended.seconds, (at, gap)))
+        print(f"{name}: {2 * len(drawn)} interruptions at {len(drawn)} of {len(entries)} entries: ")
+        print(f"    {len(wrong)} faults, at most {longest[0]:.2f} s, {longest[1]}", flush=True)
+        for fault in wrong[:3]:
+            print("   ", *fault)
+
+
 def main():
     """Print what is left after interruptions and kills."""
+    if "--entries" in sys.argv:
+        share, names = (*sys.argv[2:], *("1", ",".join(EVERY))[len(sys.argv) - 2 :])
+        with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
+            os.environ["EXFIT_CONFIG"] = str(Path(place).with_suffix(".configuration"))
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            prepare_every(Path(place), lambda *given: injected.run(given, injected.Injection()))
+            study_entries(float(share), names.split(","))
+        return
     given = [int(text) for text in sys.argv[1:]]
     interruptions, kills, commands = (*given, *(INTERRUPTIONS, KILLS, COMMANDS)[len(given) :])
     with tempfile.TemporaryDirectory() as place:

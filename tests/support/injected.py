@@ -12,11 +12,11 @@ import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from ended_commands import TEMPORARY, contents
+from ended_commands import contents
 
 from exfit import __main__
 from exfit.util import interrupts
@@ -70,8 +70,13 @@ class Injection:
             try:
                 signal.raise_signal(signal.SIGINT)
             except KeyboardInterrupt as interruption:  # which takes this function away
-                interruption.again = _Again(lambda: sys.setprofile(self))
+                interruption.again = _Again(self.go_on)
                 raise
+
+    def go_on(self) -> None:
+        """Count on, where a second interruption is to come."""
+        if self.gap:
+            sys.setprofile(self)
 
 
 class Ran(NamedTuple):
@@ -103,29 +108,35 @@ def run(arguments: tuple[str, ...], injection: Injection) -> Ran:
 
 
 def entries(arguments: tuple[str, ...]) -> list[Entry]:
-    """Return the first and the last entry into each module, in no order of time."""
+    """Return the first and the last entry into each module of exfit."""
     counting = Injection()
     ran = run(arguments, counting)
     assert ran.code in (0, 3), (arguments, ran.err)
     ends = ((module, number) for module, n in counting.counts.items() for number in {1, n})
-    return [Entry(*end) for end in ends]
+    return sorted(Entry(*end) for end in ends)
 
 
-def faults(arguments: tuple[str, ...], at: Entry, gap: int, folder: Path) -> Iterator[str]:
-    """Yield what is wrong after one or two interruptions of a command, which has run before."""
-    before = {*contents(folder)}
-    injection = Injection(at, gap)
+class Ended(NamedTuple):
+    """What is wrong after interruptions of a command, and how long it went on, s of processor."""
+
+    faults: list[str]
+    seconds: float
+
+
+def interrupted(
+    arguments: tuple[str, ...], at: Entry, gap: int, whole: set[Path], folder: Path
+) -> Ended:
+    """Interrupt a command once or twice; ``whole`` are the files of a run without that."""
+    injection, faults = Injection(at, gap), []
     ran = run(arguments, injection)
     if not injection.sent:
-        return
+        return Ended([], 0.0)
     if ran.code not in CODES:
-        yield f"exit code {ran.code}: {ran.err}"
+        faults.append(f"exit code {ran.code}: {ran.err}")
     if "nterrupted" not in ran.err:
-        yield f"not said: {ran.code} {ran.err!r}"
+        faults.append(f"not said: {ran.code} {ran.err!r}")
     if "Traceback" in ran.err:
-        yield ran.err
-    left = {*contents(folder)}
-    if any(path.name.startswith(TEMPORARY) for path in left) or left - before:
-        yield f"files: {sorted(map(str, left - before))}"
-    if interrupts._received:
-        yield "still listening"
+        faults.append(ran.err)
+    if others := {*contents(folder)} - whole:
+        faults.append(f"files: {sorted(map(str, others))}")
+    return Ended(faults, ran.seconds)

@@ -1,9 +1,14 @@
 """Every command that writes files, in a folder with what each needs."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import yaml
+from cases import FIRST_ORDER, TIME, TRUTH
+from commands import COMMANDS
+from grid_events import event_case, recorded
 from places import CONFIGS, SAMPLES
 
 CASE = CONFIGS / "first_order.yaml"
@@ -21,7 +26,8 @@ WRITERS = {
     "compare": ("compare", "record.csv", "record.csv", "--no-plots", "-o", "compared"),
     "translate": ("translate", "fit", "--model", "AC1A", "--no-plots", "-o", "translated"),
     "run": ("run", "case.yaml", "--no-plots", "-o", "programme"),
-    "rank": ("rank", "unit.yaml", "--models", "AC1A", "--no-plots", "-o", "ranked"),
+    "rank": ("rank", "unit.yaml", "--models", "AC1A", "--search", "local", "--no-plots",
+             "-o", "ranked"),
     "report": ("report", "fit", "-o", "report.html"),
     "new": ("new", "--model", "AC1A", "--record", "record.csv", "--step", "0.05", "--force",
             "-o", "new.yaml"),
@@ -55,9 +61,10 @@ def prepare(place: Path) -> None:
 
 FIT_BEFORE = ("fit", "unit.yaml", "--no-plots", "-o", "fit")  # which others read
 
-# every command: those that write, what else they write, and those that only show
-EVERY = WRITERS | {
+# every command and what else a command writes; one that is new is given a case
+OTHERS = {
     "batch": (*WRITERS["batch"], "--reports"),
+    "fit --apply": ("fit", "late.yaml", "--apply", "1", "--no-plots", "--search", "local"),
     "verify": ("verify", "record.csv", "--model", "AC1A", "--step", "0.05", "--force",
                "-o", "verified.html"),
     "models": ("models", "AC1A", "--plot", "drawn"),
@@ -65,12 +72,30 @@ EVERY = WRITERS | {
     "show": ("show", "fit"),
     "schema": ("schema",),
     "trust": ("trust", "."),
-    "fit --apply": ("fit", "slow.yaml", "--apply", "1", "--no-plots", "-q"),
-    "export --plb": ("export", "fit", "--plb", "unit.plb"),
+    "export --plb": ("export", "event", "--plb", "event.plb", "--force"),
 }  # fmt: skip
-READS_A_FIT = ("fit", "fit/parameters.yaml")
+NAMED = {**WRITERS, **OTHERS}
+EVERY = NAMED | {
+    name: (name, "case.yaml")
+    for name in COMMANDS.keys() - {arguments[0] for arguments in NAMED.values()}
+}
 
 
-def needs_a_fit(name: str) -> bool:
-    """Whether a command reads the fit that FIT_BEFORE makes."""
-    return not {*READS_A_FIT}.isdisjoint(EVERY[name][1:])
+def prepare_every(place: Path, run: Callable[..., object]) -> None:
+    """Write what every command reads into a folder; ``run`` runs those that make it, there."""
+    prepare(place)
+    old = (CONFIGS / "models" / "sexs.yaml").read_text(encoding="utf-8")
+    (place / "old.yaml").write_text(f"{old}  sources: {{K: maker}}\n", encoding="utf-8")
+    columns = np.column_stack([TIME, TRUTH])
+    np.savetxt(place / "bump.csv", columns, delimiter=",", header="t,vt")
+    late = FIRST_ORDER | {  # the step of the record is at 0
+        "test": {"vt0": 0.0, "vref": [{"at": 0.7, "step": 1.0}]},
+        "record": {"file": "bump.csv", "time": "t", "channels": {"vt": "vt"}},
+    }
+    (place / "late.yaml").write_text(yaml.safe_dump(late), encoding="utf-8")
+    (place / "grid").mkdir()
+    recorded(place / "grid" / "event.csv")
+    event_case(place / "grid", "event")
+    for case, *options in (("late.yaml",), ("grid/case.yaml", "-o", "event")):
+        run("fit", case, "--no-plots", "--search", "local", "-q", *options)
+    run(*FIT_BEFORE)
