@@ -1,5 +1,6 @@
 """What all tests share: the models that they run over, and the folder of machine code."""
 
+import contextlib
 import gc
 import os
 import signal
@@ -8,12 +9,13 @@ import tempfile
 from pathlib import Path
 
 import hypothesis
+import injected
 import numpy as np
 import pytest
 from commands import Ran
 from oracle import EXCITERS, SATURATED, SURROUNDED
 from settings import LINEAR_ALGEBRA
-from writers import prepare
+from writers import prepare, prepare_every
 
 from exfit import cli
 from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
@@ -204,6 +206,15 @@ def prepared_folder(tmp_path_factory):
     """Return a folder with all that the commands read but for a fit."""
     folder = tmp_path_factory.mktemp("place")
     prepare(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder_of_all(tmp_path_factory):
+    """Return a folder with all that any command reads."""
+    folder = tmp_path_factory.mktemp("all")
+    with contextlib.chdir(folder):
+        prepare_every(folder, lambda *arguments: injected.run(arguments, injected.Injection()))
     return folder
 
 

@@ -127,9 +127,9 @@ def _damping_ratios(swing: Array, tail: Mask) -> Array:
 
     A swing is a turning point at more than 2 % of the range, before the tail.
     """
-    slope = np.diff(swing, axis=1)
+    way = np.sign(np.diff(swing, axis=1))
     turns = np.zeros(swing.shape, dtype=bool)
-    turns[:, 1:-1] = (slope[:, 1:] * slope[:, :-1] < 0.0) & ~tail[1:-1]
+    turns[:, 1:-1] = (way[:, 1:] * way[:, :-1] < 0.0) & ~tail[1:-1]
     size = np.where(turns, np.abs(swing), 0.0)
     row, first = np.arange(len(swing)), np.argmax(size, axis=1)
     side = np.sign(swing[row, first])[:, None]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from exfit.errors import ExfitError
 from exfit.util.cache import keep_private, read_private
+from exfit.util.files import within
 
 CONFIG = "EXFIT_CONFIG"  # the variable of the environment that names the folder
 
@@ -81,6 +82,7 @@ def trust(code: Code) -> None:
     """Remember code as trusted; raises ExfitError where that cannot be written."""
     content = {"words": code.words, "place": os.path.realpath(code.place), "sha256": code.sha256}
     file = _file(code.sha256)
+    within(file.parents[1], file.parent.name)
     keep_private(file, json.dumps(content, indent=2).encode())
     if read_private(file) is None:
         raise ExfitError(f"{file}: cannot be written")

@@ -8,7 +8,7 @@ import signal
 import injected
 import pytest
 from ended_commands import contents
-from writers import EVERY, prepare_every
+from writers import EVERY
 
 from exfit.output import events
 from exfit.util import files
@@ -97,28 +97,19 @@ def test_an_interruption_that_something_swallows_is_an_exit_code(run, monkeypatc
     assert ran.err == "Interrupted: what was done until then is kept\n"
 
 
-@pytest.fixture(scope="module")
-def place_of_every(tmp_path_factory):
-    """Return a folder with all that any command reads."""
-    place = tmp_path_factory.mktemp("every")
-    with contextlib.chdir(place):
-        prepare_every(place, lambda *arguments: injected.run(arguments, injected.Injection()))
-    return place
-
-
 @pytest.mark.parametrize(
     "name",
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in EVERY],
 )
 def test_an_interruption_at_any_module_of_any_command_is_never_swallowed(
-    place_of_every, tmp_path, monkeypatch, name
+    folder_of_all, tmp_path, monkeypatch, name
 ):
     """One or two at some of the entries; tests/studies/interrupts.py has them at all."""
-    monkeypatch.chdir(place_of_every)
+    monkeypatch.chdir(folder_of_all)
     monkeypatch.setenv("EXFIT_CONFIG", str(tmp_path))
     entries = injected.entries(EVERY[name])
-    whole, rng = {*contents(place_of_every)}, random.Random(name)
+    whole, rng = {*contents(folder_of_all)}, random.Random(name)
     for at in rng.sample(entries, min(DRAWN.get(name, 8), len(entries))):
         gap = rng.choice(GAPS)
-        ended = injected.interrupted(EVERY[name], at, gap, whole, place_of_every)
+        ended = injected.interrupted(EVERY[name], at, gap, whole, folder_of_all)
         assert ended.faults == [], (at, gap)

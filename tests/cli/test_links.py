@@ -5,26 +5,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import COMMANDS
 from ended_commands import contents
-from writers import FIT_BEFORE, WRITERS, prepare
+from writers import EVERY, prepare
+
+from exfit.features.start.command import keep
+from exfit.util.trust import Code
 
 FEW = ("simulate", "import", "models", "check")  # the others take longer
-ALL = WRITERS | {
-    "batch": (*WRITERS["batch"], "--reports"),
-    "verify": ("verify", "record.csv", "--model", "AC1A", "--step", "0.05", "--force",
-               "-o", "verified.html"),
-    "models": ("models", "AC1A", "--plot", "drawn"),
-    "check": ("check", "old.yaml", "--write"),
-}  # fmt: skip
-OLD = "model: FIRST_ORDER\nplant: {type: none}\nparameters: {fixed: {k: 1}, sources: {k: test}}\n"
 SILENT = {"show", "schema", "trust"}  # they write nothing, or where the user's settings are
+ALL = {name: arguments for name, arguments in EVERY.items() if name not in SILENT}
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links need a right there")
-
-
-def test_every_command_that_writes_is_tried():
-    assert {arguments[0] for arguments in ALL.values()} == set(COMMANDS) - SILENT
 
 
 def run_among_links(run, name, outside):
@@ -38,18 +29,15 @@ def run_among_links(run, name, outside):
     return ran
 
 
-@pytest.mark.usefixtures("in_prepared_folder")
 @pytest.mark.parametrize(
     "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.long) for name in ALL]
 )
-def test_nothing_is_written_through_links(run, prepared_folder, tmp_path, name):
+def test_nothing_is_written_through_links(run, folder_of_all, tmp_path, monkeypatch, name):
     """Links in place of each file, dangling and not, and in place of each folder below the top."""
-    if "fit/parameters.yaml" in ALL[name] or "fit" in ALL[name][1:]:
-        assert Path("fit").is_dir() or run(*FIT_BEFORE).code in (0, 3)
-    Path("old.yaml").write_text(OLD, encoding="utf-8")
-    before = contents(prepared_folder)
+    monkeypatch.chdir(folder_of_all)
+    before = contents(folder_of_all)
     assert run(*ALL[name]).code in (0, 1, 3)
-    after = contents(prepared_folder)
+    after = contents(folder_of_all)
     written = [path for path in after if after[path] != before.get(path)]
     assert written
     outside = tmp_path / "outside"
@@ -97,3 +85,26 @@ def test_a_run_below_the_folder_of_all_runs_may_not(run, empty_folder, tmp_path)
     assert ran.code == 1
     assert "case-simulate: not written: a link leads out of runs, to " in ran.err
     assert [*(tmp_path / "disk").iterdir()] == []
+
+
+def test_answers_are_not_kept_through_a_link(empty_folder, tmp_path):
+    target = tmp_path / "outside"
+    Path("new.answers.yaml").symlink_to(target)
+    kept = keep({"model": "SEXS"}, Path("new.answers.yaml"))
+    assert not target.exists()
+    assert kept.exists()
+
+
+@pytest.mark.parametrize("link", ["file", "folder"])
+def test_what_is_trusted_is_not_kept_through_a_link(run, empty_folder, tmp_path, monkeypatch, link):
+    (tmp_path / "outside").mkdir()
+    monkeypatch.setenv("EXFIT_CONFIG", str(empty_folder))
+    kept = Path("trusted", f"{Code.of_folder(empty_folder).sha256}.json")
+    if link == "folder":
+        kept.parent.symlink_to(tmp_path / "outside")
+    else:
+        kept.parent.mkdir()
+        kept.symlink_to(tmp_path / "outside" / "file")
+    ran = run("trust", ".")
+    assert [*(tmp_path / "outside").iterdir()] == []
+    assert ran.code == (1 if link == "folder" else 0), ran.err

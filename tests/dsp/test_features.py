@@ -180,3 +180,15 @@ def test_a_swing_that_returns_to_its_level_has_a_damping_ratio():
     t = np.maximum(FINE_TIME - STEP_AT, 0.0)
     found = read(FINE_TIME, np.exp(-s * t) * np.sin(w * t) + 1e-4 * (t > 0.0))
     assert found.damping_ratio == pytest.approx(s / np.hypot(s, w), abs=1e-6)
+
+
+@pytest.mark.parametrize("times", [1e-300 * np.arange(9.0), [0, 1, 1 + 1e-16, 2, 3, 4, 5, 6, 7]])
+def test_times_that_nearly_agree_give_features_without_a_warning(times):
+    response = np.array([0.0, 0.0, 1e-200, 1.3, 0.7, 1.1, 1.0, 1.0, 1.0])
+    assert features(np.asarray(times, dtype=float), response, 0.0, 10.0) is not None
+
+
+@pytest.mark.parametrize("factor", [1e-300, 1e300])
+def test_samples_of_any_size_give_features_without_a_warning(factor):
+    swing = np.array([0.0, 0.0, 1.3, 1.0 - factor, 1.0 + 1e-300, 1.0, 1.0, 1.0, 1.0, 1.0])
+    features(np.arange(10.0), swing, 1.0, 10.0)

@@ -274,8 +274,8 @@ def keep(given: "Given", path: Path) -> Path:
     """Write answers to a file, or beside it where another file has its name; return which."""
     from exfit.features.start.answers import HEADING, answers_text
 
-    number, free = 2, path
-    while free.exists() and not free.read_bytes().startswith(f"# {HEADING}".encode()):
+    number, free, begin = 2, path, f"# {HEADING}".encode()
+    while free.is_symlink() or (free.exists() and not free.read_bytes().startswith(begin)):
         free, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
     write_text(answers_text(given, free), free, ())
     return free
