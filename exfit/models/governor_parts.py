@@ -6,8 +6,9 @@ its equations take ``outside_band(u.dw, p)`` for the speed, its sheet has ``*BAN
 unit of the turbine what is per unit of the machine, and says both behind the drawing.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import cleandoc
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,6 +30,11 @@ OF_RATING = """
 All is per unit of the turbine, whose rating is Trate_Mbase times the machine's
 base: 1 where Trate (MW) is 0. A .dyr file does not have that base: an import
 names a Trate."""
+# symbols of curves over the gate; "" is the first height, 0, and the last gate, 1
+GATE_CURVES = (
+    (("G0", "G1", "G2", ""), ("", "P1", "P2", "P3")),
+    tuple(tuple(f"{name}{k}" for k in range(1, 7)) for name in ("GV", "PGV")),
+)
 # what records hold that have the rating, or not, and no band
 ON_RATING = {"Trate_Mbase": 1.0}
 PLAIN = {"DBH": 0.0, "DBL": 0.0, **ON_RATING}
@@ -125,3 +131,25 @@ def delayed(u: Signal, x: Signal, v: Signal, T: Signal) -> tuple[Signal, Signal,
     """
     pole = rate(T)
     return u - v, v * pole, (12.0 * (u - x) - 6.0 * v) * pole
+
+
+def gate_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) where a curve over the gate does not rise, or ends behind a gate of 1.
+
+    Points may coincide, and those at (0, 0) are none.
+    """
+    for gates, heights in GATE_CURVES:
+        if not {*gates, *heights} - {""} <= values.keys():
+            continue
+        points = [
+            (values.get(gate, 1.0), values.get(height, 0.0))
+            for gate, height in zip(gates, heights, strict=True)
+        ]
+        names = zip(pairwise(zip(gates, heights, strict=True)), pairwise(points), strict=True)
+        for (_, (gate, height)), (before, after) in names:
+            rises = before[0] < after[0] and before[1] < after[1]
+            if not rises and after not in (before, (0.0, 0.0)):
+                text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
+                yield gate or height, f"the point {text}, ({before[0]:g}, {before[1]:g})"
+        if points[-1][0] > 1.0:
+            yield gates[-1], f"{points[-1][0]:g} is above 1, where the curve ends"

@@ -559,38 +559,13 @@ def stabiliser_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
         yield "PPSSOFF", f"{off:g} is above PPSSON = {on:g}"
 
 
-GATE_CURVES = (
-    (("G0", "G1", "G2", ""), ("", "P1", "P2", "P3")),
-    tuple(tuple(f"{name}{k}" for k in range(1, 7)) for name in ("GV", "PGV")),
-)
-
-
-def gate_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, fault) where a curve over the gate does not rise, or ends behind a gate of 1.
-
-    Points may coincide, and those at (0, 0) are none.
-    """
-    for gates, heights in GATE_CURVES:
-        if not {*gates, *heights} - {""} <= values.keys():
-            continue
-        points = [
-            (values.get(gate, 1.0), values.get(height, 0.0))
-            for gate, height in zip(gates, heights, strict=True)
-        ]
-        names = zip(pairwise(zip(gates, heights, strict=True)), pairwise(points), strict=True)
-        for (_, (gate, height)), (before, after) in names:
-            rises = before[0] < after[0] and before[1] < after[1]
-            if not rises and after not in (before, (0.0, 0.0)):
-                text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
-                yield gate or height, f"the point {text}, ({before[0]:g}, {before[1]:g})"
-        if points[-1][0] > 1.0:
-            yield gates[-1], f"{points[-1][0]:g} is above 1, where the curve ends"
-
-
 def contradictions(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) for what does not go together in any model's values."""
     yield from crossed_limits(values)
-    yield from gate_faults(values)
+    if {"P1", "GV1"} & values.keys():
+        from exfit.models.governor_parts import gate_faults
+
+        yield from gate_faults(values)
     yield from saturation_faults(values)
     yield from stabiliser_faults(values)
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from exfit.errors import SimulationError
-from exfit.util.processes import processors
 
 GIGABYTE = 1e9
 DEFAULT_MEMORY = 2.0  # GB
@@ -43,6 +42,8 @@ def check_fit(sizes: Iterable[RunSize], free: int, memory: float) -> None:
 
     The records of a fit stay in memory together; their runs follow one another in each thread.
     """
+    from exfit.util.processes import processors
+
     sizes = tuple(sizes)
     kept = sum(
         OF_STEP * each.steps + (OF_SAMPLE + OF_JACOBIAN * free) * each.samples for each in sizes

@@ -108,9 +108,8 @@ class Simulator:
         self._answers: dict[str, tuple[object, Any]] = {}
         self._located = LocatedTest(system.inputs, inputs, step, 1.0) if located else None
         # of a run with located crossings, the points at which it is read as a whole
-        self._grid = (
-            grid_segments(exact(inputs), step / READ_IN) if located else grid_segments(inputs, step)
-        )
+        read = (exact(inputs), step / READ_IN) if located else (inputs, step)
+        self._grid = grid_segments(*read)
         # a long record is read on the grid once, whatever else a fit moves
         self._recorded_samples = [
             {name: recorded.on(segment) for name, recorded in inputs.recorded.items()}
@@ -166,7 +165,9 @@ class Simulator:
         """
         if steps == self.inputs.steps and delay == self.delay:
             return self
-        if [_fixed(change) for change in steps] != [_fixed(change) for change in self.inputs.steps]:
+        both = [*steps, *self.inputs.steps]
+        fixed = [each._replace(at=0.0 if each.smooth else each.at, step=0.0) for each in both]
+        if fixed[: len(steps)] != fixed[len(steps) :]:
             raise ValueError("only the sizes of steps and the times of smooth ones may change")
         pairs = zip(steps, self.inputs.steps, strict=True)
         changed = {new.signal for new, old in pairs if new != old}
@@ -596,7 +597,3 @@ class Simulator:
                     u[:, column] = self._segments[k].u[:, column]
             segments.append(Segment(u, part.step))
         return segments
-
-
-def _fixed(change: InputStep) -> InputStep:
-    return change._replace(at=0.0 if change.smooth else change.at, step=0.0)

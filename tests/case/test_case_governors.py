@@ -203,7 +203,7 @@ def test_a_record_beyond_a_limit_of_the_governor_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("TGOV1", "TGOV9", "governor.model: 'TGOV9' is not a governor model; did you mean TGOV1"),
+        ("TGOV1", "TGOV9", "governor.model: 'TGOV9' is not a governor model; did you mean TGOV3"),
         ("T1: 0.5", "T9: 0.5", "governor.parameters.T9: not a parameter of TGOV1"),
         ("R: 0.05,", "R: 0,", "governor.parameters.R: 0 lies outside 0.001 ... 10 pu"),
         ("T1: 0.5", "VMAX: 0.2, VMIN: 0.3", "governor.parameters.VMIN: 0.3 is not below VMAX"),

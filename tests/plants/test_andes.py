@@ -13,6 +13,7 @@ from references import MACHINE_NAMES
 
 from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS, STABILISERS
+from exfit.models.governor_parts import PLAIN
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.models.speed_multiplier import times_speed
@@ -84,7 +85,7 @@ def unit_of(told):
         governor = GOVERNORS[told["governor"]["model"]]
         theirs = told["governor"]["values"]
         renamed = {OF_GOVERNOR.get(name, name): value for name, value in theirs.items()}
-        of_governor = known(renamed | theirs, governor)
+        of_governor = known(PLAIN | renamed | theirs, governor)
         values |= {GOVERNOR + symbol: value for symbol, value in of_governor.items()}
     multiplied = times_speed(model) if exciter["model"] in TIMES_SPEED else model
     quadratic = SATURATION["quadratic"]

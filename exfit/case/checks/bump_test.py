@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from itertools import pairwise
 
-from exfit.case.checks.model import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import BREAKER, EVENTS, REFERENCES, SPEED, SWITCHED, PlantKind
@@ -18,7 +17,10 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
     duration = test.at("duration").number
     for name in EVENTS:
         yield from _step_faults(test, name)
-        yield from _table_faults(test.at(name), duration)
+        if "table" in test.at(name):
+            from exfit.case.checks.tables import table_faults
+
+            yield from table_faults(test.at(name), duration)
         for place, at in moves_of(test.at(name)):
             yield from place_faults(place, at, duration)
         if name not in kind.events and name in test:
@@ -95,7 +97,7 @@ def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
         yield opens, opens.start
 
 
-def _rows(given: ContentNode) -> list[tuple[float, float]]:
+def rows_of(given: ContentNode) -> list[tuple[float, float]]:
     """Return the rows of a table; none where one of them is no row."""
     pairs = [row.pair for row in given.at("table").entries]
     rows = [row for row in pairs if row is not None]
@@ -104,30 +106,9 @@ def _rows(given: ContentNode) -> list[tuple[float, float]]:
 
 def moves_of(given: ContentNode) -> Iterator[tuple[ContentNode, float]]:
     """Yield the instants from which on the lines of a table rise or fall, with their places."""
-    for k, ((time, value), (_, then)) in enumerate(pairwise(_rows(given))):
+    for k, ((time, value), (_, then)) in enumerate(pairwise(rows_of(given))):
         if then != value:
             yield given.at("table", k), time
-
-
-def _table_faults(given: ContentNode, duration: float | None) -> Iterator[Fault]:
-    """Yield the faults of a reference that is a table; ``duration`` of a test without a record."""
-    rows, table = _rows(given), given.at("table")
-    if len(rows) < 2:
-        return
-    times = [time for time, _ in rows]
-    for k, (before, time) in enumerate(pairwise(times), 1):
-        if time < before:
-            yield table.at(k).fault(f"{show(time)} s is before {show(before)} s, the row before")
-        elif k > 1 and times[k - 2] == time:
-            text = f"{show(time)} s is given more than twice: a step has two rows"
-            yield table.at(k).fault(text)
-    level = rows[0][1]
-    if all(value == level for _, value in rows):
-        yield table.fault(f"stays at {show(level)}: there is no step")
-    elif duration is not None and not times[0] <= 0.0 <= duration <= times[-1]:
-        covered = f"{show(times[0])} ... {show(times[-1])} s"
-        text = f"{covered} does not cover the test, 0 ... {show(duration)} s: add a row"
-        yield table.fault(text)
 
 
 def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
@@ -213,8 +194,10 @@ def findable_faults(
 ) -> Iterator[Fault]:
     """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
     for value in _findable(test, record):
+        from exfit.case.checks.found import value_faults
+
         *_, above, key = value.place
-        yield from _value_faults(value)
+        yield from value_faults(value)
         scale = kind.scaled and key == "scale" and above != "vt"
         of_event = kind.finds_rest and key in ("frequency_offset", "delay")
         if kind.plays_back and not scale and not of_event:
@@ -259,35 +242,7 @@ def _shown_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
         text = f"is missing: the record does not show it while {unknown[0]} of vt is fitted"
         yield test.at("vt0").fault(text)
     for _, channel in channels.sections:
-        yield from _frequency_faults(channel.at("sine", "frequency"))
+        if "sine" in channel:
+            from exfit.case.checks.found import frequency_faults
 
-
-def _frequency_faults(frequency: ContentNode) -> Iterator[Fault]:
-    """Yield the faults of the frequency of a periodic disturbance."""
-    if frequency.is_section:
-        yield from _needed_bounds(frequency)
-    for node in (frequency, *map(frequency.at, ("start", "min", "max"))):
-        if node.number is not None and node.number <= 0.0:
-            yield node.fault(f"{show(node.number)} Hz must be above 0")
-
-
-def _value_faults(value: ContentNode) -> Iterator[Fault]:
-    """Yield the faults of one value that the fit shall find: its bounds and its start."""
-    key = value.place[-1]
-    first_step = key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)
-    shown = first_step or key == "vt0" or value.place[-2] == BREAKER
-    if value.at("start").text == "auto" and not shown:
-        text = "auto finds the first step of vref, its at and its step, vt0, or breaker.opens"
-        yield value.at("start").fault(text)
-    yield from _needed_bounds(value)
-    low, high = value.at("min").number, value.at("max").number
-    if key in ("step", "scale") and low is not None and high is not None and low <= 0 <= high:
-        yield value.at("min").fault(f"{show(low)} ... {show(high)} contains 0")
-
-
-def _needed_bounds(value: ContentNode) -> Iterator[Fault]:
-    """Yield the bounds that are missing, unless a record shows the value, or contradict it."""
-    for bound in ("min", "max"):
-        if bound not in value and value.at("start").text != "auto":
-            yield value.at(bound).fault("is missing")
-    yield from bound_faults(value)
+            yield from frequency_faults(channel.at("sine", "frequency"))

@@ -34,13 +34,8 @@ else:
     Heard = Literal[HEARD]
     Place = Literal[PLACES]
 
-DIALECT = (
-    "Whose equations are solved: standard, psse, which differs for PSS4B, powerworld, andes; see "
-    "[On load](../plants.md#on-load)."
-)
-ISOLATED = Field(
-    description="f0; PL, QL, IP, IQ, YP, YQ of the load, Ra, Rc, Xc: as of infinite-bus."
-)
+DIALECT = "Whose equations are solved; see [On load](../plants.md#on-load)."
+ISOLATED = Field(description="f0, PL, QL, IP, IQ, YP, YQ, Ra, Rc, Xc: as of infinite-bus.")
 LOAD = Field(description="P and Q until the breaker opens, pu on the base of the machine.")
 
 

@@ -15,6 +15,7 @@ from exfit.features.events.grid_playback import grid_playback
 from exfit.models import GOVERNORS, MODELS
 from exfit.models.blocks import field_demand, pi_rest
 from exfit.models.exciters.ac8 import ac8b
+from exfit.models.governor_parts import PLAIN
 from exfit.models.machines import MACHINES
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, VT0
 from exfit.plants.unit import UnitOnLoad
@@ -111,7 +112,7 @@ def test_an_event_is_that_of_another_simulator(exciter, most, governor):
     time, turbine = columns["t"], None if governor is None else GOVERNORS[governor]
     unit = UnitOnLoad(exciter, GENROU, QUADRATIC, dialect="andes", governor=turbine)
     inputs = played(time, columns["vt"], columns["angle"])
-    values = {GOVERNOR + symbol: value for symbol, value in OF_GOVERNOR.items()}
+    values = {GOVERNOR + symbol: value for symbol, value in (PLAIN | OF_GOVERNOR).items()}
     got = response(grid_playback(unit), inputs, time, values_of(columns) | values, 0.5 * STEP)
     arcs = np.abs(OF_EXCITER["KC"] * got["ifd"] / got["VE"] - 0.433) > 1e-3
     for signal, limit in most.items():
