@@ -14,20 +14,19 @@ from exfit.plants.parts import Names, output_of
 from exfit.util.text import show
 
 ROUNDING_AT_REST = 1e-9  # pu/s
-# by governor, the state that is the opening of its gate, its valve or its fuel valve, pu
-GATES = {
-    "GAST": "V1",
-    "GGOV1": "VALVE",
-    "HYGOV": "G",
-    "IEEEG1": "VALVE",
-    "TGOV1": "V1",
-    "TGOV3": "VALVE",
-}
+# the state that is the opening of a gate or a (fuel) valve, pu, where GATE and VALVE are not
+GATES = {"GAST": "V1", "GAST2A": "VALVE", "GASTWD": "VALVE", "HYGOV": "G", "TGOV1": "V1"}
+
+
+def gate_of(governor: Model) -> str | None:
+    """Return the state of a governor that is the opening of its gate, None where none is."""
+    states = (name for name in ("GATE", "VALVE") if name in governor.states)
+    return GATES.get(governor.name) or next(states, None)
 
 
 def gate(governor: Model | None, state: Signals) -> dict[str, Signal]:
     """Return the opening of the gate under its name; nothing where no state is one."""
-    own = None if governor is None else GATES.get(governor.name)
+    own = None if governor is None else gate_of(governor)
     return {} if own is None else {GATE: state[GOVERNOR + own]}
 
 

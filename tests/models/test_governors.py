@@ -339,6 +339,15 @@ def test_rest_is_rest_at_any_power(governor):
             assert np.abs(slopes).max() < 1e-13
 
 
+def test_the_measured_power_reaches_the_output_through_states_alone(governor):
+    """A governor driven by a record measures the power that it gives."""
+    for values in (typical(governor.sheet), lively(governor)):
+        p = Names(**values)
+        x, pref = resting(governor, p)
+        _, others = motion_of(governor, p, x, seen(p=0.9 * POWER, pref=pref))
+        assert others == motion_of(governor, p, x, seen(pref=pref))[1]
+
+
 @pytest.mark.parametrize("change", [{"Kpload": 0.0}, {"Ka": 0.0}, {"R": 0.0, "Rselect": 0.0}])
 def test_GGOV1_rests_without_one_of_its_parts(change):
     model = GOVERNORS["GGOV1"]

@@ -9,7 +9,7 @@ from exfit.case.parts import Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
 from exfit.plants import FURTHER, GATE, HEARD, PlantKind, Stabilised, acts_without_load, inputs_at
-from exfit.plants.controls import GATES, rests_with_output, why_no_rest
+from exfit.plants.controls import gate_of, rests_with_output, why_no_rest
 from exfit.plants.limiting import inputs_for_limiters
 from exfit.plants.parts import Names
 from exfit.util.text import show, show_value
@@ -83,7 +83,7 @@ def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -
     values = _start_values(section, model)
     for recording in (content, *records):
         channel, added = recording.at("record", "channels", GATE), recording.at("test", "fs")
-        if channel.value is not None and model.name not in GATES:
+        if channel.value is not None and gate_of(model) is None:
             yield channel.fault(f"{model.name} has no state that is the gate")
         if added.value is not None and values and _passes_speed_at_once(model, values):
             yield added.fault(f"the power of {model.name} must wait for its gate: give it a lag")
