@@ -38,7 +38,8 @@ class SignalRow(NamedTuple):
     @property
     def label(self) -> str:
         """The label of an axis."""
-        return f"{self.name} {self.symbol} ({self.unit})"
+        named = self.symbol in self.name.split()
+        return f"{self.name}{'' if named else f' {self.symbol}'} ({self.unit})"
 
 
 RATED_VOLTAGE, AIR_GAP_LINE, RATED_POWER = "rated, line to line", "air-gap line", "rated MVA"

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import whole_unit
+from places import CONFIGS
 from programmes import OF_MACHINE, TRUTH, programme_content, written
 from tiers import few_of
 
@@ -16,7 +18,7 @@ from exfit.features.programme import run as running
 from exfit.features.programme.folder import load_summary, result_kept, summary_text
 from exfit.features.programme.programme import load_programme
 from exfit.features.programme.result import ProgrammeStep
-from exfit.results.verdict import NOT_CONVERGED
+from exfit.results.verdict import GOOD, MATCHES, NOT_CONVERGED
 from exfit.util.files import write
 
 ORDER = ["saturation", "v-curve", OF_MACHINE, "fit"]
@@ -49,6 +51,17 @@ def again(folder, whole, tmp_path):
         return exfit.run(path, progress=progress, **places, **options), ran
 
     return run
+
+
+@pytest.mark.long
+def test_both_halves_of_a_unit_are_found_in_one_programme():
+    result = exfit.run(CONFIGS / "programmes" / "hydro_unit.yaml").fit
+    assert result.verdict.verdict in (GOOD, MATCHES)
+    governor = {f"governor.{name}": value for name, value in whole_unit.GOVERNOR.items()}
+    known = whole_unit.EXCITER | governor
+    for name, parameter in result.parameters.items():
+        low, high = parameter.interval
+        assert low < known[name] < high, name
 
 
 @pytest.mark.long
