@@ -119,7 +119,7 @@ def export(
     comments += [f"{text}." for text in of_fit]
     lines = list[str]()
     for own in written:
-        warnings += _warnings(own)
+        warnings += warnings_of(own)
         comments += _comments(own)
         lines.append(
             files.record_text(own.definition, {**own.values, **own.unused}, bus, machine_id)
@@ -141,7 +141,7 @@ def _comments(entry: Written) -> Iterator[str]:
     for source, symbols in entry.by_source.items():
         if source != TYPICAL:
             yield f"{entry.definition.record.name}: {source}: {' '.join(symbols)}."
-    yield from (f"{warning}." for warning in _warnings(entry))
+    yield from (f"{warning}." for warning in warnings_of(entry))
 
 
 def _other_forms(content: Content, written: Sequence[Written]) -> Iterator[str]:
@@ -382,12 +382,14 @@ def values_in_digits(result: FitResult, prefix: str) -> dict[str, float]:
     return values
 
 
-def _warnings(entry: Written) -> Iterator[str]:
+def warnings_of(entry: Written) -> Iterator[str]:
     """Warn of values that a record cannot hold, leaves undefined, or takes from typical data."""
     record = entry.definition.record
     for row in entry.definition.model.sheet:
         symbol, value = row.symbol, entry.values[row.symbol]
         if symbol in entry.definition.names or (symbol == SHARE and RATING in entry.unused):
+            continue
+        if value == dict(record.held).get(symbol):  # what the record stands for
             continue
         acts = value != 0.0  # as no gain of 0 and no limit out of reach does
         if symbol.endswith(("MAX", "MIN")):

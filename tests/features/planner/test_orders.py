@@ -2,6 +2,7 @@
 
 import pytest
 
+from exfit.features.planner.export import Written, warnings_of
 from exfit.features.planner.pslf import heads
 from exfit.features.planner.psse import sound_records
 from exfit.features.planner.records import (
@@ -387,3 +388,12 @@ def test_pss4c_with_two_bus_numbers_and_without_its_last_limits_is_refused():
     assert len(shifted) == len(definition.names)
     faults = [fault.text for fault in read(definition, shifted).faults]
     assert "PSS4C: BLI: 0 leaves the transducer with ALI = 0.5 undamped" in faults
+
+
+@pytest.mark.parametrize("program", [PSSE, PSLF])
+def test_what_a_record_stands_for_is_not_lost_in_it(program):
+    for definition in definitions(program):
+        held = dict(definition.record.held)
+        values = {**typical(definition.model.sheet), **held}
+        warned = " ".join(warnings_of(Written(definition, values, {}, {})))
+        assert not any(f"cannot hold {symbol} " in warned for symbol in held), definition.record
