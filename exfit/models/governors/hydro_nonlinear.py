@@ -204,7 +204,8 @@ def hyg3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     Rgate times c plus Relec times the power at rest. A record has its dead band
     DB1, DB1L in Hz, with a hysteresis, and its backlash DB2 in MW. Not modelled:
     the hysteresis; the curve that PSLF has where GV1 < 0. Typical data are those of
-    IEC 61970-302 (GovHydro3), with a straight curve.
+    IEC 61970-302 (GovHydro3), but for a straight curve, and the droop: of the gate,
+    there of the power.
     """
     low, high = in_use(s.PMIN0, p.PMIN), in_use(s.PMAX0, p.PMAX)
     speed, is_pid = outside_band(u.dw, p), p.Cflag > 0.5
