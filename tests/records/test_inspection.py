@@ -82,8 +82,9 @@ def truth(record):
 
 REJECTION = "rejection"  # whose breaker opens: no step of a reference
 EVENT = "grid_event"  # nor has this one, of another recorder
-BUMPS = [path.stem for path in SAMPLES.glob("*.csv") if not path.stem.startswith("programme")]
-RECORDS = sorted({*BUMPS} - {REJECTION, EVENT})
+OF_PROGRAMMES = ("programme", "hydro_unit")
+STEMS = {path.stem for path in SAMPLES.glob("*.csv") if not path.stem.startswith(OF_PROGRAMMES)}
+RECORDS = sorted(STEMS - {REJECTION, EVENT})
 
 
 @pytest.mark.parametrize("record", few_of(RECORDS, 4))
