@@ -149,11 +149,11 @@ def test_a_plant_is_one_file_one_section_and_one_line(copy):
         '        "open-circuit": ',
         '        "offset": "offset:OFFSET",\n',
     )
-    copy.add("exfit/case/schema/plants.py", "\nPlant = (", SECTION + "\n")
+    copy.add("exfit/case/schema/plants.py", "\nPlant = Annotated[", SECTION + "\n")
     copy.add(
         "exfit/case/schema/plants.py",
-        "    OpenCircuit\n    | InfiniteBus",
-        "    OffsetPlant\n    | ",
+        "    Annotated[Later[OpenCircuit],",
+        '    Annotated[Later[OffsetPlant], Tag("offset")]\n    | ',
     )
     test = {"vt0": 0.0, "duration": 3.0, "vref": [{"at": 0.5, "step": 1.0}]}
     case = {**FIRST_ORDER, "plant": {"type": "offset"}, "test": test}
