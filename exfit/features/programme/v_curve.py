@@ -131,10 +131,14 @@ class FieldsOnLoad:
         return PointProblem(self.errors, {**data, **bases}, parameters, blocks, priors)
 
     def fit(self, problem: PointProblem) -> FittedPoints:
-        """Return the fit of what is free; raises ModelError where its start contradicts itself."""
+        """Return the fit of what is free; raises ModelError where its start has no errors."""
         for symbol, text in self.machine.faults(problem.start):
             raise ModelError(f"{self.machine.name}: the fit starts from {symbol}: {text}")
-        fit = fit_points(problem, search_of(problem))
+        try:
+            fit = fit_points(problem, search_of(problem))
+        except NotFinite:
+            text = "the start of the fit and the given values give the points no finite errors"
+            raise ModelError(f"{self.machine.name}: {text}") from None
         known = fit.confidence.parameters.get("Xq")
         if known is None or known.interval is None or known.interval[1] is not None:
             return fit
