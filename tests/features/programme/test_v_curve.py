@@ -148,10 +148,10 @@ def test_a_fit_from_data_that_contradict_each_other_is_refused():
         v_curve(SALIENT, TRUTH, points(), [free("S12", 0.05, 0.01, 1.0)])
 
 
-def test_a_fit_of_points_without_finite_errors_is_refused():
-    far = PointsOnLoad(P, Q, np.full_like(P, np.nan), points().measurements)
+def test_a_fit_of_points_without_finite_errors_is_refused(monkeypatch):
+    monkeypatch.setattr(FieldsOnLoad, "errors", lambda *_: np.full(len(P), np.nan))
     with pytest.raises(ModelError, match="give the points no finite errors"):
-        v_curve(SALIENT, TRUTH, far, [free("Xd", 1.2, 0.4, 4.0)])
+        v_curve(SALIENT, TRUTH, points(), [free("Xd", 1.2, 0.4, 4.0)])
 
 
 def test_the_points_are_grouped_by_their_power():
