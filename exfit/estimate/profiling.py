@@ -266,10 +266,10 @@ class Side:
                 trial = min(trial, shorter, key=lambda point: point.cost)
             gain = point.cost - trial.cost
             if gain > 0.0:
-                carried = linear.carried_to(trial)
-                holds = abs(gain - linear.full.promise) <= AS_PROMISED * gain
-                if holds and carried.full.promise <= fine:
-                    return self.spot(carried)
+                if abs(gain - linear.full.promise) <= AS_PROMISED * gain:
+                    carried = linear.carried_to(trial)
+                    if carried.full.promise <= fine:
+                        return self.spot(carried)
                 point, before = trial, linear
                 linear = yield from self.linearised(problem, point, linear)
             if gain <= fine:

@@ -14,7 +14,6 @@ from exfit.plants.parts import (
     Names,
     motion,
     named_parameters,
-    present,
     refuse_taken,
     symbols,
     values_named,
@@ -74,16 +73,7 @@ def isolated(unit: UnitOnLoad, inputs: tuple[str, ...] = ("vref",)) -> System:
 
 
 def _build(equipment: Equipment) -> System:
-    unit = UnitOnLoad(
-        present(equipment.exciter),
-        present(equipment.machine),
-        equipment.saturation,
-        equipment.stabiliser,
-        equipment.dialect,
-        equipment.governor,
-        equipment.limiters,
-    )
-    return isolated(unit, equipment.inputs)
+    return isolated(UnitOnLoad.of(equipment), equipment.inputs)
 
 
 ISOLATED = PlantKind(

@@ -8,7 +8,15 @@ from exfit.engine.system import Rest, Signals
 from exfit.engine.trace import Signal
 from exfit.models.machines import Axes, Machine, Source
 from exfit.models.sheet import Model
-from exfit.plants import GOVERNOR, MACHINE, STABILISER, Dialect, SaturationForm, Stabilised
+from exfit.plants import (
+    GOVERNOR,
+    MACHINE,
+    STABILISER,
+    Dialect,
+    Equipment,
+    SaturationForm,
+    Stabilised,
+)
 from exfit.plants.controls import gate, listening, turbine_power
 from exfit.plants.limiting import Limiters, limited_exciter, limiters_rest, sheets_of, states_of
 from exfit.plants.loaded_machine import (
@@ -27,6 +35,7 @@ from exfit.plants.parts import (
     exciter_parameters,
     named_parameters,
     output_of,
+    present,
     rest_of,
     seconds,
     states_at_rest,
@@ -49,6 +58,19 @@ class UnitOnLoad(NamedTuple):
     dialect: Dialect = "standard"
     governor: Model | None = None
     limiters: Limiters = ()
+
+    @classmethod
+    def of(cls, equipment: Equipment) -> "UnitOnLoad":
+        """Return the unit of a case's equipment."""
+        return cls(
+            present(equipment.exciter),
+            present(equipment.machine),
+            equipment.saturation,
+            equipment.stabiliser,
+            equipment.dialect,
+            equipment.governor,
+            equipment.limiters,
+        )
 
     @property
     def speed_in_stator(self) -> bool:

@@ -28,7 +28,6 @@ from exfit.plants.parts import (
     initial,
     motion,
     named_parameters,
-    present,
     refuse_taken,
     symbols,
     values_named,
@@ -268,19 +267,14 @@ def grid_playback(
 
 
 def _build(equipment: Equipment) -> System:
-    unit = UnitOnLoad(
-        present(equipment.exciter),
-        present(equipment.machine),
-        equipment.saturation,
-        equipment.stabiliser,
-        equipment.dialect,
-        equipment.governor,
-        equipment.limiters,
-    )
     inputs = tuple(name for name in REFERENCES if name in equipment.inputs)
     given = equipment.given & {row.symbol for row in AT_START}
     return grid_playback(
-        unit, (*inputs, "vt", "angle"), given, equipment.power_at, equipment.further
+        UnitOnLoad.of(equipment),
+        (*inputs, "vt", "angle"),
+        given,
+        equipment.power_at,
+        equipment.further,
     )
 
 

@@ -384,12 +384,12 @@ def values_in_digits(result: FitResult, prefix: str) -> dict[str, float]:
 
 def warnings_of(entry: Written) -> Iterator[str]:
     """Warn of values that a record cannot hold, leaves undefined, or takes from typical data."""
-    record = entry.definition.record
+    record, held = entry.definition.record, dict(entry.definition.record.held)
     for row in entry.definition.model.sheet:
         symbol, value = row.symbol, entry.values[row.symbol]
         if symbol in entry.definition.names or (symbol == SHARE and RATING in entry.unused):
             continue
-        if value == dict(record.held).get(symbol):  # what the record stands for
+        if value == held.get(symbol):  # what the record stands for
             continue
         acts = value != 0.0  # as no gain of 0 and no limit out of reach does
         if symbol.endswith(("MAX", "MIN")):

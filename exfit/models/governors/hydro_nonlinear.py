@@ -36,7 +36,6 @@ from exfit.models.sheet import (
     sheet,
 )
 
-GAIN = ("1", (0.0, 1000.0))
 SERVO = sheet(
     ("Kg", 2.0, "1/s", (0.001, 1000.0), "gate servo gain"),
     ("Tp", 0.05, *TIME, "pilot valve lag"),
@@ -57,15 +56,13 @@ HELD = {**PLAIN, "BLG": 0.0}
 PAIRS = range(1, 7)
 
 
-def gate_servo(
-    c: Signal, s: Signal, p: Signal, d: Signal, low: Signal, high: Signal
-) -> tuple[Signal, Signal]:
-    """Return the gate behind its backlash and the velocity, of the demand c."""
+def gate_servo(c: Signal, s: Signal, p: Signal, d: Signal, low: Signal, high: Signal) -> Signal:
+    """Return the gate behind its backlash, of the demand c."""
     gate = clip(s.GATE, low, high)
     g, d.PLAY = backlash(gate, s.PLAY, p.BLG)
     velocity, d.VALVE = limited_lag(c - g, s.VALVE, p.Kg, p.Tp, p.VELCLOSE, p.VELOPEN)
     d.GATE = limited(velocity, s.GATE, low, high)
-    return g, velocity
+    return g
 
 
 def column(opening: Signal, s: Signal, p: Signal, d: Signal, H0: Signal) -> Signal:
@@ -108,7 +105,7 @@ def hygovr(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     v, d.LL7 = lead_lag(v, s.LL7, p.T7, p.T8)
     drooped, d.PE = lag(u.p, s.PE, p.R, p.Tt)
     d.C = p.Kp * (u.pref - v - drooped)
-    g, _ = gate_servo(s.C, s, p, d, low, high)
+    g = gate_servo(s.C, s, p, d, low, high)
     return column(g, s, p, d, 1.0) - p.Dturb * g * u.dw
 
 
@@ -218,7 +215,7 @@ def hyg3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     _, d.TD = lag(where(is_pid, wanted - speed, speed), s.TD, 1.0, p.Td)
     error = where(is_pid, s.TD, wanted - s.TD - k1 - second)
     d.INTEG = limited(p.Ki * error, s.INTEG, low, high)
-    g, _ = gate_servo(c, s, p, d, low, high)
+    g = gate_servo(c, s, p, d, low, high)
     opening = curve(g, *gates_and_openings(p))
     return column(opening, s, p, d, p.H0) - p.Dturb * g * u.dw
 

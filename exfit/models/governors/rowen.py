@@ -12,8 +12,7 @@ from exfit.models.blocks import (
 )
 from exfit.models.governor_parts import (
     BAND,
-    ON_RATING,
-    PLAIN,
+    banded,
     delayed,
     governor,
     in_use,
@@ -22,13 +21,10 @@ from exfit.models.governor_parts import (
 from exfit.models.sheet import (
     DIVIDING_TIME,
     LONG_TIME,
-    OF_TWO_PROGRAMS,
     SHORT_TIME,
     TIME,
     WITHIN_10,
-    Records,
     limits,
-    record,
     sheet,
 )
 
@@ -138,13 +134,6 @@ ROWEN = sheet(
 )
 
 
-def records(name: str, cons: str) -> Records:
-    """Return the records of a governor, which have the rating, and of its form with a band."""
-    banded, doubt = f"{cons} DBH DBL", OF_TWO_PROGRAMS
-    plain = record(name, cons, ignored="Trate", held=PLAIN)
-    return (*plain, *record(f"{name}D", banded, ignored="Trate", held=ON_RATING, doubt=doubt))
-
-
 def gast2a(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return Pm."""
     error = u.pref - outside_band(u.dw, p)
@@ -180,7 +169,7 @@ pref is a speed, Z over W times the fuel command at rest. Typical data are
 those of OPAL-RT's library.""",
     aliases="GAST2AD",
     setpoints="MAX0 MIN0",
-    records=records("GAST2A", f"W X Y Z {CONS}"),
+    records=banded("GAST2A", f"W X Y Z {CONS}", ignored="Trate"),
     doubt=DOUBT,
 )
 
@@ -225,6 +214,6 @@ pref is a speed, KDROOP times the power at rest. The derivative has a lag of
 are those of GAST2A, those of the PID of a case of InterPSS.""",
     aliases="GASTWDD",
     setpoints="MAX0 MIN0",
-    records=records("GASTWD", f"KDROOP KP KI KD {CONS} TD"),
+    records=banded("GASTWD", f"KDROOP KP KI KD {CONS} TD", ignored="Trate"),
     doubt=DOUBT,
 )
