@@ -187,22 +187,27 @@ def fitted_table(
     marks = {name: ", ".join(remarks_on(parameter)) for name, parameter in shown.items()}
     linear = any(parameter.linear_error is not None for parameter in shown.values())
     by_noise = any(parameter.noise_interval is not None for parameter in shown.values())
+    found = {name: _found(result, name) for name in shown}
+    no_errors = all(error == "-" for _, _, error, _ in found.values())
+    of_errors = TableColumn(
+        "by noise" if by_noise else "error", number=True, expendable=2 if linear else 1
+    )
     heads = (
         TableColumn("parameter"),
         TableColumn("start", number=True, expendable=1 if linear else 2),
         *([] if before is None else [TableColumn("before", number=True)]),
         TableColumn("fitted", number=True),
         TableColumn("95 % interval", number=True),
-        TableColumn(
-            "by noise" if by_noise else "error", number=True, expendable=2 if linear else 1
-        ),
+        *([] if no_errors else [of_errors]),
         TableColumn("unit"),
         *([TableColumn("")] if any(marks.values()) else []),
     )
     rows = []
     for name, parameter in shown.items():
         before_it = [] if before is None else [parameter.rounded(before.values.get(name))]
-        cells = (name, number(parameter.start), *before_it, *_found(result, name))
+        value, limits, error, unit = found[name]
+        errors = [] if no_errors else [error]
+        cells = (name, number(parameter.start), *before_it, value, limits, *errors, unit)
         mark = [marks[name]] if any(marks.values()) else []
         rows.append(row(*cells, *mark, mark=_mark(result, parameter)))
     return Table(heads, tuple(rows))

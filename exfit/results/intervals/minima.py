@@ -172,11 +172,11 @@ def valley_in_words(
     bounds = {free.name: (free.low, free.high) for free in residuals.free}
     moves = []
     for name in most_different({name: (min(own), max(own)) for name, own in values.items()}):
-        least, most, own = (
-            rounded_value(value, None, *bounds[name])
-            for value in (min(values[name]), max(values[name]), here[name])
+        least, most = (
+            rounded_value(end, None, *bounds[name])
+            for end in (min(values[name]), max(values[name]))
         )
-        moves.append(f"{name} {least} ... {most} (here {own})")
+        moves.append(f"{name} {least} ... {most}")
     count = "another minimum lies" if len(others) == 1 else f"{len(others)} other minima lie"
     height = f"{'up to ' * (len(others) > 1)}{times(max(each.cost for each in others), cost)}"
     return (

@@ -280,9 +280,9 @@ def averaging(evidence: Evidence) -> Iterator[Suspicion]:
         late, after = trial.values.get(LATE.name), ""
         if late is not None:
             after = f", and is {1e3 * late:.0f} ms late"
+        what = f"averages, or filters, over some {1e3 * window:.0f} ms{after}"
         cause = Cause(
-            f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms"
-            f"{after}",
+            f"the recorder{evidence.name_of(number)} {what}",
             "ask for its setting",
             "averaged",
             changes_to_averages(evidence.case, number, experiment.signals, window, late),
