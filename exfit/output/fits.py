@@ -182,35 +182,41 @@ def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
 def fitted_table(
     result: FitResult, before: FitResult | None = None, of_records: bool = True
 ) -> Table:
-    """Make the table of fitted values with their intervals; those of records come last."""
+    """Make the table of fitted values with their intervals; those of records come last.
+
+    Columns in which no parameter has anything are left out.
+    """
     shown = {name: p for name, p in result.parameters.items() if of_records or not p.of_record}
-    marks = {name: ", ".join(remarks_on(parameter)) for name, parameter in shown.items()}
     linear = any(parameter.linear_error is not None for parameter in shown.values())
     by_noise = any(parameter.noise_interval is not None for parameter in shown.values())
-    found = {name: _found(result, name) for name in shown}
-    no_errors = all(error == "-" for _, _, error, _ in found.values())
-    of_errors = TableColumn(
-        "by noise" if by_noise else "error", number=True, expendable=2 if linear else 1
-    )
     heads = (
         TableColumn("parameter"),
         TableColumn("start", number=True, expendable=1 if linear else 2),
-        *([] if before is None else [TableColumn("before", number=True)]),
+        TableColumn("before", number=True),
         TableColumn("fitted", number=True),
         TableColumn("95 % interval", number=True),
-        *([] if no_errors else [of_errors]),
+        TableColumn(
+            "by noise" if by_noise else "error", number=True, expendable=2 if linear else 1
+        ),
         TableColumn("unit"),
-        *([TableColumn("")] if any(marks.values()) else []),
+        TableColumn(""),
     )
-    rows = []
+    lines = []
     for name, parameter in shown.items():
-        before_it = [] if before is None else [parameter.rounded(before.values.get(name))]
-        value, limits, error, unit = found[name]
-        errors = [] if no_errors else [error]
-        cells = (name, number(parameter.start), *before_it, value, limits, *errors, unit)
-        mark = [marks[name]] if any(marks.values()) else []
-        rows.append(row(*cells, *mark, mark=_mark(result, parameter)))
-    return Table(heads, tuple(rows))
+        before_it = "" if before is None else parameter.rounded(before.values.get(name))
+        remarks = ", ".join(remarks_on(parameter))
+        lines.append((name, number(parameter.start), before_it, *_found(result, name), remarks))
+    empty = {"before": "", "error": "-", "by noise": "-", "": ""}
+    kept = [
+        place
+        for place, head in enumerate(heads)
+        if head.title not in empty or any(line[place] != empty[head.title] for line in lines)
+    ]
+    rows = [
+        row(*(line[place] for place in kept), mark=_mark(result, parameter))
+        for line, parameter in zip(lines, shown.values(), strict=True)
+    ]
+    return Table(tuple(heads[place] for place in kept), tuple(rows))
 
 
 def _mark(result: FitResult, parameter: FittedParameter) -> Mark:
