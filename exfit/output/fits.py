@@ -1,7 +1,7 @@
 """The result of a fit as blocks: in brief, and whole; and the profiles of its parameters."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -187,21 +187,7 @@ def fitted_table(
     Columns in which no parameter has anything are left out.
     """
     shown = {name: p for name, p in result.parameters.items() if of_records or not p.of_record}
-    linear = any(parameter.linear_error is not None for parameter in shown.values())
-    by_noise = any(parameter.noise_interval is not None for parameter in shown.values())
-    heads = (
-        TableColumn("parameter"),
-        TableColumn("start", number=True, expendable=1 if linear else 2),
-        TableColumn("before", number=True),
-        TableColumn("fitted", number=True),
-        TableColumn("95 % interval", number=True),
-        TableColumn(
-            "by noise" if by_noise else "error", number=True, expendable=2 if linear else 1
-        ),
-        TableColumn("unit"),
-        TableColumn(""),
-    )
-    lines = []
+    heads, lines = _heads(shown.values()), []
     for name, parameter in shown.items():
         before_it = "" if before is None else parameter.rounded(before.values.get(name))
         remarks = ", ".join(remarks_on(parameter))
@@ -217,6 +203,22 @@ def fitted_table(
         for line, parameter in zip(lines, shown.values(), strict=True)
     ]
     return Table(tuple(heads[place] for place in kept), tuple(rows))
+
+
+def _heads(parameters: Collection[FittedParameter]) -> tuple[TableColumn, ...]:
+    linear = any(parameter.linear_error is not None for parameter in parameters)
+    by_noise = any(parameter.noise_interval is not None for parameter in parameters)
+    error = "by noise" if by_noise else "error"
+    return (
+        TableColumn("parameter"),
+        TableColumn("start", number=True, expendable=1 if linear else 2),
+        TableColumn("before", number=True),
+        TableColumn("fitted", number=True),
+        TableColumn("95 % interval", number=True),
+        TableColumn(error, number=True, expendable=2 if linear else 1),
+        TableColumn("unit"),
+        TableColumn(""),
+    )
 
 
 def _mark(result: FitResult, parameter: FittedParameter) -> Mark:
