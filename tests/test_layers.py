@@ -19,6 +19,7 @@ IN_ORDER = (  # each of the core may import those above it, the leaves nothing
 LEAVES = {"signals", "dsp", "estimate", "inference", "engine"}
 # beside the core, and another feature only as here
 OTHER_FEATURES = {
+    "app": {"drawings", "report", "start"},
     "fleet": {"planner", "programme", "report", "start"},
     "planner": {"start", "fleet", "translate"},
     "programme": {"report"},
@@ -32,19 +33,21 @@ EXCEPTIONS = {("exfit.results.model", "exfit.output.notebook")}
 
 ONLY_IN = {  # where a library may be imported, inside functions too
     "yaml": {"case"},
-    "pydantic": {"case", "programme", "start"},
+    "pydantic": {"app", "case", "programme", "start"},
     "matplotlib": {"output", "compare", "design", "programme", "rank", "translate"},
     "rich": {"output", "cli", "compare", "design", "fleet", "programme", "rank", "translate"},
     "jinja2": {"report", "drawings"},
     "weasyprint": {"report"},
     "click": {
-        "cli", "compare", "design", "fleet", "planner", "programme", "rank", "report", "start",
-        "translate",
+        "app", "cli", "compare", "design", "fleet", "planner", "programme", "rank", "report",
+        "start", "translate",
     },
     "llvmlite": {"engine"},
     "distributed": {"fleet"},
     "dask": {"fleet"},
     "fmpy": {"external"},
+    "starlette": {"app"},
+    "uvicorn": {"app"},
 }  # fmt: skip
 AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml"}
 

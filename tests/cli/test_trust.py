@@ -38,6 +38,7 @@ COMMANDS_OF_CASES = {
     "check": ("{}.yaml",),
     "identify": ("{}.yaml", *OPTIONS),
     "rank": ("{}.yaml", "--models", "AC1A", *OPTIONS),
+    "app": ("{}.yaml", "--no-browser"),
 }
 # of the others, with a result whose case and model are a stranger's
 OTHERS = {

@@ -7,5 +7,4 @@ COMMANDS = {
         "command:report",
     )
 }
-
 PUBLIC = {"report": "writing:write_report"}

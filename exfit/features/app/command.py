@@ -1,0 +1,57 @@
+"""The command app: a page in the browser."""
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+
+import click
+
+from exfit.cli.given_files import GivenFile, Kind
+from exfit.cli.streams import echo
+from exfit.errors import ExfitError
+
+
+@click.command(short_help="Drag sliders, see the response, fit, in a page.")
+@click.argument("case", type=GivenFile(Kind.CASE, Kind.RESULT), metavar="CASE|RESULT")
+@click.option("--browser/--no-browser", default=True, help="Open the browser (default: yes).")
+def app(case: Path, browser: bool) -> None:
+    """Open a page in the browser that shows CASE, or the RESULT of its fit.
+
+    A slider for each free parameter moves the response beside the record. Fit shows each iteration,
+    then the verdict, the intervals and the causes. Each change is stored in CASE-draft.yaml until
+    the page saves the case; the page shows the command that does the same.
+
+    The page is served to this computer alone, under the address that is printed. Ctrl-C ends it, or
+    the last page when it has been closed for a minute. Needs: pip install 'exfit[app]'.
+    """
+    try:
+        from exfit.features.app.server import page_server
+    except ModuleNotFoundError as fault:
+        raise ExfitError(f"app needs {fault.name}: pip install 'exfit[app]'") from fault
+    from exfit.features.app.session import Session
+    from exfit.results.io import load_result
+
+    result, path = None, case
+    if case.is_dir() or case.suffix == ".json":
+        result = load_result(case)
+        path = result.case
+    first = Session(path, result)
+    try:
+        first.open()  # what is wrong is said here
+    finally:
+        first.close()
+    server, address = page_server(lambda: Session(path, result))
+    echo(f"{address}\nCtrl-C ends it", err=False)
+    if browser and has_display():
+        webbrowser.open(address)
+    try:
+        server.serve_pages()
+    except KeyboardInterrupt:  # how it ends
+        click.get_current_context().find_root().obj.clear()
+
+
+def has_display() -> bool:
+    """Tell if a browser can show itself."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY")
+    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, names))

@@ -1,0 +1,111 @@
+"""What a page may send: each message has its form, and whatever has another is refused."""
+
+from typing import Annotated, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StringConstraints,
+    TypeAdapter,
+    ValidationError,
+)
+
+from exfit.errors import ExfitError
+
+LONGEST = 100_000  # characters of a message
+Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+Values = Annotated[dict[Name, FiniteFloat], Field(max_length=200)]
+
+
+class Form(BaseModel):
+    """A message: its keys, and no others."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Try(Form):
+    """Values that a slider passes through."""
+
+    do: Literal["try"]
+    values: Values
+
+
+class Store(Form):
+    """Values that someone has chosen: the starts of the draft."""
+
+    do: Literal["store"]
+    values: Values
+
+
+class Bound(Form):
+    """Other bounds of a free parameter."""
+
+    do: Literal["bound"]
+    name: Name
+    low: FiniteFloat
+    high: FiniteFloat
+
+
+class Lock(Form):
+    """A free parameter that is held at a value."""
+
+    do: Literal["lock"]
+    name: Name
+    value: FiniteFloat
+
+
+class Free(Form):
+    """A given value that the fit finds, too."""
+
+    do: Literal["free"]
+    name: Name
+
+
+class Look(Form):
+    """A profile of a free parameter."""
+
+    do: Literal["profile"]
+    name: Name
+
+
+class Apply(Form):
+    """The remedy of a cause, by its number."""
+
+    do: Literal["apply"]
+    cause: Annotated[int, Field(ge=1, le=99)]
+
+
+class Validate(Form):
+    """Comparison with records that were not fitted, at values."""
+
+    do: Literal["validate"]
+    values: Values
+
+
+class Plain(Form):
+    """What needs no more than its name."""
+
+    do: Literal["open", "fit", "stop", "save case", "save result", "save report", "discard"]
+
+
+Message = Annotated[
+    Try | Store | Bound | Lock | Free | Look | Apply | Validate | Plain, Field(discriminator="do")
+]
+FORMS: TypeAdapter[Message] = TypeAdapter(Message)
+
+
+def read_message(text: str) -> Message:
+    """Read a message; raises ExfitError with all that is wrong in it."""
+    if len(text) > LONGEST:
+        raise ExfitError(f"message: {len(text)} characters, at most {LONGEST}")
+    try:
+        return FORMS.validate_json(text)
+    except ValidationError as fault:
+        raise ExfitError(
+            "; ".join(
+                f"message: {'.'.join(map(str, each['loc']))}: {each['msg']}"[:300]
+                for each in fault.errors(include_url=False, include_input=False)[:5]
+            )
+        ) from None

@@ -1,0 +1,193 @@
+"""The server of a page: on this computer alone, for who has its address, until no page is left."""
+
+import asyncio
+import secrets
+import socket
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from exfit.errors import ExfitError
+from exfit.features.app.messages import LONGEST, read_message
+from exfit.features.app.packing import packed
+from exfit.features.app.session import Content, Session
+
+HERE = "127.0.0.1"
+LINGER = 60.0  # s after the last page was closed: time to load it again
+PAGE = Path(__file__).parent / "page"
+FILES = {
+    "": ("index.jinja", "text/html"),
+    "app.js": ("app.js", "text/javascript"),
+    "plot.js": ("plot.js", "text/javascript"),
+    "style.css": ("style.css", "text/css"),
+}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
+    "connect-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+class Pages:
+    """The pages that are open, and since when there is none; before the first there is no end."""
+
+    def __init__(self) -> None:
+        self.count, self.closed = 0, float("inf")
+
+    def opened(self) -> None:
+        """Count a page more."""
+        self.count, self.closed = self.count + 1, float("inf")
+
+    def left(self) -> None:
+        """Count a page less."""
+        self.count -= 1
+        if not self.count:
+            self.closed = time.monotonic()
+
+
+class Doorkeeper:
+    """Lets in who knows the token, by the address of this server, from none but its own pages."""
+
+    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+        self.app, self.token = app, token
+        self.hosts = {f"{name}:{port}" for name in (HERE, "localhost")}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer 403 to all others."""
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        asked = HTTPConnection(scope)
+        host, origin = asked.headers.get("host", ""), asked.headers.get("origin")
+        foreign = origin is not None and origin != f"http://{host}"
+        foreign |= scope["type"] == "websocket" and origin is None
+        token = scope["path"].split("/")[1].encode()
+        known = secrets.compare_digest(token, self.token.encode())
+        if host in self.hosts and not foreign and known:
+            await self.app(scope, receive, send)
+        elif scope["type"] == "http":
+            refusal = PlainTextResponse("exfit app: use the address that it printed\n", 403)
+            await refusal(scope, receive, send)
+        else:
+            await WebSocket(scope, receive, send).close(1008)
+
+
+def page_server(make: Callable[[], Session], linger: float = LINGER) -> tuple["PageServer", str]:
+    """Make the server of pages, each with a session of its own; return its address, too."""
+    listening = socket.create_server((HERE, 0))
+    port, token = listening.getsockname()[1], secrets.token_urlsafe(24)
+    pages = Pages()
+
+    async def file(request: Request) -> Response:
+        name, kind = FILES.get(request.path_params.get("name", ""), ("", ""))
+        if not name:
+            return PlainTextResponse("not found\n", 404, HEADERS)
+        return Response((PAGE / name).read_bytes(), 200, HEADERS, kind)
+
+    async def live(socket: WebSocket) -> None:
+        await socket.accept()
+        pages.opened()
+        try:
+            await PageConversation(socket, make()).hold()
+        finally:
+            pages.left()
+
+    routes = [
+        Route(f"/{token}/", file),
+        Route(f"/{token}/{{name}}", file),
+        WebSocketRoute(f"/{token}/live", live),
+    ]
+    app = Doorkeeper(Starlette(routes=routes), token, port)
+    config = uvicorn.Config(
+        app, log_level="critical", lifespan="off", ws="websockets-sansio",
+        ws_max_size=4 * LONGEST, timeout_graceful_shutdown=1,
+    )  # fmt: skip
+    return PageServer(config, listening, pages, linger), f"http://{HERE}:{port}/{token}/"
+
+
+class PageServer(uvicorn.Server):
+    """A server that ends when the last page has been closed for a while."""
+
+    def __init__(
+        self, config: uvicorn.Config, listening: socket.socket, pages: Pages, linger: float
+    ) -> None:
+        super().__init__(config)
+        self.listening, self.pages, self.linger = listening, pages, linger
+
+    async def on_tick(self, counter: int) -> bool:
+        """Look whether it is time to end."""
+        if time.monotonic() - self.pages.closed > self.linger:
+            return True
+        return await super().on_tick(counter)
+
+    def serve_pages(self) -> None:
+        """Serve until the last page is closed; raises KeyboardInterrupt at Ctrl-C."""
+        self.run([self.listening])
+
+
+class PageConversation:
+    """A page's messages and their answers: in turn, but for a fit, which runs beside the others."""
+
+    def __init__(self, socket: WebSocket, session: Session) -> None:
+        self.socket, self.session = socket, session
+        self.loop = asyncio.get_running_loop()
+        self.sending = asyncio.Lock()
+        self.beside = set[asyncio.Task[None]]()
+
+    async def hold(self) -> None:
+        """Answer until the page is closed."""
+        try:
+            while True:
+                text = await self.socket.receive_text()
+                if '"fit"' in text or '"profile"' in text:
+                    task = asyncio.create_task(self._answer(text))
+                    self.beside.add(task)
+                    task.add_done_callback(self.beside.discard)
+                else:
+                    await self._answer(text)
+        except (WebSocketDisconnect, KeyError):  # KeyError: of a message that is no text
+            pass
+        finally:
+            await run_in_threadpool(self.session.close)
+
+    async def _answer(self, text: str) -> None:
+        try:
+            asked = read_message(text)
+            content = await run_in_threadpool(self.session.answer, asked, self._send_from_thread)
+        except ExfitError as fault:
+            content = {"of": "fault", "lines": str(fault).splitlines()}
+        except OSError as fault:
+            content = {"of": "fault", "lines": [f"{fault.filename}: {fault.strerror}"]}
+        except KeyboardInterrupt:
+            content = {"of": "fault", "lines": ["stopped before there was a result"]}
+        except Exception:  # the page goes on, and the terminal has what its developers need
+            traceback.print_exc()
+            content = {"of": "fault", "lines": ["a mistake in exfit: the terminal says more"]}
+        await self._send(content)
+
+    def _send_from_thread(self, content: Content) -> None:
+        asyncio.run_coroutine_threadsafe(self._send(content), self.loop)
+
+    async def _send(self, content: dict[str, Any]) -> None:
+        data = packed(content)
+        async with self.sending:
+            if self.socket.application_state is WebSocketState.CONNECTED:
+                try:
+                    await self.socket.send_bytes(data)
+                except (WebSocketDisconnect, RuntimeError):
+                    return

@@ -1,0 +1,464 @@
+"""What a page looks at: a case, its draft, its responses and its fit; what it asks is done here.
+
+Everything is computed and written by the workflows and the writers of the commands.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from shlex import quote
+from typing import Any
+
+from exfit import workflows
+from exfit.case.case import Case
+from exfit.case.changes import Changes, between, freed, number_text, part_of
+from exfit.case.load import load_case, parse_case
+from exfit.case.rewriting import with_changes
+from exfit.case.yaml import read_text
+from exfit.cli.options import Output
+from exfit.dsp.features import LABELS
+from exfit.errors import ExfitError
+from exfit.estimate import Progress
+from exfit.features.app import messages
+from exfit.features.app.packing import thinned
+from exfit.fitting.program import program_of
+from exfit.output import run_folder
+from exfit.output.live import STAGES
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult, Iteration
+from exfit.signals import label_of
+from exfit.util.files import on_disk, within, write
+from exfit.util.text import dotted, near
+from exfit.workflows.applied_causes import write_applied
+from exfit.workflows.exploring import Explorer, explorer
+from exfit.workflows.responses import LiveResponse
+
+Content = dict[str, Any]
+Send = Callable[[Content], None]
+
+DRAFT = "-draft"  # behind the name of a case: the file of its draft
+BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
+
+
+class Session:
+    """One page: its case as it is on disk or in its draft, and what was made of it.
+
+    ``seen`` are the texts of both files as this page knows them, None for one that is not there: a
+    file that another page or program has changed is not written over.
+    """
+
+    def __init__(self, case: Path, result: FitResult | None = None) -> None:
+        self.case_path, self.result = case, result
+        self.stack = ExitStack()
+        self.seen = dict[Path, str | None]()
+        self.bounds = dict[str, tuple[float, float]]()
+        self.stopped = self.fitting = False
+        self.explorer: Explorer
+
+    @property
+    def draft(self) -> Path:
+        """The file that changes go to until the case is saved."""
+        name = f"{self.case_path.stem}{DRAFT}{self.case_path.suffix}"
+        return within(self.case_path.parent, name)
+
+    @property
+    def path(self) -> Path:
+        """The file that describes what the page shows: the draft where there is one."""
+        return self.case_path if self.seen.get(self.draft) is None else self.draft
+
+    @property
+    def case(self) -> Case:
+        """The case as it was read last."""
+        return self.explorer.case
+
+    # ---- the case and its draft
+
+    def open(self) -> Content:
+        """Read the case, or its draft, and describe all that the page shows of it."""
+        files = (self.case_path, self.draft)
+        self.seen = {path: _text(path) for path in files}
+        if self.seen[self.case_path] is None:
+            read_text(self.case_path)  # says why
+        self._look_at(load_case(self.path))
+        return self.shown()
+
+    def _look_at(self, case: Case) -> None:
+        stack = ExitStack()
+        try:
+            made = explorer(case, stack.enter_context(program_of(case)))
+        except BaseException:
+            stack.close()
+            raise
+        self.stack.close()
+        self.stack, self.explorer = stack, made
+
+    def close(self) -> None:
+        """End what simulates for this page, and its fit."""
+        self.stopped = True
+        self.stack.close()
+
+    def change(self, changes: Changes) -> Case:
+        """Store changes in the draft, whole before the former one goes; return the new case.
+
+        Raises ExfitError where the case would be none, or a file was changed by others.
+        """
+        self._refuse_changed()
+        text = with_changes(self.path, changes)
+        case = parse_case(text, self.draft)
+        if not case.free():
+            raise ExfitError(f"{self.path.name}: the last free parameter: a fit needs one")
+        write(self.draft, text)
+        self.seen[self.draft] = text
+        return case
+
+    def _refuse_changed(self) -> None:
+        for path, text in self.seen.items():
+            if _text(path) != text:
+                raise ExfitError(
+                    f"{path}: was changed by another page or program since this page read it; "
+                    "nothing was written: read it again"
+                )
+
+    def _place(self, name: str) -> str:
+        """Return the place of a free parameter in the file."""
+        if name not in self.case.free():
+            raise ExfitError(f"{name}: not a free parameter; {near(name, self.case.free())}")
+        part = part_of(self.case, name)
+        if part is None or part.free is None:
+            return dotted(("parameters", "free", name))
+        return dotted((*part.free, name.removeprefix(part.prefix)))
+
+    def shown(self) -> Content:
+        """Describe the case with its parameters and the responses to its start values."""
+        case, start = self.case, self.explorer.start
+        parameters = list(self._parameters())
+        known = {each["name"] for each in parameters}
+        return {
+            "of": "open",
+            "name": self.case_path.stem,
+            "title": f"{case.subject}, {case.plant.type}",
+            "draft": self.path == self.draft and self.draft.name,
+            "parameters": parameters,
+            "given": [name for name in self._given() if name not in known],
+            "records": [_record(each, whole=True) for each in start],
+            "cost": sum(each.cost for each in start),
+            "command": self.command,
+            "result": None if self.result is None else self._result(self.result),
+        }
+
+    def _parameters(self) -> Iterator[Content]:
+        """Yield the free parameters, and those that this page holds, with their bounds."""
+        values, rows = self.case.values(), self.case.rows()
+        free = {each.name: each for each in self.explorer.free}
+        limits = {name: (each.low, each.high) for name, each in free.items()}
+        for name, (low, high) in {**self.bounds, **limits}.items():
+            yield {
+                "name": name,
+                "unit": rows[name].unit if name in rows else "",
+                "meaning": rows[name].meaning if name in rows else "used by ties",
+                "value": values[name],
+                "low": low,
+                "high": high,
+                "logarithmic": name in free and free[name].logarithmic,
+                "locked": name not in free,
+            }
+
+    def _given(self) -> Iterator[str]:
+        """Yield the given values that a fit can find, too."""
+        taken = {*self.case.ties.by_name, *self.case.free()}
+        for name, value in self.case.values().items():
+            part = part_of(self.case, name)
+            if value and name not in taken and part is not None and part.free is not None:
+                yield name
+
+    @property
+    def command(self) -> str:
+        """The command that fits what the page shows."""
+        return f"exfit fit {quote(str(self.path))}"
+
+    # ---- what a page asks for
+
+    def answer(self, asked: "messages.Message", send: Send) -> Content:
+        """Do what a message asks for; raises ExfitError where it cannot be done."""
+        match asked:
+            case messages.Try():
+                return self.response(asked.values)
+            case messages.Store():
+                places = {f"{self._place(n)}.start": v for n, v in asked.values.items()}
+                self.change({place: number_text(value) for place, value in places.items()})
+                return self._changed()
+            case messages.Bound():
+                place = self._place(asked.name)
+                ends = {"min": number_text(asked.low), "max": number_text(asked.high)}
+                changed = self.change({f"{place}.{key}": end for key, end in ends.items()})
+                return self._rebuilt(changed)
+            case messages.Lock():
+                return self._lock(asked.name, asked.value)
+            case messages.Free():
+                return self._free(asked.name)
+            case messages.Look():
+                return self._profile(asked.name)
+            case messages.Apply():
+                return self._apply(asked.cause)
+            case messages.Validate():
+                return self._validate(asked.values)
+        plain: Mapping[str, Callable[[], Content]] = {
+            "open": self.open,
+            "stop": self._stop,
+            "save case": self._save_case,
+            "save result": self._save_result,
+            "save report": self._save_report,
+            "discard": self._discard,
+            "fit": lambda: self._fit(send),
+        }
+        return plain[asked.do]()
+
+    def response(self, values: Mapping[str, float]) -> Content:
+        """Simulate the tests at values of free parameters."""
+        unknown = [name for name in values if name not in self.case.free()]
+        if unknown:
+            raise ExfitError(f"{unknown[0]}: {near(unknown[0], self.case.free())}")
+        of_record = {} if self.result is None else self.result.of_records
+        of_record = {
+            each.name: of_record[each.name]
+            for each in self.explorer.residuals.free
+            if each.name in of_record
+        }
+        compared = self.explorer.at({**of_record, **values})
+        records = [_record(each) for each in compared]
+        return {"of": "try", "records": records, "cost": sum(each.cost for each in compared)}
+
+    def _changed(self) -> Content:
+        return {"of": "store", "draft": self.draft.name, "command": self.command}
+
+    def _rebuilt(self, case: Case) -> Content:
+        self._look_at(case)
+        return self.shown()
+
+    def _lock(self, name: str, value: float) -> Content:
+        place, part = self._place(name), part_of(self.case, name)
+        section = ("parameters", "fixed") if part is None else part.fixed
+        symbol = name if part is None else name.removeprefix(part.prefix)
+        own = next(each for each in self.explorer.free if each.name == name)
+        case = self.change({place: "", dotted((*section, symbol)): number_text(value)})
+        self.bounds[name] = (own.low, own.high)
+        return self._rebuilt(case)
+
+    def _free(self, name: str) -> Content:
+        values, part = self.case.values(), part_of(self.case, name)
+        if part is None or part.free is None or name not in self._given():
+            raise ExfitError(f"{name}: not a given value that a fit can find")
+        changes = dict(freed(self.case, {name: values[name]}))
+        low, high = self.bounds.get(name, (0.0, 0.0))
+        if low < values[name] < high and isfinite(high - low):
+            found = between(values[name], low, high)
+            place = dotted((*part.free, name.removeprefix(part.prefix)))
+            changes[place] = found if low > 0.0 else f"{found[:-1]}, scale: linear}}"
+        case = self.change(changes)
+        self.bounds.pop(name, None)
+        return self._rebuilt(case)
+
+    def _discard(self) -> Content:
+        self._refuse_changed()
+        self.draft.unlink(missing_ok=True)
+        self.result, self.bounds = None, {}
+        return self.open()
+
+    # ---- fit, profile, validation
+
+    def _fit(self, send: Send) -> Content:
+        if self.fitting:
+            raise ExfitError("fit: one runs already; stop it first")
+        self._refuse_changed()
+        self.fitting, self.stopped, shown = True, False, 0.0
+
+        def iterated(line: Iteration) -> None:
+            self._end_if_stopped()
+            number = {"number": line.number, "phase": line.phase, "cost": line.cost}
+            send({"of": "iteration", **number, "values": dict(line.values)})
+
+        def advanced(progress: Progress) -> None:
+            self._end_if_stopped()
+            stage, counted = STAGES[progress.stage]
+            words = f"{stage}: {progress.done} of {progress.total} {counted}"
+            send({"of": "stage", "words": words})
+
+        def live(sketch: LiveResponse) -> None:
+            nonlocal shown
+            now = time.monotonic()
+            if now - shown > BETWEEN_SKETCHES:
+                shown = now
+                at, (current,) = thinned(sketch.time, [sketch.simulated])
+                send({"of": "live", "signal": sketch.signal, "time": at, "current": current})
+
+        try:
+            case = load_case(self.path)
+            self.result = workflows.fit(case, None, iterated, advanced, live)
+        finally:
+            self.fitting = False
+        return {**self._result(self.result), "of": "fit"}
+
+    def _end_if_stopped(self) -> None:
+        if self.stopped:
+            raise KeyboardInterrupt
+
+    def _stop(self) -> Content:
+        self.stopped = True
+        return {"of": "stop"}
+
+    def _result(self, result: FitResult) -> Content:
+        """Describe a fit: its verdict, its values with their intervals, its causes."""
+        path = quote(str(self.path))
+        return {
+            "verdict": result.verdict.verdict,
+            "reason": result.verdict.reason,
+            "holds": result.holds,
+            "outcome": f"{result.outcome}, {result.nit} iterations, {result.seconds:.2f} s",
+            "parameters": [
+                {
+                    "name": name,
+                    "value": each.value,
+                    "text": each.rounded(each.value),
+                    "unit": each.unit,
+                    "interval": each.interval,
+                    "words": _interval(result, name),
+                    "of_record": each.of_record,
+                }
+                for name, each in result.parameters.items()
+            ],
+            "causes": [
+                {
+                    "sentence": cause.sentence,
+                    "command": f"exfit fit {path} --apply {number}" if cause.changes else "",
+                    "number": number,
+                }
+                for number, cause in enumerate(result.verdict.causes, 1)
+            ],
+            "validation": [_judged(each) for each in result.validation],
+            "notes": list(result.notes),
+        }
+
+    def _profile(self, name: str) -> Content:
+        self._place(name)
+        self.stopped = False
+        found = workflows.profile(load_case(self.path), name, lambda _: self._end_if_stopped())
+        (profile,) = found.profiles
+        command = f"exfit profile {quote(str(self.path))} {name}"
+        return {
+            "of": "profile",
+            "name": name,
+            "unit": profile.unit,
+            "at": profile.at,
+            "rise": profile.costs - min(profile.costs),
+            "limit": profile.rise,
+            "low": profile.low,
+            "high": profile.high,
+            "words": f"{profile.rounded(profile.low)} ... {profile.rounded(profile.high)}",
+            "ends": list(profile.ends),
+            "command": command,
+        }
+
+    def _validate(self, values: Mapping[str, float]) -> Content:
+        given = self.result if self.result is not None and not values else values
+        matches = workflows.validate(load_case(self.path), given)
+        places = "".join(f" --set {name}={value:g}" for name, value in values.items())
+        return {
+            "of": "validate",
+            "records": [{**_record(each, whole=True), **_judged(each)} for each in matches],
+            "command": f"exfit validate {quote(str(self.path))}{places}",
+        }
+
+    # ---- files
+
+    def _fitted(self) -> FitResult:
+        if self.result is None:
+            raise ExfitError("result: there is none yet: fit first")
+        return self.result
+
+    def _folder(self) -> Path:
+        output = Output(None, figures=True, quiet=True, as_json=False)
+        return output.folder_of(load_case(self.path), "fit", run_folder.OF_FIT, after_records=True)
+
+    def _save_case(self) -> Content:
+        self._refuse_changed()
+        text = self.seen[self.draft]
+        if text is None:
+            return {"of": "saved", "words": f"{self.case_path} is as the page shows it"}
+        parse_case(text, self.case_path)
+        write(self.case_path, text)
+        former, draft = self.path, self.draft
+        draft.unlink(missing_ok=True)
+        self.seen = {self.case_path: text, draft: None}
+        if self.result is not None and self.result.case == former:  # the same text, byte by byte
+            self.result = replace(self.result, case=self.case_path)
+        return {**self._changed(), "of": "saved", "draft": False, "words": str(self.case_path)}
+
+    def _save_result(self) -> Content:
+        result, folder = self._fitted(), self._folder()
+        run_folder.write_fit(result, folder).draw()
+        return {"of": "saved", "words": str(folder), "command": self.command}
+
+    def _save_report(self) -> Content:
+        from exfit.features.report.writing import write_report
+
+        result, folder = self._fitted(), self._folder()
+        run_folder.write_fit(result, folder)
+        places = write_report(folder)
+        command = f"{self.command} && exfit report {quote(str(folder))}"
+        return {"of": "saved", "words": ", ".join(map(str, places)), "command": command}
+
+    def _apply(self, number: int) -> Content:
+        path, folder = self.path, self._folder()
+        run_folder.write_fit(self._fitted(), folder)
+        applied = write_applied(path, str(number), folder)
+        self.case_path, self.result, self.bounds = applied.path, None, {}
+        return {**self.open(), "words": f"written: {applied.path}: {applied.sentence}"}
+
+
+def _text(path: Path) -> str | None:
+    """Return the text of a file as it is on disk, None where there is none."""
+    return read_text(path) if on_disk(path).exists() else None
+
+
+def _interval(result: FitResult, name: str) -> str:
+    """Write the interval of a parameter, or why it has none."""
+    each = result.parameters[name]
+    if each.interval is None:
+        return each.why or ""
+    ends = [end if end is None else each.rounded(end) for end in each.interval]
+    return f"{ends[0] or 'open'} ... {ends[1] or 'open'}"
+
+
+def _judged(match: Comparison) -> Content:
+    return {
+        "name": match.name,
+        "validation": match.validation,
+        "accepted": match.accepted,
+        "reason": match.reason,
+        "match": f"rmse {match.rmse:.3g} pu, fit {match.fit_percent:.4g} %",
+    }
+
+
+def _record(match: Comparison, whole: bool = False) -> Content:
+    """Describe the response beside a record; ``whole`` with what does not move with the values."""
+    signals = []
+    for signal, overlay in match.overlays.items():
+        moving = {"current": overlay.simulated, "residual": overlay.error}
+        still = {"measured": overlay.measured, "start": overlay.simulated} if whole else {}
+        time, curves = thinned(match.time, [*moving.values(), *still.values()])
+        named = dict(zip([*moving, *still], curves, strict=True))
+        own = match.channels[signal]
+        figures = {"rmse": f"{own.rmse:.4g}", "fit": f"{own.fit_percent:.2f}"}
+        label = {"label": label_of(signal), "time": time} if whole else {}
+        signals.append({"signal": signal, **figures, **label, **named})
+    cells = [(label, unit, match.features.cells(key)) for label, key, unit in LABELS]
+    has = match.features.measured is not None or match.features.simulated is not None
+    features = [
+        {"label": label, "unit": unit, "measured": measured, "simulated": simulated}
+        for label, unit, (measured, _, simulated) in cells
+        if has
+    ]
+    return {"name": match.name, "file": match.record, "signals": signals, "features": features}

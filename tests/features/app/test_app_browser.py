@@ -1,0 +1,176 @@
+"""The page of exfit app in a real browser: from a slider to a saved report, and what goes wrong."""
+
+import re
+import shutil
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from app_server import served
+from browsers import WIDTHS, barriers, chromium, html_errors, listened_to
+from places import ROOT
+
+import exfit
+from exfit.features.app.server import PAGE
+
+pytestmark = pytest.mark.long  # a browser, and a server of its own for each test
+
+FIT = 60_000  # ms, of a fit on a busy machine
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Start the browser once."""
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture
+def case(tmp_path):
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
+    return tmp_path / "configs" / "ac1a_good.yaml"
+
+
+@pytest.fixture
+def server(case):
+    with served("configs/ac1a_good.yaml", case.parents[1]) as (process, address):
+        yield process, address
+
+
+@pytest.fixture
+def opened(browser, server):
+    """Open the page."""
+    contexts = []
+
+    def page(width=1280):
+        contexts.append(browser.new_context(viewport={"width": width, "height": 900}))
+        new = listened_to(contexts[-1])
+        new.goto(server[1])
+        new.locator(".parameter").first.wait_for()
+        return new
+
+    yield page
+    for context in contexts:
+        context.close()
+
+
+def test_from_a_slider_moved_by_keys_to_a_saved_report(opened, case, server):
+    page = opened()
+    page.get_by_label("KA slider").focus()
+    before = page.inner_text("#cost")
+    page.keyboard.press("ArrowRight")
+    page.locator("#draft", has_text="ac1a_good-draft.yaml").wait_for()
+    page.locator(f"#cost:not(:has-text('{before}'))").wait_for()
+    page.get_by_role("button", name="Fit", exact=True).press("Enter")
+    page.locator("#iterations tr").nth(3).wait_for(timeout=FIT)
+    page.locator("#save-report:enabled").wait_for(timeout=FIT)
+    assert page.inner_text("#verdict").startswith("matches, not all determined")
+    assert page.locator(".band:visible").count() == 7
+    assert page.inner_text("#command") == "exfit fit configs/ac1a_good-draft.yaml"
+    page.click("#save-case")
+    page.locator("#message", has_text="saved: configs/ac1a_good.yaml").wait_for()
+    page.click("#save-report")
+    page.locator("#message", has_text="report.html").wait_for(timeout=FIT)
+    folder = case.parents[1] / "runs" / "ac1a_good-fit"
+    assert "AC1A" in (folder / "report.html").read_text(encoding="utf-8")
+    result = exfit.load_result(folder)
+    assert result.inputs["case"] == exfit.fit(case).inputs["case"]
+    assert page.faults == []
+    assert {*page.asked} == {server[1] + name for name in ("", "app.js", "plot.js", "style.css")}
+
+
+@pytest.mark.parametrize("width", [*WIDTHS, 2560])
+def test_the_page_is_open_to_all_readers_and_no_wider_than_its_window(opened, width):
+    page = opened(width)
+    wide, room = page.evaluate(
+        "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+    )
+    assert wide <= room
+    for colours in ("light", "dark"):
+        page.emulate_media(color_scheme=colours)
+        assert barriers(page) == ""
+    assert page.faults == []
+
+
+def test_the_page_is_html(tmp_path):
+    page = tmp_path / "page.html"
+    shutil.copy(PAGE / "index.jinja", page)
+    assert html_errors(page) == []
+
+
+def test_values_under_the_pointer_and_the_arrow_keys_are_read_out(opened):
+    page = opened()
+    page.locator("canvas").first.hover()
+    values = re.compile(r"^[\d.]+ s: measured [\d.]+, start [\d.]+, current [\d.]+$")
+    readout = page.locator(".readout").first
+    assert values.match(readout.inner_text())
+    page.locator("canvas").first.press("ArrowLeft")
+    assert values.match(readout.inner_text())
+
+
+def test_a_profile_is_shown_on_a_click(opened):
+    page = opened()
+    page.get_by_role("button", name="Profile of TA").click()
+    page.locator("#profile h3", has_text="Profile of TA").wait_for(timeout=FIT)
+    assert page.faults == []
+
+
+def test_a_killed_server_is_noticed_and_the_draft_is_there(opened, server, case):
+    page = opened()
+    page.get_by_label("KA slider").press("ArrowRight")
+    page.locator("#draft", has_text="draft").wait_for()
+    server[0].kill()
+    page.locator("#message", has_text="The server has ended").wait_for()
+    assert page.locator("button:enabled, input:enabled").count() == 0
+    assert exfit.load_case(case.with_name("ac1a_good-draft.yaml"))
+
+
+def test_of_two_pages_the_second_writes_nothing_over_what_the_first_has_stored(opened, case):
+    first, second = opened(), opened()
+    first.get_by_label("KA slider").press("ArrowRight")
+    first.locator("#draft", has_text="draft").wait_for()
+    stored = case.with_name("ac1a_good-draft.yaml").read_text()
+    second.get_by_label("TE slider").press("ArrowLeft")
+    second.locator("#message", has_text="was changed by another page").wait_for()
+    assert case.with_name("ac1a_good-draft.yaml").read_text() == stored
+
+
+def answered(address, **headers):
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answer:
+            return answer.status
+    except urllib.error.HTTPError as refusal:
+        refusal.close()
+        return refusal.code
+
+
+def test_others_are_refused(server, browser):
+    _, address = server
+    host = address.split("/")[2]
+    assert answered(address) == 200
+    assert answered(address + "app.js", Origin=f"http://{host}") == 200
+    assert answered(f"http://{host}/") == 403
+    assert answered(f"http://{host}/wrong/") == 403
+    assert answered(address, Origin="http://example.org") == 403
+    assert answered(address, Host="example.org") == 403
+    assert answered(address + "session.py") == 404
+    page = browser.new_page()
+    page.set_content("<p>another origin</p>")
+    live = address.replace("http", "ws") + "live"
+    ended = page.evaluate(
+        "(live) => new Promise((told) => { const socket = new WebSocket(live);"
+        "socket.onopen = () => told('open'); socket.onclose = () => told('refused'); })",
+        live,
+    )
+    page.close()
+    assert ended == "refused"
+
+
+def test_a_file_that_is_no_case_is_refused_before_anything_is_served(run, tmp_path):
+    bad = Path(tmp_path / "bad.yaml")
+    bad.write_text("plant: {type: nothing}\n")
+    ran = run("app", str(bad), "--no-browser")
+    assert ran.code == 1
+    assert "bad.yaml:1: plant.type" in ran.err
