@@ -47,8 +47,8 @@ def pytest_addoption(parser):
         choices=("few", "others", "numerical", "long", "all"),
         default="few",
         help="few: one model of each family; others: the laws of models over all the others; "
-        "numerical: these, and the linear algebra; long: what takes long; all: every law over "
-        "every model",
+        "numerical: these with fewer examples, and the linear algebra; long: what takes long; "
+        "all: every law over every model",
     )
 
 
@@ -62,7 +62,7 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "every_example: runs with --models=all only")
     config.addinivalue_line("markers", "each_model: a law of each model, in whichever folder")
     config.addinivalue_line("markers", "pixels: its commands draw their figures in pixels")
-    few = config.getoption("models") == "few"
+    few = config.getoption("models") in ("few", "numerical")
     hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _keep_bytecode(str(config.cache.mkdir("bytecode")))
@@ -81,6 +81,20 @@ def _keep_bytecode(folder):
     """
     if sys.dont_write_bytecode and sys.pycache_prefix is None:
         sys.dont_write_bytecode, sys.pycache_prefix = False, folder
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Pass over the files without a numerical test: to collect is a tenth of a session."""
+    if config.getoption("models") != "numerical" or collection_path.suffix != ".py":
+        return None
+    of_models = OF_MODELS & {*collection_path.parts} or _is_of_algebra(collection_path)
+    return None if of_models or "each_model" in collection_path.read_text("utf-8") else True
+
+
+def _is_of_algebra(path):
+    """Return whether the tests of a file compute by more than the models themselves."""
+    folders = (TESTS / folder for folder in LINEAR_ALGEBRA)
+    return path.name == "test_settings.py" or any(map(path.is_relative_to, folders))
 
 
 def pytest_collection():
@@ -109,10 +123,6 @@ def _is_selected(item, models):
     Over the others run the laws of the models themselves, and drawn inputs once more, in greater
     number.
     """
-    if models == "numerical":
-        of_algebra = any(item.path.is_relative_to(TESTS / folder) for folder in LINEAR_ALGEBRA)
-        also = of_algebra or item.path.name == "test_settings.py"
-        return _is_selected(item, "others") or (also and _is_selected(item, "few"))
     if item.get_closest_marker("every_example"):
         return False
     if (models == "long") != bool(item.get_closest_marker("long")):
@@ -121,6 +131,8 @@ def _is_selected(item, models):
         is_law_of_models = item.get_closest_marker("each_model") or OF_MODELS & {*item.path.parts}
         return models != "few" and is_law_of_models
     is_drawn = hypothesis.is_hypothesis_test(getattr(item, "obj", None))
+    if models == "numerical":
+        return is_drawn or _is_of_algebra(item.path)
     return models != "others" or is_drawn
 
 

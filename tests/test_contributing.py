@@ -36,7 +36,7 @@ def test_what_runs_before_a_commit_is_what_the_gate_runs_and_what_is_installed()
     hooks = config["repos"][0]["hooks"]
     entries = [hook["entry"].removesuffix(" --force-exclude") for hook in hooks]
     gate = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    assert all(re.search(rf"^{entry}\b", gate, re.MULTILINE) for entry in entries)
+    assert all(re.search(rf"^ *{entry}\b", gate, re.MULTILINE) for entry in entries)
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
         "optional-dependencies"
     ]

@@ -65,7 +65,7 @@ def test_without_features_the_core_fits_simulates_and_validates(tmp_path):
     )
     for arguments in (
         ["--help"],
-        ["fit", CASE, "--no-plots", "-q", "-o", "fit"],
+        ["fit", CASE, "--search", "local", "--no-plots", "-q", "-o", "fit"],
         ["simulate", CASE, "--no-plots", "-q", "-o", "simulated"],
         ["validate", CASE, "--parameters", "fit", "--no-plots", "-q", "-o", "validated"],
     ):

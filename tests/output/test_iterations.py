@@ -65,7 +65,9 @@ def same(text, stored):
 @pytest.mark.parametrize(
     ("case", "options"),
     [
-        ("ac1a_typical", ("--strategy", "gn", "--search", "local")),
+        pytest.param(
+            "ac1a_typical", ("--strategy", "gn", "--search", "local"), marks=pytest.mark.long
+        ),
         ("ac1a_typical", ("--strategy", "lm-then-dgn", "--search", "local")),
         pytest.param("thesis/ac1a_table_1", (), marks=pytest.mark.long),
         pytest.param("ac1a_typical", ("--strategy", "gn"), marks=pytest.mark.long),

@@ -30,6 +30,7 @@ def texts(tmp_path_factory):
             recorded("up"),
             recorded("down", at={"start": 1.02, "min": 0.9, "max": 1.1}),
             free={"KA": {"start": 300.0, "min": 76.6, "max": 7660.0}},
+            estimate={"causes": 0},  # of its misfit they would be 95 % of the time
         ),
         "starts": {
             **config("first_order"),

@@ -28,6 +28,7 @@ def faulty_case(verdict, folder):
     """Return a case whose response misses its record by a limit, or goes the other way."""
     content = config("ac1a_good")
     del content["validate"]
+    content["estimate"] = content.get("estimate", {}) | {"causes": 0}  # another test's subject
     if verdict == NO_MATCH:
         content["test"]["vref"][0]["step"] = -0.05
     else:

@@ -77,6 +77,7 @@ def test_what_the_test_explains_better_moves_no_value():
     assert result.verdict.causes[0].cause.startswith(("the size of the step", "the base of vt"))
 
 
+@pytest.mark.long
 def test_values_of_a_machine_are_refined_and_the_intervals_hold_the_truth():
     """AC1A, whose T'd0 is given 12 % too low: the record was made with 6 s."""
     content = config("ac1a_typical")
