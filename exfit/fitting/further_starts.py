@@ -4,17 +4,19 @@ These are the linear phase, a coarse grid, the case's own grid. Each only has to
 for the next one: docs/methods.md has what was measured.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from exfit.errors import SimulationError
 from exfit.estimate import Descent, spread
+from exfit.estimate.problem import TINY, UNSEEN
 from exfit.fitting.compression import compressed
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.global_search import Way
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import UNSTABLE, Residuals, SimulationCounter
+from exfit.fitting.residuals import UNREACHABLE, UNSTABLE, Residuals, SimulationCounter
 from exfit.plants import BREAKER, FAULT, REFERENCES
 from exfit.simulation.limits import limits_at_rest
 from exfit.util.arrays import Array
@@ -31,6 +33,7 @@ NEAR_STEP = 1e-6  # units
 MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
 TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
 LAST_STEP = 1e-8  # units: no error of a parameter is as small
+TOLD = 0.25  # of what all records say of each direction: errors twice as large are near enough
 SWITCHED = {"R": "resistance", "X": "reactance"}  # a share of a switching is none
 
 
@@ -94,7 +97,7 @@ def legs_of(residuals: Residuals, own: Descent) -> tuple[tuple[Descent, ...], st
 
     The first is the linear phase, left out where it has no meaning; then the reason follows. Only
     the bounds and units of the last leg are those of the others: they do not depend on the case's
-    methods and tolerances.
+    methods and tolerances. Of many records the others take those that tell enough.
     """
 
     def leg(form: Residuals, method: str, iterations: int) -> Descent:
@@ -108,12 +111,43 @@ def legs_of(residuals: Residuals, own: Descent) -> tuple[tuple[Descent, ...], st
             x_scale=own.x_scale,
         )
 
-    coarse = coarse_form(residuals)
+    coarse = coarse_form(telling_form(residuals))
     linear = linear_form(coarse)
     legs = (leg(coarse, "lm-then-dgn", COARSE_ITERATIONS), own)
     if isinstance(linear, str):
         return legs, linear
     return (leg(linear, "lm", LINEAR_ITERATIONS), *legs), ""
+
+
+def telling_form(residuals: Residuals) -> Residuals:
+    """Keep few records, which together tell ``TOLD`` of what all of them do at the start.
+
+    That holds for each direction that the free parameters can take, so that a record that alone
+    shows one of them is among them.
+    """
+    try:
+        values, moves = residuals.values(residuals.start), residuals.moves(residuals.start)
+        slopes = [each.tangents(values, moves)[1] for each in residuals.experiments]
+    except UNREACHABLE:
+        return residuals
+    whole = np.concatenate(slopes)
+    whole /= np.maximum(np.linalg.norm(whole, axis=0), TINY)
+    if not np.isfinite(whole).all():
+        return residuals
+    rows, sizes, _ = np.linalg.svd(whole, full_matrices=False)
+    rows = rows[:, sizes > UNSEEN * sizes[0]]
+    parts = np.split(rows, np.cumsum([len(own) for own in slopes])[:-1])
+    shares = {k: own.T @ own for k, own in enumerate(parts)}  # of all records that is the identity
+
+    def told(some: Iterable[int]) -> Array:
+        """Share of each direction that some records tell, as far as it is needed."""
+        return np.minimum(np.linalg.eigvalsh(sum(shares[k] for k in some)), TOLD)
+
+    kept = list[int]()
+    while not kept or np.min(told(kept)) < TOLD:
+        left = [k for k in shares if k not in kept]
+        kept.append(max(left, key=lambda k: np.sum(told([*kept, k]))))
+    return replace(residuals, experiments=[residuals.experiments[k] for k in sorted(kept)])
 
 
 def coarse_form(residuals: Residuals) -> Residuals:

@@ -22,6 +22,7 @@ from exfit.simulation.memory import DEFAULT_MEMORY, RunSize, check_run
 from exfit.simulation.responder import Counts, Kept, Responder, Values
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
+    OF_LOCATED,
     groups,
     spectral_radii,
     substeps_at_rest,
@@ -480,7 +481,7 @@ class Simulator:
         alike = {(id(test._located), id(test._sampling)) for test in every}
         courses = [test.located_course() for test in (every if len(alike) > 1 else every[:1])]
         samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-        for lanes, group in groups(parts, self._lanes if len(courses) == 1 else 1):
+        for lanes, group in groups(parts, self._lanes if len(courses) == 1 else 1, OF_LOCATED):
             own = courses if len(courses) == 1 else [courses[k] for k in group]
             code = located_kernel(self.system, outputs, lanes)
             samples[group] = code.samples(p[group], own, parts[group])

@@ -2,10 +2,12 @@
 
 import pytest
 from places import ROOT
+from records import config
 
+from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.estimate.starts import multistart, spread
-from exfit.fitting.further_starts import last_leg, legs_of
+from exfit.fitting.further_starts import last_leg, legs_of, telling_form
 from exfit.fitting.search import fitted
 
 STARTS = 4
@@ -44,3 +46,17 @@ def test_a_case_that_has_no_linear_response_says_why():
     assert "recorded signals drive the simulation" in why_direct
     assert [leg.method for leg in of_case] == ["lm-then-dgn", own.method]
     assert of_case[-1] is own
+
+
+def test_of_many_records_the_first_legs_take_those_that_tell_enough():
+    """Which tell a quarter of each direction, so that one with a quantity of its own stays."""
+    content = config("ac1a_both")
+    up, down = content["records"]
+    up["test"]["vref"] = [{"at": 1.0, "step": 0.05}]
+    content["records"] = [{**up, "name": f"up{k}"} for k in range(4)] + [down]
+    _, problem = fitted(Case.from_dict(content, folder=ROOT / "configs"))
+    some = telling_form(problem.residuals)
+    assert [each.name for each in some.experiments] == ["up0", "down"]
+    *first, own = legs_of(problem.residuals, last_leg(problem))[0]
+    assert {leg.functions.count for leg in first} == {some.count}
+    assert own.functions.count == problem.residuals.count
