@@ -16,7 +16,6 @@ from unittest.mock import patch
 import numpy as np
 from places import REFERENCE
 
-from exfit.engine.trace import exp, log
 from exfit.features.planner.units import read_unit, with_rating
 from exfit.models import GOVERNORS
 from exfit.models.blocks import lag
@@ -84,21 +83,14 @@ def without_bus_frequency():
 
 
 def genqec_of_powerworld():
-    """Return GENQEC with a power of the flux as its saturation, and X''d in the slope of E'd.
-
-    PowerWorld 24 has X''d there for X''q, and that saturation where the flag is 0.
-    """
-
-    def saturated(flux, it, p):
-        return p.S10 * exp(log(p.S12 / p.S10) / log(1.2) * log(flux))
+    """Return GENQEC with X''d for X''q in the slope of E'd, as PowerWorld 24 has it."""
 
     def q_slopes(s, i, p, d):
         by, i_q = 1.0 + s.SAT, genqec.unsaturated(s, i).q
         d.EDP = -by * unsaturated_q_current(s, i_q, p.Xppd, p) / transient_time(p)
         _, d.PSIQ = lag(s.EDP + (p.Xpq - p.Xl) * i_q, s.PSIQ, 1.0, p.Tppq0 / by)
 
-    machine = genqec.machine("GENQEC", genqec.KW, saturated, "")
-    return machine._replace(q_slopes=q_slopes)
+    return genqec.GENQEC._replace(q_slopes=q_slopes)
 
 
 class TwoBuses:
@@ -123,6 +115,8 @@ class TwoBuses:
         if added := told.get("governor"):
             governor = GOVERNORS[added["model"]]
             values |= prefixed(GOVERNOR, typical(governor.sheet) | added["parameters"])
+        if "form_of_powerworld" in told:  # it was run with this flag
+            values[f"{MACHINE}SATFLG"] = 0.0
         limiters = []
         for part in parts.limiters:
             limiters.append(Attached(part.definition.model, part.place))

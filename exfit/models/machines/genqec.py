@@ -9,7 +9,7 @@ current over 1 + S, so that the equations are those of a machine without saturat
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from exfit.models.blocks import Signal, clip, lag, modulus
+from exfit.models.blocks import Signal, clip, lag, modulus, quadratic, where
 from exfit.models.machines import gentpj
 from exfit.models.machines.machine import (
     D_AXIS,
@@ -20,6 +20,7 @@ from exfit.models.machines.machine import (
     descending,
     factor,
     of_machine,
+    power_curve,
     pslf_record,
     subtransient_flux,
     unsaturated_field,
@@ -38,20 +39,39 @@ efd ─►(+)─►[   1   ]─┬─ EQP ─┬──────────�
 ifd (1 - Kw id) = (1 + S) EQP + (Xd - Xpd) (id + k (1 + S) u), u the input of
 PSID's integrator, k = (Xpd - Xppd) / (Xpd - Xl)^2, and
 Xds = (Xppd - Xl) / (1 + S) + Xl. S is the saturation at the air-gap flux, of
-GENQEJ plus Kis it. The q axis mirrors the d axis without an excitation. On open
+GENQEJ plus Kis it: with SATFLG = 0 a power of the flux, 1 a quadratic over the
+flux, 2 a quadratic. The q axis mirrors the d axis without an excitation. On open
 circuit id and iq are 0, and the q axis rests."""
 
 MOST = 0.25  # of Kw id, up and down
 DOUBT = "limits Kw id to 0.25 as PowerWorld's equations do; InterPSS has 0.4"
 KW = Parameter("Kw", 0.0, "1", 0.0, 0.99, "compensation of the field current, on load")
+SATFLG = Parameter(
+    "SATFLG",
+    1.0,
+    "1",
+    0.0,
+    2.0,
+    "saturation: 0 power of the flux, 1 quadratic over it, 2 quadratic",
+)
 *COMMON, KIS = gentpj.SHEET
 LEAKAGE = of_machine(Xl=0.154)  # of which the damper's flux has a share on open circuit, too
 CONS = gentpj.CONS.removesuffix(" Kis")
 
 
 def by_flux(flux: Signal, it: Signal, p: Signal) -> Signal:
-    """Saturation at an air-gap flux, whatever the current of the stator."""
-    return factor(flux, p)
+    """Saturation at an air-gap flux, whatever the current of the stator.
+
+    Source: the forms of the flag as NREL's PowerSystems.jl has them, from the same specification.
+    """
+    squared = quadratic(flux, 1.0, p.S10, 1.2, p.S12 / 1.2).vx
+    of_square = where(p.SATFLG > 1.5, squared, factor(flux, p))
+    return where(p.SATFLG < 0.5, power_curve(flux, p) / flux, of_square)
+
+
+def by_flux_and_current(flux: Signal, it: Signal, p: Signal) -> Signal:
+    """Saturation at an air-gap flux and a current of the stator."""
+    return by_flux(flux + p.Kis * it, it, p)
 
 
 def unsaturated(s: Signal, i: Axes) -> Axes:
@@ -112,6 +132,11 @@ def faults(values: Mapping[str, float]) -> Faults:
     """Find contradictions in the data sheet."""
     yield from gentpj.faults(values)
     yield from descending(values, "Xpq", "Xl")
+    flag = values.get("SATFLG", 1.0)
+    if not float(flag).is_integer():
+        yield "SATFLG", f"{flag:g} is none of 0, 1, 2"
+    elif flag == 0.0 and values["S10"] == 0.0 < values["S12"]:
+        yield "S10", "0 lies on no power of the flux; give S12 as 0, too, or another SATFLG"
 
 
 def machine(name: str, own: Parameter, saturated: Callable[..., Signal], title: str) -> Machine:
@@ -121,7 +146,7 @@ def machine(name: str, own: Parameter, saturated: Callable[..., Signal], title: 
         name=name,
         title=f"all inductances saturate alike by the air-gap flux{title}",
         drawing=DRAWING,
-        sheet=(*(LEAKAGE[0] if row.symbol == "Xl" else row for row in COMMON), own),
+        sheet=(*(LEAKAGE[0] if row.symbol == "Xl" else row for row in COMMON), own, SATFLG),
         d_axis=D_AXIS,
         q_axis=("EDP", "PSIQ"),
         source=source,
@@ -134,9 +159,8 @@ def machine(name: str, own: Parameter, saturated: Callable[..., Signal], title: 
         saturated=saturated,
         speed="voltage",
         doubt=DOUBT if compensates else "",
-        # the integer is the form of the saturation, of which 1 is the quadratic over the flux
         records=record(
-            f"{name}U", f"{CONS} {own.symbol}", icons={"SATFUNC": 1}, user="1 1 1 16 6 1"
+            f"{name}U", f"{CONS} {own.symbol}", icons={"SATFLG": 1}, user="1 1 1 16 6 1"
         ),
         pslf_records=pslf_record(
             name.lower(), CONS, f"{own.symbol} SATFLG", icons={"SATFLG": 1}, doubt=OF_A_LIST
@@ -145,4 +169,4 @@ def machine(name: str, own: Parameter, saturated: Callable[..., Signal], title: 
 
 
 GENQEC = machine("GENQEC", KW, by_flux, "")
-GENQEJ = machine("GENQEJ", KIS, gentpj.saturated, " and the current")
+GENQEJ = machine("GENQEJ", KIS, by_flux_and_current, " and the current")
