@@ -46,6 +46,10 @@ RENAMED: Mapping[Place, str] = {
 }
 KIND_OF_TEST = "_kind_of_test"  # the function by which the schema distinguishes tests
 NOT_A_MAPPING = "is not a mapping (key: value)"
+IN_PLACE_OF: Mapping[str, str] = {
+    "ChannelSection": " or, as text, a column",
+    "CriteriaSection": "; of a file: {file: its name}",
+}
 PATTERNS: Mapping[str, str] = {
     FILE_NAME: "must begin with a letter or digit and hold letters, digits, - _ . % only",
     PERCENT: "is neither a number nor a percentage such as 20 %",
@@ -69,8 +73,7 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
     ),
     "model_attributes_type": lambda value, _: f"{value} {NOT_A_MAPPING}",
     "model_type": lambda value, limits: (
-        f"{value} {NOT_A_MAPPING}"
-        + (" or, as text, a column" if limits["class_name"] == "ChannelSection" else "")
+        f"{value} {NOT_A_MAPPING}{IN_PLACE_OF.get(limits['class_name'], '')}"
     ),
     "dict_type": lambda value, _: f"{value} {NOT_A_MAPPING}",
     "tuple_type": lambda value, _: f"{value} is not a list",

@@ -410,6 +410,12 @@ FORM = {
         "criteria",
         ["not a mapping"],
     ),
+    "file of criteria as text": (
+        "criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
+        "criteria: operator.yaml",
+        "criteria",
+        ["'operator.yaml' is not a mapping", "of a file: {file: its name}"],
+    ),
     "earlier name of the criteria": (
         "criteria: {limits: [{quantity: rms, limit: 1.5e-4}]}",
         "accept: {rmse: 1.5e-4}",

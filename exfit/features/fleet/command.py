@@ -124,8 +124,8 @@ def batch(
     this computer, but none of its files. The package distributed comes with exfit[cluster].
 
     fleet.csv and fleet.html in DIR are the table of all cases that have been given for DIR. Exit
-    code 0: every case that has a record matches it; 1: some have no fit; 3: some do not match, or
-    Ctrl-C ended the command with some done.
+    code 0: every case that has a record matches it; 1: some have no fit, or none has a record; 3:
+    some do not match, or Ctrl-C ended the command with some done.
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers and --scheduler exclude each other.")
@@ -201,6 +201,8 @@ def _exit(fleet: "Fleet", quiet: bool) -> None:
     if fleet.interrupted and not done:
         raise Interruption("no case is done")
     without = [row for row in rows if row.status in WITHOUT_FIT]
+    if all(row.status == "no record" for row in rows):
+        without = [*rows]  # nothing was there to fit
     if without and not fleet.interrupted:
         if quiet:
             raise FileError(f"{row.case}: {row.reason}" for row in without)

@@ -60,6 +60,9 @@ def test_a_case_without_a_record_is_no_failure(run):
     Path("cases/c.yaml").write_text("model: SEXS\nplant: {type: open-circuit}\n")
     assert run("batch", "cases", "-q").code == 0
     assert rows()[2]["status"] == "no record"
+    code, out, err = run("batch", "cases/c.yaml", "-q")  # nothing to fit at all
+    assert (code, out) == (1, "")
+    assert "cases/c.yaml: nothing to fit: the case has no record" in err
 
 
 @pytest.mark.parametrize(("at_once", "code"), [(True, 130), (False, 3)])
