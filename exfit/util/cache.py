@@ -33,7 +33,12 @@ def read_private(path: Path) -> bytes | None:
 
 
 def keep_private(path: Path, data: bytes) -> None:
-    """Keep a file that nobody else may write to; where that is not possible, keep nothing."""
+    """Keep a file that nobody else may write to; where that is not possible, keep nothing.
+
+    So where its folder is a link out of the cache, which may itself be one.
+    """
+    if path.parent.is_symlink() and path.parent != _chosen():
+        return
     with suppress(OSError):
         path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         write_whole(path, data)

@@ -671,6 +671,18 @@ def test_a_file_that_others_could_write_is_not_run(cache, builds):
     assert path.stat().st_mode & 0o777 == 0o600
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a right there")
+def test_nothing_is_kept_outside_the_cache_which_may_be_a_link_itself(cache, builds, tmp_path):
+    disk, outside = tmp_path / "disk", tmp_path / "outside"
+    disk.mkdir(0o700)
+    outside.mkdir(0o700)
+    cache.symlink_to(disk, target_is_directory=True)
+    (cache / "traces").symlink_to(outside, target_is_directory=True)
+    assert nine() == 9.0
+    assert [*outside.iterdir()] == []
+    assert len(builds) == len(codes(cache)) == 1
+
+
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch, builds):
     monkeypatch.setattr(engine, "_loaded", NothingLoaded())
     (tmp_path / "file").write_text("not a folder")

@@ -23,7 +23,7 @@ from exfit.util.vocabulary import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRAT
 
 if TYPE_CHECKING:
     from exfit.features.fleet.batch import BatchObserver, CaseMaking
-    from exfit.features.fleet.folder import Fleet
+    from exfit.features.fleet.folder import CaseSummary, Fleet
     from exfit.output.events import Events
 
 FAILED = 1  # the exit code where cases are without a fit
@@ -195,14 +195,18 @@ def _cases_of(tables: Sequence[Path], folder: Path) -> "dict[Path, CaseMaking]":
     return made
 
 
+def _without_fit(rows: "Sequence[CaseSummary]") -> "Sequence[CaseSummary]":
+    """List the cases that have no fit and should; all where none has a record."""
+    none_to_fit = {row.status for row in rows} == {"no record"}
+    return rows if none_to_fit else [row for row in rows if row.status in WITHOUT_FIT]
+
+
 def _exit(fleet: "Fleet", quiet: bool) -> None:
     rows = fleet.of_run
     done = [row for row in rows if row.status == "done"]
     if fleet.interrupted and not done:
         raise Interruption("no case is done")
-    without = [row for row in rows if row.status in WITHOUT_FIT]
-    if all(row.status == "no record" for row in rows):
-        without = [*rows]  # nothing was there to fit
+    without = _without_fit(rows)
     if without and not fleet.interrupted:
         if quiet:
             raise FileError(f"{row.case}: {row.reason}" for row in without)
