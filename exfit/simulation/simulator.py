@@ -22,7 +22,6 @@ from exfit.simulation.memory import DEFAULT_MEMORY, RunSize, check_run
 from exfit.simulation.responder import Counts, Kept, Responder, Values
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
-    OF_LOCATED,
     groups,
     spectral_radii,
     substeps_at_rest,
@@ -45,8 +44,8 @@ REACH = 2.0  # of the fastest rate that a sub-step takes, where the step is chos
 LARGEST_STEP = 1e-2  # s, the first that is tried where an accuracy is asked for
 STEPS = tuple(k * 10.0**-n for n in (3, 4) for k in (5.0, 2.0, 1.0))  # s, the others
 SHORTEST_STEP, LARGEST_DIVISION = STEPS[-1], 10.0
-# states of systems whose sets gain from lanes; with 34 and 41 a set takes up to 3.5 times as long
-MOST_STATES = 20
+MOST_STATES = 20  # of systems that gain from lanes; with 34 and 41 a set takes 3.5 times as long
+FEW = 12  # sets: with located crossings they run faster one by one, as they cross apart
 LARGEST_GROWTH = 35.0  # logarithm: of a rounding of 1e-16 to about 1 pu
 SAFE = 0.5  # of the accuracy: parameters move in a fit
 READ_IN = 5.0  # parts of a step in which a whole run with located crossings is read
@@ -481,7 +480,7 @@ class Simulator:
         alike = {(id(test._located), id(test._sampling)) for test in every}
         courses = [test.located_course() for test in (every if len(alike) > 1 else every[:1])]
         samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-        for lanes, group in groups(parts, self._lanes if len(courses) == 1 else 1, OF_LOCATED):
+        for lanes, group in groups(parts, self._lanes(len(sets)) if len(courses) == 1 else 1):
             own = courses if len(courses) == 1 else [courses[k] for k in group]
             code = located_kernel(self.system, outputs, lanes)
             samples[group] = code.samples(p[group], own, parts[group])
@@ -489,10 +488,9 @@ class Simulator:
             samples = samples[:, :1] + (samples - samples[:, :1]) / self._share
         return self.as_asked(samples), parts
 
-    @property
-    def _lanes(self) -> int:
+    def _lanes(self, sets: int) -> int:
         """Sets side by side with located crossings: many limits part the ways of lanes."""
-        return SIDE_BY_SIDE if len(self.system.states) <= MOST_STATES else 1
+        return SIDE_BY_SIDE if sets >= FEW and len(self.system.states) <= MOST_STATES else 1
 
     def as_asked(self, samples: Array) -> Array:
         """Samples (K, M, ...) of machine code with located crossings, in the order of the times."""

@@ -24,7 +24,6 @@ STATE_ROUNDING = 1e-13  # of a state, relative
 SQUARINGS = 5  # of a Jacobian, to bound its spectral radius
 UNDERFLOW = 1e-200  # a smaller norm of a power may have lost all digits
 WORTH_A_BLOCK = 3  # sets that take longer one by one than a block of them together
-OF_LOCATED = 12  # the same where crossings are located: few sets cross together
 NO_SUBSTEPS = 0  # sub-steps of a set of values that has no response
 KEPT = 32  # answers: a Jacobian is asked for where residuals were, and by one record after another
 
@@ -64,20 +63,15 @@ def _substeps_at_rest(system: System, step: float, sets: bytes) -> NDArray[np.in
     return parts
 
 
-def groups(
-    parts: Counts, lanes: int, least: int = WORTH_A_BLOCK
-) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Yield lanes and the sets that run in so many: blocks with equal sub-steps, then others.
-
-    The last block of equal ones has ``least`` sets.
-    """
+def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield lanes and the sets that run in so many: blocks with equal sub-steps, then others."""
     alone = np.flatnonzero(parts != NO_SUBSTEPS)
-    if lanes > 1 and len(alone) >= least:
+    if lanes > 1 and len(alone) >= WORTH_A_BLOCK:
         order = alone[np.argsort(parts[alone], kind="stable")]
         equal = np.split(order, np.flatnonzero(np.diff(parts[order])) + 1)
         filling = [len(group) - len(group) % lanes for group in equal]
         ends = [
-            end if len(group) - end < least else len(group)
+            end if len(group) - end < WORTH_A_BLOCK else len(group)
             for group, end in zip(equal, filling, strict=True)
         ]
         together = [group[:end] for group, end in zip(equal, ends, strict=True) if end]
