@@ -33,12 +33,9 @@ def read_private(path: Path) -> bytes | None:
 
 
 def keep_private(path: Path, data: bytes) -> None:
-    """Keep a file that nobody else may write to; where that is not possible, keep nothing.
-
-    So where its folder is a link out of the cache, which may itself be one.
-    """
+    """Keep a file that nobody else may write to; where that is not possible, keep nothing."""
     if path.parent.is_symlink() and path.parent != _chosen():
-        return
+        return  # it leads out of the cache, which may itself be a link
     with suppress(OSError):
         path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         write_whole(path, data)
@@ -47,8 +44,7 @@ def keep_private(path: Path, data: bytes) -> None:
 
 
 def _chosen() -> Path:
-    chosen = os.environ.get(CACHE)
-    if chosen:
+    if chosen := os.environ.get(CACHE):
         return Path(chosen)
     from platformdirs import user_cache_path
 
