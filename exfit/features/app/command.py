@@ -7,16 +7,21 @@ from pathlib import Path
 
 import click
 
-from exfit.cli.given_files import GivenFile, Kind
+from exfit.cli.given_files import RECORDS, GivenFile, Kind
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 
 
 @click.command(short_help="Drag sliders, see the response, fit, in a page.")
-@click.argument("case", type=GivenFile(Kind.CASE, Kind.RESULT), metavar="CASE|RESULT")
+@click.argument(
+    "case", type=GivenFile(Kind.CASE, Kind.RECORD, Kind.RESULT), metavar="CASE|RECORD|RESULT"
+)
 @click.option("--browser/--no-browser", default=True, help="Open the browser (default: yes).")
 def app(case: Path, browser: bool) -> None:
     """Open a page in the browser that shows CASE, or the RESULT of its fit.
+
+    Of a RECORD it shows the channels, as exfit inspect reads them, and makes the case, as exfit new
+    does. A record can be dropped on the page, too: it is kept in the working folder.
 
     A slider for each free parameter moves the response beside the record. Fit shows each iteration,
     then the verdict, the intervals and the causes. Each change is stored in CASE-draft.yaml until
@@ -32,16 +37,18 @@ def app(case: Path, browser: bool) -> None:
     from exfit.features.app.session import Session
     from exfit.results.io import load_result
 
-    result, path = None, case
-    if case.is_dir() or case.suffix == ".json":
+    result, path, record = None, case, None
+    if case.suffix.lower() in RECORDS:
+        record = case
+    elif case.is_dir() or case.suffix == ".json":
         result = load_result(case)
         path = result.case
-    first = Session(path, result)
+    first = Session(path, result, record)
     try:
         first.open()  # what is wrong is said here
     finally:
         first.close()
-    server, address = page_server(lambda: Session(path, result))
+    server, address = page_server(lambda: Session(path, result, record))
     echo(f"{address}\nCtrl-C ends it", err=False)
     if browser and has_display():
         webbrowser.open(address)

@@ -84,6 +84,30 @@ class Validate(Form):
     values: Values
 
 
+class Inspect(Form):
+    """A record in the working folder, which was dropped there."""
+
+    do: Literal["inspect"]
+    file: Name
+
+
+class Draw(Form):
+    """The drawing of an exciter."""
+
+    do: Literal["drawing"]
+    model: Name
+
+
+class Make(Form):
+    """The case of the record that is shown: model, step (pu), rated voltage (kV), machine data."""
+
+    do: Literal["make"]
+    model: Name
+    step: FiniteFloat | None
+    kv: FiniteFloat | None
+    machine: Values
+
+
 class Plain(Form):
     """What needs no more than its name."""
 
@@ -91,7 +115,8 @@ class Plain(Form):
 
 
 Message = Annotated[
-    Try | Store | Bound | Lock | Free | Look | Apply | Validate | Plain, Field(discriminator="do")
+    Try | Store | Bound | Lock | Free | Look | Apply | Validate | Inspect | Draw | Make | Plain,
+    Field(discriminator="do"),
 ]
 FORMS: TypeAdapter[Message] = TypeAdapter(Message)
 

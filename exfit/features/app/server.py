@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from exfit.errors import ExfitError
+from exfit.features.app.beginning import LARGEST, dropped
 from exfit.features.app.messages import LONGEST, read_message
 from exfit.features.app.packing import packed
 from exfit.features.app.session import Content, Session
@@ -99,6 +100,19 @@ def page_server(make: Callable[[], Session], linger: float = LINGER) -> tuple["P
             return PlainTextResponse("not found\n", 404, HEADERS)
         return Response((PAGE / name).read_bytes(), 200, HEADERS, kind)
 
+    async def drop(request: Request) -> Response:
+        data = bytearray()
+        async for part in request.stream():
+            data += part
+            if len(data) > LARGEST:
+                return PlainTextResponse(f"record: more than {LARGEST} bytes", 413, HEADERS)
+        try:
+            name = request.query_params.get("name", "")
+            place = await run_in_threadpool(dropped, name, bytes(data))
+        except ExfitError as fault:
+            return PlainTextResponse(str(fault), 400, HEADERS)
+        return PlainTextResponse(place.name, 200, HEADERS)
+
     async def live(socket: WebSocket) -> None:
         await socket.accept()
         pages.opened()
@@ -109,6 +123,7 @@ def page_server(make: Callable[[], Session], linger: float = LINGER) -> tuple["P
 
     routes = [
         Route(f"/{token}/", file),
+        Route(f"/{token}/record", drop, methods=["POST"]),
         Route(f"/{token}/{{name}}", file),
         WebSocketRoute(f"/{token}/live", live),
     ]

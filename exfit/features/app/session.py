@@ -23,6 +23,7 @@ from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
 from exfit.estimate import Progress
 from exfit.features.app import messages
+from exfit.features.app.beginning import drawn, inspected, made
 from exfit.features.app.packing import thinned
 from exfit.fitting.program import program_of
 from exfit.output import run_folder
@@ -39,6 +40,7 @@ from exfit.workflows.responses import LiveResponse
 Content = dict[str, Any]
 Send = Callable[[Content], None]
 
+WITHOUT_CASE = ("open", "inspect", "drawing", "make", "stop")
 DRAFT = "-draft"  # behind the name of a case: the file of its draft
 BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
 
@@ -46,12 +48,16 @@ BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
 class Session:
     """One page: its case as it is on disk or in its draft, and what was made of it.
 
+    With a ``record`` there is no case yet: the page begins with what is in it.
+
     ``seen`` are the texts of both files as this page knows them, None for one that is not there: a
     file that another page or program has changed is not written over.
     """
 
-    def __init__(self, case: Path, result: FitResult | None = None) -> None:
-        self.case_path, self.result = case, result
+    def __init__(
+        self, case: Path, result: FitResult | None = None, record: Path | None = None
+    ) -> None:
+        self.case_path, self.result, self.record = case, result, record
         self.stack = ExitStack()
         self.seen = dict[Path, str | None]()
         self.bounds = dict[str, tuple[float, float]]()
@@ -78,6 +84,8 @@ class Session:
 
     def open(self) -> Content:
         """Read the case, or its draft, and describe all that the page shows of it."""
+        if self.record is not None:
+            return inspected(self.record)
         files = (self.case_path, self.draft)
         self.seen = {path: _text(path) for path in files}
         if self.seen[self.case_path] is None:
@@ -183,6 +191,7 @@ class Session:
 
     def answer(self, asked: "messages.Message", send: Send) -> Content:
         """Do what a message asks for; raises ExfitError where it cannot be done."""
+        self._refuse_without_case(asked.do)
         match asked:
             case messages.Try():
                 return self.response(asked.values)
@@ -199,6 +208,8 @@ class Session:
                 return self._lock(asked.name, asked.value)
             case messages.Free():
                 return self._free(asked.name)
+            case messages.Inspect() | messages.Draw() | messages.Make():
+                return self._begin(asked)
             case messages.Look():
                 return self._profile(asked.name)
             case messages.Apply():
@@ -267,6 +278,38 @@ class Session:
         self.result, self.bounds = None, {}
         return self.open()
 
+    # ---- from a record
+
+    def _refuse_without_case(self, do: str) -> None:
+        if not hasattr(self, "explorer") and do not in WITHOUT_CASE:
+            raise ExfitError(f"{do}: there is no case yet: make one of a record")
+
+    def _begin(self, asked: "messages.Inspect | messages.Draw | messages.Make") -> Content:
+        match asked:
+            case messages.Inspect():
+                return self._inspect(asked.file)
+            case messages.Draw():
+                return drawn(asked.model)
+            case messages.Make():
+                return self._make(asked)
+
+    def _inspect(self, file: str) -> Content:
+        place = Path(file)
+        if place.name != file or "\\" in file:
+            raise ExfitError(f"{file}: not the name of a file in the working folder")
+        said = inspected(place)
+        self.record = place
+        return said
+
+    def _make(self, asked: "messages.Make") -> Content:
+        if self.record is None:
+            raise ExfitError("record: there is none: drop one on the page")
+        path, command = made(self.record, asked)
+        self.case_path, self.record, self.result, self.bounds = path, None, None, {}
+        said = {**self.open(), "words": f"written: {path}"}
+        # no option gives machine data: the case that is there has them
+        return said if asked.machine else {**said, "command": command}
+
     # ---- fit, profile, validation
 
     def _fit(self, send: Send) -> Content:
@@ -299,7 +342,7 @@ class Session:
             self.result = workflows.fit(case, None, iterated, advanced, live)
         finally:
             self.fitting = False
-        return {**self._result(self.result), "of": "fit"}
+        return {**self._result(self.result), "of": "fit", "command": self.command}
 
     def _end_if_stopped(self) -> None:
         if self.stopped:

@@ -188,7 +188,36 @@ function table(into, heads, rows) {
 // ---- what the server says
 
 const handlers = {
+  record(said) {
+    $("begin").hidden = false;
+    $("work").hidden = $("actions").hidden = true;
+    drafted(false);
+    $("name").textContent = said.file;
+    $("title").textContent = "a record";
+    const channels = make("table");
+    table(channels, ["channel", "unit", "seems to be", "level", "noise"], said.channels.map((c) => [c.name, c.unit, c.signal, c.level, c.noise]));
+    $("channels").replaceChildren(channels);
+    $("findings").replaceChildren(...said.findings.map((finding) => make("li", {}, finding)));
+    $("curves").replaceChildren();
+    for (const [name, curve] of Object.entries(said.curves)) {
+      const canvas = make("canvas", { className: "low", "aria-label": `channel ${name} over time` }), readout = make("p", { className: "readout" });
+      $("curves").append(make("h3", {}, name), canvas, readout);
+      new Plot(canvas, readout, ["current"], "s").set(said.time, { current: curve });
+    }
+    $("model").replaceChildren(...said.models.map((name) => make("option", { selected: name === "AC1A" }, name)));
+    $("machine").replaceChildren(...said.machine.map((row) => make("p", { className: "field" },
+      make("label", { htmlFor: `m-${row.name}`, title: row.meaning }, `${row.name}, ${row.unit}`),
+      make("input", { id: `m-${row.name}`, type: "number", step: "any", placeholder: String(row.typical), min: row.low, max: row.high }))));
+    send({ do: "drawing", model: $("model").value });
+    say("");
+  },
+  drawing(said) {
+    const src = `data:image/svg+xml,${encodeURIComponent(said.svg)}`;
+    $("drawing").replaceChildren(said.svg ? make("img", { src, alt: `block diagram: ${said.title}` }) : "no drawing");
+  },
   open(said) {
+    $("begin").hidden = true;
+    $("work").hidden = $("actions").hidden = false;
     $("name").textContent = said.name;
     document.title = `${said.name} – exfit`;
     $("title").textContent = said.title;
@@ -245,7 +274,7 @@ const handlers = {
     $("verdict").className = said.holds ? "good" : "bad";
     for (const id of ["save-result", "save-report"]) $(id).disabled = false;
     const found = make("table");
-    table(found, ["parameter", "value", "95 % interval", "unit"], said.parameters.map((p) => [p.name, p.text, p.words, p.unit]));
+    table(found, ["parameter", "value", "95 % interval", "unit"], said.parameters.map((p) => [p.name, p.text, p.interval ? p.words : "none", p.unit]));
     const causes = make("ol", {}, ...said.causes.map((cause) => make("li", {}, cause.sentence, " ",
       cause.command ? make("button", { type: "button", className: "small", title: cause.command, onclick: () => send({ do: "apply", cause: cause.number }) }, "Apply") : "",
       cause.command ? make("code", {}, ` ${cause.command}`) : "")));
@@ -321,3 +350,24 @@ $("copy").onclick = async () => {
   $("copy").textContent = "Copied";
 };
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => state.plots.forEach((record) => record.signals.forEach((s) => { s.upper.draw(); s.lower.draw(); })));
+
+// ---- from a record
+
+const given = (id) => ($(id).value === "" ? null : Number($(id).value));
+$("model").onchange = () => send({ do: "drawing", model: $("model").value });
+$("make").onclick = () => {
+  const boxes = [...document.querySelectorAll("#machine input")].filter((box) => box.value !== "");
+  const machine = Object.fromEntries(boxes.map((box) => [box.id.slice(2), Number(box.value)]));
+  send({ do: "make", model: $("model").value, step: given("step"), kv: given("kv"), machine });
+};
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", async (event) => {
+  event.preventDefault();
+  const [file] = event.dataTransfer.files;
+  if (!file || state.ended) return;
+  say(`reads ${file.name} …`);
+  const answer = await fetch(`record?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+  const text = await answer.text();
+  if (answer.ok) send({ do: "inspect", file: text });
+  else say(text, true);
+});
