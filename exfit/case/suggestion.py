@@ -18,6 +18,7 @@ from exfit.records.channel_names import connection_of
 from exfit.records.contradictions import FIELD, ScaleRange, is_on_load, scale_to_find
 from exfit.records.formats import open_table
 from exfit.records.inspection import Inspection, inspect
+from exfit.records.kinds import FOLLOWING, INJECTION, ISOLATED_LOAD, REJECTION
 from exfit.records.rejection import POWERS, BreakerOpening
 from exfit.records.steps import RecordedStep, bounds_of_instant
 from exfit.records.units import alike, scale_between, unit_of, usual
@@ -134,10 +135,14 @@ DIGITS = 4
 BASE_ON_LOAD = "; check its base: on load the level does not show whether it is the air-gap line"
 SPEED = "speed"  # which no plant with the breaker open has
 GATE = "gate"  # which needs a governor
+OF_GOVERNOR_TEST = ("p", SPEED, GATE)
+WITHOUT_GOVERNOR = tuple(signal for signal in COMPARED if signal != GATE)
 COLUMNS_LISTED = 6  # among which the voltage may be
 
 
-def record_section(inspection: Inspection, file: str, only: tuple[str, ...] = COMPARED) -> Section:
+def record_section(
+    inspection: Inspection, file: str, only: tuple[str, ...] = WITHOUT_GOVERNOR
+) -> Section:
     """Suggest the ``record`` of a file; signals that are not in ``only`` are comments.
 
     A channel in engineering units has a base that is to be filled in.
@@ -187,9 +192,67 @@ def suggested_sections(
 
 def suggested_event(inspection: Inspection, file: str, bases: Mapping[str, Base]) -> Section:
     """Suggest the sections of a case for a record that is no bump test; {} for one that is."""
+    if inspection.of_governor:
+        return governor_sections(inspection, file, bases)
     suggestions = (part.load() for part in parts("SUGGESTIONS").values())
     sections = (suggest(inspection, file, bases) for suggest in suggestions)
     return next(filter(None, sections), {})
+
+
+def governor_sections(inspection: Inspection, file: str, bases: Mapping[str, Base]) -> Section:
+    """Suggest ``plant``, ``governor``, ``test`` and ``record`` of a test of a governor."""
+    kind, f0 = inspection.kind.name, Noted(QUESTION, "Hz, rated frequency")
+    level = _per_unit_level(inspection, "p")
+    network: Section
+    if kind in (ISOLATED_LOAD, REJECTION):
+        load = Noted(level, "the load before, pu of the machine at 1 pu of voltage")
+        network = {"f0": f0, "YP": load, "YQ": Noted(QUESTION, "as YP; Q is -YQ")}
+        plant = {"type": Noted("isolated", "the unit feeds this load alone"), "network": network}
+    elif kind == FOLLOWING:
+        drives = "the recorded speed drives governor and turbine"
+        plant = {"type": Noted("governor-playback", drives)}
+    else:
+        network = {"f0": f0, "R": 0.0, "X": Noted(QUESTION, "pu, reactance to the source")}
+        network |= {"P": Noted(level, "pu of the machine, before"), "Q": Noted(QUESTION, "pu")}
+        plant = {"type": Noted("infinite-bus", "on load"), "network": network}
+    channels = channels_section(inspection, OF_GOVERNOR_TEST, bases)
+    if inspection.channel_of("vt") is None:
+        channels.pop("vt", None)
+    test = {} if kind == FOLLOWING else {"test": _governor_test(inspection, level)}
+    model = Noted(QUESTION, "`exfit models` lists governors; R and its times are to be free")
+    governor = {"governor": {"model": model}}
+    return {"plant": plant, **governor, **test, "record": record_of(inspection, file, channels)}
+
+
+def _governor_test(inspection: Inspection, level: float | str) -> Section:
+    """Suggest the ``test`` of a governor: a load that changes, or steps of an input."""
+    section: Section = {}
+    if inspection.channel_of("vt") is None:
+        section["vt0"] = Noted(QUESTION, "pu, the voltage before")
+    opening, steps = inspection.opening, inspection.steps
+    if opening is not None:
+        gone = {"at": rounded(opening.at), "YP": 0.0, "YQ": 0.0}
+        return {**section, "network": [Noted(gone, f"the breaker opens, +- {opening.error:.1g} s")]}
+    if inspection.kind.name == ISOLATED_LOAD:
+        power = inspection.channel_of("p")
+        after = power.change_at(steps[0]) if power is not None else None
+        load = QUESTION if after is None or isinstance(level, str) else rounded(level + after)
+        at = Noted(rounded(steps[0].at), f"+- {steps[0].error:.1g} s")
+        return {**section, "network": [{"at": at, "YP": Noted(load, "the load from then on")}]}
+    signal = "fs" if inspection.kind.name == INJECTION else "pref"
+    if inspection.channel_of(signal) is not None:
+        return {**section, signal: Noted("recorded", "its change from its level at rest")}
+    size = Noted(QUESTION, "as keyed in: docs/plants.md says what it is of each governor")
+    made = [{"at": Noted(_range(each.at, *bounds_of_instant(each.at, inspection.time)),
+                         f"+- {each.error:.1g} s"), "step": size} for each in steps]  # fmt: skip
+    return {**section, signal: Noted(made, above="fs in place of pref: added to the speed, pu")}
+
+
+def _per_unit_level(inspection: Inspection, signal: str) -> float | str:
+    """Return the level at rest of a signal in per unit, "?" where its base is not known."""
+    channel = inspection.channel_of(signal)
+    known = channel is not None and channel.seems_per_unit
+    return float(f"{channel.level:.4g}") if channel is not None and known else QUESTION
 
 
 def channels_section(
@@ -206,7 +269,7 @@ def channels_section(
         if channel is None or (signal in OF_EVENT and signal not in only):
             continue
         drives = channel is inspection.reference
-        compared = signal in only and signal != GATE and (signal != SPEED or loaded)
+        compared = signal in only and (signal != SPEED or loaded)
         base = bases.get(signal)
         scale = None if base is not None else scale_to_find(channel, inspection.channels)
         entry = channel_entry(channel, base, scale, drives)

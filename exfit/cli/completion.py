@@ -26,6 +26,7 @@ def names_of(*shelves: str) -> Completion:
 
 models = names_of("MODELS", "MACHINE_NAMES", "STABILISERS", "GOVERNORS", "LIMITERS")
 exciters, machines = names_of("MODELS"), names_of("MACHINE_NAMES")
+governors = names_of("GOVERNORS")
 
 
 def several_exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:

@@ -37,7 +37,7 @@ from exfit.records.formats.table import (
     listed,
     refuse_uneven,
 )
-from exfit.records.kinds import EVENT, STEADY, KindOfTest, kind_of
+from exfit.records.kinds import EVENT, OF_GOVERNOR, REJECTION, STEADY, KindOfTest, kind_of
 from exfit.records.phasors import Status, angle_findings, bad_rows, in_radians
 from exfit.records.physics import RATED_HZ, readings_by_physics, waveforms_apart
 from exfit.records.pmu_recognition import PmuContent, pmu_content
@@ -122,9 +122,15 @@ class Inspection:
         return self.kind.name == EVENT
 
     @property
+    def of_governor(self) -> bool:
+        """Whether it seems to be a test of the governor, or a rejection with the gate recorded."""
+        rejected = self.kind.name == REJECTION and self.channel_of("gate") is not None
+        return rejected or self.kind.name in OF_GOVERNOR
+
+    @property
     def findings(self) -> tuple[str, ...]:
         """What must be known before the record is used, in sentences."""
-        if self.is_event:
+        if self.is_event or (self.of_governor and self.opening is None):
             of_channels = (
                 text
                 for each in self.channels

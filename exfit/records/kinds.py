@@ -1,4 +1,4 @@
-"""What kind of test a record holds, and by what it shows: bump test, event, rejection, rest."""
+"""What kind of test a record holds, and by what it shows: bump test, event, governor test, rest."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,12 +12,20 @@ from exfit.util.arrays import Array, median, median_step
 if TYPE_CHECKING:
     from exfit.records.channel_inspection import InspectedChannel
     from exfit.records.inspection import Inspection
+    from exfit.records.steps import RecordedStep
 
 BUMP, EVENT, REJECTION, STEADY = "bump test", "grid event", "load rejection", "steady point"
+REFERENCE = "step of the governor's reference"
+INJECTION = "signal injected into the governor"
+ISOLATED_LOAD = "step of load on an isolated unit"
+FOLLOWING = "governor that follows the grid"
+OF_GOVERNOR = (REFERENCE, INJECTION, ISOLATED_LOAD, FOLLOWING)
 BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
 ABOVE_NOISE = 5.0  # times the noise of p: then it moves
 CERTAINLY = 0.3  # correlation of the changes of q and vt: whose sign counts
 OF_GRID = 5e-4  # pu: what the frequency of a grid event moves by; less is a unit's swing
+OF_ISOLATED = 5e-3  # pu: so far the speed of a unit in a grid hardly moves
+AT_ONCE = 0.5  # s: so soon p follows a load, and no gate yet
 SMALL = 2e-3  # of its level: what moves less is at rest
 AT_REST = (*COMPARED, "frequency")  # what a steady point holds
 BY_REFERENCE = "a step of the reference raises both"
@@ -49,11 +57,54 @@ def kind_of(record: "Inspection") -> KindOfTest:
         for each in record.channels
         if each.signal is not None and not each.frequency
     }
+    of_governor = _of_governor(record, signals)
+    if of_governor is not None:
+        return of_governor
     if record.reference is not None:
         return KindOfTest(BUMP, f"{record.reference.name}, the reference, moves")
     if not record.steps and not record.phases and _at_rest(record, signals):
         return KindOfTest(STEADY, "nothing moves beyond its noise")
     return _by_what_moves(record, signals)
+
+
+def _of_governor(record: "Inspection", signals: Mapping[str, Array]) -> KindOfTest | None:
+    """Tell a test of the governor: by its recorded input, or by a gate that moves for good."""
+    names = {str(each.signal): each.name for each in record.channels if each.signal}
+    for signal, kind in (("pref", REFERENCE), ("fs", INJECTION)):
+        if any(names.get(signal) in step.sizes for step in record.steps):
+            return KindOfTest(kind, f"{names[signal]} moves")
+    step = next((each for each in record.steps if names.get("gate") in each.sizes), None)
+    turning = next((each for each in ("speed", "frequency") if each in signals), None)
+    if step is None or turning is None or "p" not in signals:
+        return None
+    gate, speed, power = names["gate"], names[turning], names["p"]
+    moved = _range_pu(signals[turning])
+    if moved < OF_GRID:
+        doubt = "or was a signal added to the speed that the governor measures?"
+        return KindOfTest(REFERENCE, f"{gate} and {power} move, {speed} rests; {doubt}")
+    early, lasting = _soon_after(record, step, "p"), step.sizes.get(power, 0.0)
+    of_gate = _soon_after(record, step, "gate") / step.sizes[gate]
+    leads = early * lasting > 0.5 * lasting**2 and of_gate < 0.5
+    if leads and _together(record.time, signals[turning], signals["gate"]) < CERTAINLY:
+        doubt = "" if moved > OF_ISOLATED else "; or is it a grid event?"
+        return KindOfTest(ISOLATED_LOAD, f"{power} steps, {speed} and {gate} follow{doubt}")
+    if {"vt", "angle"} <= signals.keys() or {"vt", "frequency"} <= signals.keys():
+        return KindOfTest(EVENT, f"{gate} follows {speed}, which moves with the grid")
+    return KindOfTest(FOLLOWING, f"{gate} follows {speed}, which moves with the grid")
+
+
+def _soon_after(record: "Inspection", step: "RecordedStep", signal: str) -> float:
+    """Change of a signal from before a step to just after it, in the unit of its channel."""
+    channel = record.channel_of(signal)
+    if channel is None:
+        return 0.0
+    time, samples = record.time, record.samples[channel.name]
+    begin, end = step.at - step.error, step.at + step.error
+    before = samples[(time < begin) & (time >= begin - 4.0 * AT_ONCE)]
+    after = samples[(time > end) & (time <= end + AT_ONCE)]
+    if not (len(before) and len(after)):
+        return 0.0
+    return float(np.nanmedian(after) - np.nanmedian(before))
 
 
 def _at_rest(record: "Inspection", signals: Mapping[str, Array]) -> bool:

@@ -30,6 +30,9 @@ TYPE = AskedFact("Excitation type", ("Exciter type",))
 REGULATOR = AskedFact("Regulator", ("Voltage regulator", "AVR"))
 COMPENSATION = AskedFact("Compensation", ("Droop", "Line drop compensation"))
 STABILISER = AskedFact("Stabiliser", ("Stabilizer", "PSS"))
+GOVERNOR = AskedFact("Governor", ("Governor control",))
+TURBINE = AskedFact("Turbine", ("Turbine type",))
+LOAD_CONTROL = AskedFact("Load control", ("Outer loop control",))
 PLANNER = AskedFact("Planner's base", ("Planner",))
 DATE = AskedFact("Test date", ("Date",))
 TESTED = AskedFact("Tested by", ("Tester",))
@@ -46,9 +49,9 @@ REPORTED = AskedFact("Report date")
 CHANGES = AskedFact("Revision note", ("Changes",))
 
 ASKED = (
-    PLANT, UNIT, RATED, MAKER, MODEL, TYPE, REGULATOR, COMPENSATION, STABILISER, PLANNER, DATE,
-    TESTED, INSTRUMENTS, RECORDER, STATE, TAP, SPEED, WRITTEN, CHECKED, APPROVED, REVISION,
-    REPORTED, CHANGES,
+    PLANT, UNIT, RATED, MAKER, MODEL, TYPE, REGULATOR, COMPENSATION, STABILISER, GOVERNOR,
+    TURBINE, LOAD_CONTROL, PLANNER, DATE, TESTED, INSTRUMENTS, RECORDER, STATE, TAP, SPEED,
+    WRITTEN, CHECKED, APPROVED, REVISION, REPORTED, CHANGES,
 )  # fmt: skip
 
 

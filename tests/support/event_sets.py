@@ -25,17 +25,21 @@ LENGTHS = (60.0, 40.0, 30.0)  # s
 REST = 5.0  # s
 
 
-def frequency_course(seconds, size, swing, damping, fall, recovery):
-    """Return instants (s) and angle (degrees) of a grid: a swing on a frequency that dips."""
-    fine = np.arange(REST, min(REST + 12.0, seconds), 1.0 / 60.0)
-    time = np.concatenate([[0.0], fine, np.arange(fine[-1] + 0.2, seconds, 0.2), [seconds]])
+def angle_at(time, size, swing, damping, fall, recovery):
+    """Return the angle (degrees) of a grid at times (s): a swing on a frequency that dips."""
     after = np.maximum(time - REST, 0.0)
     begun = 1.0 - np.exp(-((after / 0.15) ** 2))  # a PMU filters what jumps
     lost = after - 2.0 * (1.0 - np.exp(-after / 2.0))  # integrals of the two exponentials
     regained = after - 12.0 * (1.0 - np.exp(-after / 12.0))
     angle = 360.0 * fall * (recovery * regained - lost)
-    angle += begun * size * np.exp(-damping * after) * np.sin(2.0 * np.pi * swing * after)
-    return time, angle
+    return angle + begun * size * np.exp(-damping * after) * np.sin(2.0 * np.pi * swing * after)
+
+
+def frequency_course(seconds, *course):
+    """Return instants (s) of a table of a grid's angle, and the angle there (degrees)."""
+    fine = np.arange(REST, min(REST + 12.0, seconds), 1.0 / 60.0)
+    time = np.concatenate([[0.0], fine, np.arange(fine[-1] + 0.2, seconds, 0.2), [seconds]])
+    return time, angle_at(time, *course)
 
 
 COURSES = (

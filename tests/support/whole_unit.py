@@ -33,9 +33,9 @@ TESTS = {  # seconds, channels, start (vt, E, R, X, P), changes of vref, pref, f
 }  # fmt: skip
 
 
-def record(name, unit, rng):
+def record(test, unit, rng):
     """Return the samples of a test by channel, with time."""
-    seconds, channels, start, moves = TESTS[name]
+    seconds, channels, start, moves = test
     time = np.arange(0.0, seconds + 1e-9, 1.0 / SAMPLES)
     x0, vref, pref = unit.start(*start)
     E, R, X = start[1:4]
@@ -64,16 +64,19 @@ def record(name, unit, rng):
     return columns
 
 
+def save(path, columns):
+    """Write columns as a recorder of 16 bits does, by its digits."""
+    form = ["%.2f", *["%.5f"] * (len(columns) - 1)]
+    header = ",".join(columns)
+    np.savetxt(path, np.transpose([*columns.values()]), form, ",", header=header, comments="")
+
+
 def write(folder):
     """Write the record of each test to a file of a folder."""
     rng = np.random.default_rng(2026)
     unit = TypedUnit("GENSAL", MACHINE, EXCITER, "HYGOV", GOVERNOR)
-    for name in TESTS:
-        columns = record(name, unit, rng)
-        path = folder / f"hydro_unit_{name}.csv"
-        table = np.transpose([*columns.values()])
-        form = ["%.2f", *["%.5f"] * (len(columns) - 1)]
-        np.savetxt(path, table, form, ",", header=",".join(columns), comments="")
+    for name, test in TESTS.items():
+        save(folder / f"hydro_unit_{name}.csv", record(test, unit, rng))
 
 
 if __name__ == "__main__":

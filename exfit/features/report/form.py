@@ -72,13 +72,14 @@ class FormRow(NamedTuple):
 class FormAnswers(NamedTuple):
     """What the rows of the form have from a fit or a programme, facts of the case aside.
 
-    ``machine`` are its values by symbol, ``source_of`` says where the value of a name is from,
-    ``excursions`` how far the frequency departed in grid events, if there were any.
+    ``machine`` and ``governor`` are their values by symbol, ``source_of`` says where the value of
+    a name is from, ``excursions`` how far the frequency departed in grid events, if there were any.
     """
 
     responses: str
     parts: tuple[PartDescription, ...]
     machine: Mapping[str, float]
+    governor: Mapping[str, float]
     source_of: Callable[[str], str]
     excitation: str
     before: str
@@ -94,6 +95,16 @@ class FormAnswers(NamedTuple):
         """Name the model of a part of a kind, or say what is ``missing``."""
         part = self.part(kind)
         return missing if part is None else f"{part.name}, {part.title}"
+
+    def data(self, prefix: str, values: Mapping[str, float]) -> str:
+        """List values of a part by symbol, each with its source."""
+        sources = {symbol: self.source_of(prefix + symbol) for symbol in values}
+        texts = (
+            f"{', '.join(f'{symbol} {rounded(values[symbol])}' for symbol in group)} "
+            f"({_source(word)})"
+            for word, group in by_source([*values], sources).items()
+        )
+        return "; ".join(texts) or f"{NOT_STATED}: the model has none"
 
 
 def form_table(rows: Sequence[FormRow]) -> Iterator[Block]:
@@ -131,6 +142,7 @@ def form(result: Reported) -> tuple[FormRow, ...]:
         responses=_responses(result),
         parts=result.parts,
         machine=result.values_of("machine."),
+        governor=result.values_of("governor."),
         source_of=result.source_of,
         excitation=f"{NOT_STATED}: the case has the machine alone",
         before=before,
@@ -188,6 +200,7 @@ def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
         responses=silent,
         parts=unit.parts,
         machine=values_of_part(unit.values, "machine."),
+        governor=values_of_part(unit.values, "governor."),
         source_of=lambda name: unit.sources.get(name, NOT_STATED),
         excitation=silent,
         before=silent,
@@ -222,7 +235,7 @@ def _rows(about: facts.Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
         FormRow("R2.1.4", "Model in the planner's base", answers.before, "as-found"),
         FormRow("R2.1.5", "Compensation (droop, line drop)", answers.compensation),
         FormRow("R2.1.6", "Stabiliser", stabiliser or NOT_IN_MODEL, "parameters"),
-        *_governor(answers),
+        *_governor(about, answers),
         *(FormRow("R6", name, text, "flat") for name, text in usable),
         *(_fact(about, "", fact, "test") for fact in TESTS),
         *(FormRow("", asked, answer(about, key), "test") for asked, key in ambient.items()),
@@ -242,22 +255,20 @@ def _excitation_type(about: facts.Facts, answers: FormAnswers) -> str:
 def _generator(answers: FormAnswers) -> Iterator[FormRow]:
     """Yield the rows of each kind of data of the generator, with their sources."""
     for letter, asked in MACHINE_DATA.items():
-        symbols = [symbol for symbol in answers.machine if symbol.startswith(letter)]
-        sources = {symbol: answers.source_of(f"machine.{symbol}") for symbol in symbols}
-        texts = (
-            f"{', '.join(f'{symbol} {rounded(answers.machine[symbol])}' for symbol in group)} "
-            f"({_source(word)})"
-            for word, group in by_source(symbols, sources).items()
-        )
-        data = "; ".join(texts) or f"{NOT_STATED}: the model has none"
-        yield FormRow("R2.1.3", asked, data, "parameters")
+        own = {k: value for k, value in answers.machine.items() if k.startswith(letter)}
+        yield FormRow("R2.1.3", asked, answers.data("machine.", own), "parameters")
 
 
-def _governor(answers: FormAnswers) -> Iterator[FormRow]:
+def _governor(about: facts.Facts, answers: FormAnswers) -> Iterator[FormRow]:
     """Yield the rows on a governor where a grid event was played in, or the unit has one."""
     if answers.excursions or answers.part("governor") is not None:
         model = answers.model("governor", CONSTANT_POWER)
         yield FormRow("MOD-027-1 R2", "Turbine governor and load control", model, "parameters")
+    if answers.part("governor") is not None:
+        for fact in (facts.GOVERNOR, facts.TURBINE, facts.LOAD_CONTROL):
+            yield _fact(about, "MOD-027-1 R2", fact)
+        data = answers.data("governor.", answers.governor)
+        yield FormRow("MOD-027-1 R2", "Data of turbine and governor", data, "parameters")
     if answers.excursions:
         yield FormRow("", "Recorded disturbances, from rest", answers.excursions, "fit")
 

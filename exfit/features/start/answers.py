@@ -74,6 +74,7 @@ class Answers(Section):
     id: Annotated[MachineId, BeforeValidator(_as_text)] | None = None
     model: Text | None = None  # of the exciter
     machine_model: Text | None = None
+    governor: Text | None = None  # its model, where it is tested
     machine_from: Text | None = None  # another case, whose generator is taken
     machine: Values = NONE  # data of the generator that are not typical
     exciter: Values = NONE  # data of the exciter that are not typical
@@ -165,5 +166,7 @@ def contradictions(answers: Answers) -> Iterator[str]:
         yield "--step: not allowed with --tests, which has a column step."
     if answers.machine_model and (answers.dyr or answers.machine_from):
         yield "--machine: not allowed with --dyr or --machine-from."
+    if answers.governor and answers.dyr:
+        yield "--governor: not allowed with --dyr, which has that of the unit."
     if not answers.dyr and (answers.bus is not None or answers.id is not None):
         yield "--bus and --id: only with --dyr."

@@ -82,11 +82,17 @@ answers_option = click.option(
     shell_complete=completion.machines,
 )
 @click.option(
+    "--governor",
+    metavar="NAME",
+    help="Governor, of a record of one of its tests.",
+    shell_complete=completion.governors,
+)
+@click.option(
     "--record",
     "file",
     type=GivenFile(Kind.RECORD),
     metavar="FILE",
-    help="Record of bump tests, or of a grid event by a PMU.",
+    help="Record of bump tests, of a grid event by a PMU, or of a test of the governor.",
 )
 @steps_option
 @click.option(
@@ -121,6 +127,7 @@ answers_option = click.option(
 def new(
     model: str | None,
     machine: str | None,
+    governor: str | None,
     file: Path | None,
     sizes: tuple[str, ...],
     table: Path | None,
@@ -147,6 +154,7 @@ def new(
     found, and most propose one. Ctrl-C keeps the answers.
 
     The file of a phasor measurement unit is a grid event, which is played back into the unit.
+    In a test of the governor, which inspect knows by the gate, the governor is fitted.
     Of several tests in a record, each is a record of the case with a window; the first is fitted,
     the second validates, and so on. Values are typical, or those of a planner's file. Without a
     terminal, what the record does not show is left as "?", and the case is refused until it is
@@ -157,10 +165,11 @@ def new(
     from exfit.features.start.starting_tests import sizes_of
 
     options = {
-        "model": model, "machine_model": machine, "record": file, "step": sizes_of(sizes),
-        "tests": table, "base": bases_by_signal(bases), "kv": kv, "mva": mva, "dyr": dyr,
-        "bus": bus, "id": machine_id, "machine_from": machine_from, "about": facts_by_name(facts),
-        "time": clock, "time_unit": unit, "sheet": sheet, "memory": memory, "output": output,
+        "model": model, "machine_model": machine, "governor": governor, "record": file,
+        "step": sizes_of(sizes), "tests": table, "base": bases_by_signal(bases), "kv": kv,
+        "mva": mva, "dyr": dyr, "bus": bus, "id": machine_id, "machine_from": machine_from,
+        "about": facts_by_name(facts), "time": clock, "time_unit": unit, "sheet": sheet,
+        "memory": memory, "output": output,
     }  # fmt: skip
     given, read = merged(answers_file, options), dict[Path, Any]()
     for text in contradictions(checked(given)):

@@ -21,6 +21,7 @@ from exfit.features.start.starting_case import (
 )
 from exfit.features.start.starting_tests import StartingTest, doubtful_bases, starting_tests
 from exfit.features.start.tables import read_test_table, tests_of_table
+from exfit.models import GOVERNORS
 from exfit.models.sheet import Parameter
 from exfit.plants import KINDS
 from exfit.records.inspection import Inspection
@@ -68,6 +69,8 @@ def new_case(answers: Answers, folder: Path, read: Inspections) -> NewCase:
         planner = unit_data(imported, relative(Path(answers.dyr), folder))
     model = answers.model or (None if planner else ANY_MODEL)
     unit = unit_with(model, answers.machine_model, planner, folder)
+    if answers.governor is not None:
+        unit = replace(unit, added={**unit.added, "governor": _governor(answers.governor)})
     machine, exciter = unit.machine, unit.exciter
     if answers.machine_from is not None:
         machine = machine_of_case(Path(answers.machine_from))
@@ -129,6 +132,14 @@ def tests_of_answers(answers: Answers, read: Inspections) -> tuple[StartingTest,
             raise ExfitError(f"{row.place}: file: missing, and no --record is given")
     files = dict.fromkeys(row.file for row in rows if row.file is not None)
     return tests_of_table(rows, {path: inspected(answers, path, read) for path in files}, bases)
+
+
+def _governor(name: str) -> PartData:
+    """Return a governor with typical data; raises ExfitError for a name that is none."""
+    symbol = name.upper()
+    if symbol not in GOVERNORS:
+        raise ExfitError(f"governor: {name}: no governor of exfit; {near(symbol, GOVERNORS)}")
+    return PartData.typical(GOVERNORS[symbol])
 
 
 def _with_values(

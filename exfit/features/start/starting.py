@@ -23,6 +23,7 @@ def new(
     kv: float | None = None,
     mva: float | None = None,
     base: Mapping[str, str] | None = None,
+    governor: str | None = None,
     machine: Mapping[str, float] | None = None,
     exciter: Mapping[str, float] | None = None,
     sources: str | Mapping[str, str] | None = None,
@@ -41,6 +42,7 @@ def new(
         kv: rated voltage, line to line, kV; needed where the record is in V or kV.
         mva: rated power, MVA; needed where power is recorded in MW.
         base: value of 1 pu of other signals, with its unit, ``{"ifd": "550A"}``.
+        governor: its model, of a record of one of its tests.
         machine, exciter: data that are not typical, by their symbols, in the units of
             ``exfit models``: s and pu of the machine's base.
         sources: where these are from, "maker" for all of them or a word each.
@@ -61,8 +63,8 @@ def new(
         raise ExfitError("model: missing; or give dyr, a planner's file with the unit")
     given = {
         "record": record, "model": model, "dyr": dyr, "bus": bus, "id": id, "step": step, "kv": kv,
-        "mva": mva, "base": base, "machine": machine, "exciter": exciter, "sources": sources,
-        "validate": [str(file) for file in validate], "about": about,
+        "mva": mva, "base": base, "governor": governor, "machine": machine, "exciter": exciter,
+        "sources": sources, "validate": [str(file) for file in validate], "about": about,
     }  # fmt: skip
     stated = {
         key: str(value) if isinstance(value, PathLike) else value

@@ -41,7 +41,7 @@ from exfit.features.start.starting_tests import (
 from exfit.features.start.tables import CaseOfTable, TableRow, tests_of_table
 from exfit.models import find
 from exfit.models.machines import Machine, find_machine
-from exfit.models.sheet import Model, typical
+from exfit.models.sheet import Model, Parameter, typical
 from exfit.plants import MACHINE
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.open_circuit import OPEN_CIRCUIT
@@ -51,6 +51,7 @@ from exfit.records.recorded_tests import tests_of
 from exfit.util.text import first_texts
 from exfit.util.vocabulary import TYPICAL
 
+DROOPS = ("R", "r")  # of a governor, permanent and temporary
 SOME_TEST = {"vref": [{"at": 0.1, "step": 0.01}], "duration": 1.0}  # in place of a record's
 
 VALIDATION_TO_COME = Remark("""\
@@ -167,15 +168,19 @@ def starting_case(
     recordings, validations = (
         _events(tests, names) if event else _bump_tests(tests, names, unit.exciter.model.name)
     )
+    added = {key: added_section(part) for key, part in unit.added.items()}
+    of_governor = first.inspection.of_governor
+    if of_governor:
+        added["governor"] = _governor(unit, event)
     sections: Section = {
         **({"about": about} if about else {FACTS_TO_COME: None}),
         "model": unit.name,
         **({"efd_times_speed": True} if unit.exciter.times_speed else {}),
         "plant": _plant(unit, first.inspection, event),
-        **{key: added_section(part) for key, part in unit.added.items()},
+        **added,
         **({"limiters": [*map(added_section, unit.limiters)]} if unit.limiters else {}),
         **recordings,
-        "parameters": _parameters(unit.exciter),
+        "parameters": _parameters(unit.exciter, of_governor),
         **weights_section(first.inspection),
         **validations,
         **({"as_found": unit.as_found} if unit.as_found else {}),
@@ -224,16 +229,19 @@ def _heading(unit: UnitData, tests: Sequence[StartingTest]) -> tuple[str, ...]:
 
 
 def _events(tests: Sequence[StartingTest], names: Mapping[Path, str]) -> tuple[Section, Section]:
-    """Make the sections of grid events: the first, or every other one, is fitted."""
-    records = [
-        suggested_event(test.inspection, names[test.inspection.path], test.bases)["record"]
-        for test in tests
+    """Make the sections of grid events, or tests of a governor; the case has the first's plant."""
+    suggested = [
+        suggested_event(test.inspection, names[test.inspection.path], test.bases) for test in tests
     ]
+    kept = ("test", "record")
+    entries: list[Section] = [{k: own[k] for k in own if k in kept} for own in suggested]
     if len(tests) == 1:
-        return {"record": records[0]}, {}
+        return entries[0], {}
+    for own, entry in zip(suggested, entries, strict=True):
+        if own["plant"]["type"].value != suggested[0]["plant"]["type"].value:
+            entry["plant"] = own["plant"]
     return _recordings(
-        (test, {"name": test.name, "record": record})
-        for test, record in zip(tests, records, strict=True)
+        (test, {"name": test.name, **entry}) for test, entry in zip(tests, entries, strict=True)
     )
 
 
@@ -281,6 +289,11 @@ def _bump_tests(
 def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
     of_psse = [part.model.name for part in unit.added.values() if differs_in_psse(part.model)]
     dialect = {"dialect": Noted("psse", f"{' '.join(of_psse)} as in PSS/E")} if of_psse else {}
+    if inspection.of_governor:
+        plant = {**event["plant"], **dialect}
+        if "network" not in plant:
+            return plant
+        return with_sources({**plant, **_machine(unit.machine)}, unit.machine.sources)
     if event:
         plant = {**event["plant"], **dialect, **_machine(unit.machine)}
         return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, "X": TYPICAL})
@@ -331,9 +344,36 @@ def _machine(machine: PartData) -> Section:
     return {"machine": Noted(model.name, machine.origin or model.title), "parameters": values}
 
 
-def _parameters(exciter: PartData) -> Section:
+def _governor(unit: UnitData, suggested: Section) -> Section:
+    """Make the section of the governor that a test is fitted for."""
+    if "governor" not in unit.added:
+        return dict(suggested["governor"])
+    part = unit.added["governor"]
+    rows = [*free_of(part.model, part.values)]
+    rows += [row for row in part.model.sheet if row.symbol in DROOPS]
+    section = added_section(part)
+    section["parameters"] = {
+        row.symbol: parameter(row, part.values[row.symbol])
+        for row in part.model.sheet
+        if row not in rows
+    }
+    free = Noted(_starts(rows, part.values), "move to parameters what the record does not show")
+    return {**section, "free": free}
+
+
+def _starts(rows: Iterable[Parameter], values: Mapping[str, float]) -> Section:
+    starts: Section = {}
+    for row in rows:
+        numbers = (values[row.symbol], *bounds_of(row, values[row.symbol]))
+        short = (float(f"{number:.6g}") for number in numbers)
+        bounds = dict(zip(("start", "min", "max"), short, strict=True))
+        starts[row.symbol] = Noted(bounds, above=f"{row.unit}, {row.meaning}")
+    return starts
+
+
+def _parameters(exciter: PartData, of_governor: bool = False) -> Section:
     model, values = exciter.model, exciter.values
-    free = free_of(model, values)
+    free = () if of_governor else free_of(model, values)
     section: Section = {}
     fixed = {
         row.symbol: parameter(row, values[row.symbol]) for row in model.sheet if row not in free
@@ -341,13 +381,7 @@ def _parameters(exciter: PartData) -> Section:
     if fixed:
         section["fixed"] = Noted(fixed, "stays as it is; move to free what a fit is to find")
     if free:
-        starts = {}
-        for row in free:
-            numbers = (values[row.symbol], *bounds_of(row, values[row.symbol]))
-            short = (float(f"{number:.6g}") for number in numbers)
-            bounds = dict(zip(("start", "min", "max"), short, strict=True))
-            starts[row.symbol] = Noted(bounds, above=f"{row.unit}, {row.meaning}")
-        section["free"] = Noted(starts, "found between bounds about where it starts")
+        section["free"] = Noted(_starts(free, values), "found between bounds about where it starts")
     sources = {name: word for name, word in exciter.sources.items() if name in fixed}
     return with_sources(section, sources)
 

@@ -64,7 +64,7 @@ def starting_tests(
                 f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
                 "sections of a case that exfit simulate takes"
             )
-    if any(inspection.is_event for inspection in every):
+    if any(map(_drives, every)):
         return _events(every, len(inspections), sizes, given)
     _refuse_rejections(every)
     if len(every) == 1 and (every[0].opening or not tests_of(inspections[0])):
@@ -108,29 +108,35 @@ def _bases_for(inspection: Inspection, bases: Mapping[str, Base]) -> dict[str, B
     return {s: base for s, base in bases.items() if s not in per_unit or base.unit == "pu"}
 
 
+def _drives(inspection: Inspection) -> bool:
+    return inspection.is_event or inspection.of_governor
+
+
 def _events(
     inspections: Sequence[Inspection],
     alternate: int,
     sizes: Mapping[str, float],
     bases: Mapping[str, Base],
 ) -> tuple[StartingTest, ...]:
-    """Return the grid events that phasor measurement units recorded, one a record.
+    """Return the grid events that measurement units recorded, or tests of a governor, one a record.
 
     Of the first ``alternate`` each second one validates, of the others all.
 
     Raises ExfitError for sizes of steps, and for a record of another kind beside them.
     """
     _refuse_unused(sizes, [])
+    first = next(inspection for inspection in inspections if _drives(inspection))
     for inspection in inspections:
-        if not inspection.is_event:
+        if inspection.is_event != first.is_event or not _drives(inspection):
             raise ExfitError(
-                f"{inspection.path}: no angle of a grid event, which the other records have: give "
-                "bump tests a case of their own"
+                f"{inspection.path}: a {inspection.kind.name}, {first.path.name} a "
+                f"{first.kind.name}: give each kind a case of its own"
             )
     single = len(inspections) == 1
+    name = "event" if first.is_event else "governor"
     return tuple(
         StartingTest(
-            "fit" if single else f"event{k}",
+            "fit" if single else f"{name}{k}",
             inspection,
             (),
             bases=bases,

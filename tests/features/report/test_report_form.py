@@ -60,7 +60,8 @@ def answers(result):
 def test_every_row_of_the_form_is_filled_or_not_stated(name, tmp_path):
     result = workflows.fit(case_of(config(name), tmp_path))
     rows = form(result)
-    assert len(rows) == 32 + (2 if name in EVENTS else 0)
+    governed = any(part.kind == "governor" for part in result.parts)
+    assert len(rows) == 32 + (2 if name in EVENTS else 0) + (4 if governed else 0)
     assert all(row.answer.strip() and "nan" not in row.answer for row in rows)
     sections = {section.key for section in result_page(result, tmp_path).sections}
     assert all(row.section in sections for row in rows if row.section)

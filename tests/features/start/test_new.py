@@ -14,7 +14,9 @@ from exfit.case.case_draft import LONGEST
 from exfit.case.load import load_case
 from exfit.case.other_model import bounds_of, free_of
 from exfit.case.stated_values import taken_apart
-from exfit.errors import CaseError
+from exfit.errors import CaseError, ExfitError
+from exfit.features.start.answers import checked
+from exfit.features.start.making import new_case
 from exfit.features.start.starting_case import PartData, UnitData, starting_case
 from exfit.features.start.starting_tests import starting_tests
 from exfit.fitting.build import build_experiments
@@ -222,3 +224,19 @@ def test_a_field_voltage_that_rests_where_the_model_does_not_is_noted(tmp_path):
         assert ("efd: rests at 0.373" in notes) == (scale != 1.0)
         assert ("the machine with the breaker open at 0.95 to 1.6 pu" in notes) == (scale != 1.0)
         assert max(map(len, text.splitlines())) <= 100
+
+
+def test_a_record_of_a_governors_test_becomes_a_case_that_fits_the_governor(tmp_path):
+    answers = {"plant.network.f0": 60, "plant.network.YQ": -0.15, "test.vt0": 1.0}
+    given = {"record": str(SAMPLES / "hydro_unit_load.csv"), "model": "SEXS", "open": answers}
+    made = new_case(checked({**given, "governor": "hygov"}), tmp_path, {})
+    assert made.open == ()
+    path = tmp_path / "case.yaml"
+    path.write_text(made.draft.text, encoding="utf-8")
+    case = load_case(path)
+    assert case.kind.name == "isolated"
+    assert {"governor.R", "governor.r", "governor.Tr", "governor.TW"} <= set(case.free())
+    assert all(name.startswith("governor.") for name in case.free())
+    assert {*case.record.channels} == {"p", "speed", "gate"}
+    with pytest.raises(ExfitError, match="governor: HYGOVX: no governor of exfit"):
+        new_case(checked({**given, "governor": "HYGOVX"}), tmp_path, {})
