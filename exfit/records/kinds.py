@@ -77,6 +77,17 @@ def _of_governor(record: "Inspection", signals: Mapping[str, Array]) -> KindOfTe
     turning = next((each for each in ("speed", "frequency") if each in signals), None)
     if step is None or turning is None or "p" not in signals:
         return None
+    return _by_gate(record, signals, names, step, turning)
+
+
+def _by_gate(
+    record: "Inspection",
+    signals: Mapping[str, Array],
+    names: Mapping[str, str],
+    step: "RecordedStep",
+    turning: str,
+) -> KindOfTest:
+    """Tell what moves a gate: its reference, a load that steps, or the speed of a grid."""
     gate, speed, power = names["gate"], names[turning], names["p"]
     moved = _range_pu(signals[turning])
     if moved < OF_GRID:

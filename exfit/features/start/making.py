@@ -69,8 +69,7 @@ def new_case(answers: Answers, folder: Path, read: Inspections) -> NewCase:
         planner = unit_data(imported, relative(Path(answers.dyr), folder))
     model = answers.model or (None if planner else ANY_MODEL)
     unit = unit_with(model, answers.machine_model, planner, folder)
-    if answers.governor is not None:
-        unit = replace(unit, added={**unit.added, "governor": _governor(answers.governor)})
+    unit = replace(unit, added={**unit.added, **_governor(answers.governor)})
     machine, exciter = unit.machine, unit.exciter
     if answers.machine_from is not None:
         machine = machine_of_case(Path(answers.machine_from))
@@ -134,12 +133,14 @@ def tests_of_answers(answers: Answers, read: Inspections) -> tuple[StartingTest,
     return tests_of_table(rows, {path: inspected(answers, path, read) for path in files}, bases)
 
 
-def _governor(name: str) -> PartData:
-    """Return a governor with typical data; raises ExfitError for a name that is none."""
+def _governor(name: str | None) -> dict[str, PartData]:
+    """Return a governor with typical data under its key; raises ExfitError for an unknown one."""
+    if name is None:
+        return {}
     symbol = name.upper()
     if symbol not in GOVERNORS:
         raise ExfitError(f"governor: {name}: no governor of exfit; {near(symbol, GOVERNORS)}")
-    return PartData.typical(GOVERNORS[symbol])
+    return {"governor": PartData.typical(GOVERNORS[symbol])}
 
 
 def _with_values(

@@ -289,14 +289,8 @@ def _bump_tests(
 def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
     of_psse = [part.model.name for part in unit.added.values() if differs_in_psse(part.model)]
     dialect = {"dialect": Noted("psse", f"{' '.join(of_psse)} as in PSS/E")} if of_psse else {}
-    if inspection.of_governor:
-        plant = {**event["plant"], **dialect}
-        if "network" not in plant:
-            return plant
-        return with_sources({**plant, **_machine(unit.machine)}, unit.machine.sources)
     if event:
-        plant = {**event["plant"], **dialect, **_machine(unit.machine)}
-        return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, "X": TYPICAL})
+        return _suggested_plant(unit, inspection, {**event["plant"], **dialect})
     if unit.exciter.model.name == ALONE:
         return {"type": "none"}
     power, opening = inspection.channel_of("p"), inspection.opening
@@ -323,6 +317,16 @@ def _plant(unit: UnitData, inspection: Inspection, event: Section) -> Section:
         **_machine(unit.machine),
     }
     return with_sources(plant, {**unit.machine.sources, "R": TYPICAL, **measured})
+
+
+def _suggested_plant(unit: UnitData, inspection: Inspection, plant: Section) -> Section:
+    """Add the machine to the plant of an event or of a test of the governor, where it has one."""
+    if not inspection.of_governor:
+        sources = {**unit.machine.sources, "R": TYPICAL, "X": TYPICAL}
+        return with_sources({**plant, **_machine(unit.machine)}, sources)
+    if "network" not in plant:
+        return plant
+    return with_sources({**plant, **_machine(unit.machine)}, unit.machine.sources)
 
 
 def _open_circuit(unit: UnitData, inspection: Inspection) -> Section:
