@@ -57,7 +57,7 @@ class Robust(NamedTuple):
 
 SHORT_RUNS = 5000  # steps, of the simulations of all records together
 WORK_OF_PROFILES = 2e8  # steps of a Jacobian, times its directions: about twenty seconds
-LEAST_OF_SIDE = 15  # iterations: most sides take four to twelve
+LEAST_ITERATIONS = 15  # most sides take four to twelve
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,12 +112,15 @@ class Residuals:
         alone = all(test.responder is None for test in tests)
         return 1 if alone and sum(test.steps for test in tests) <= SHORT_RUNS else None
 
+    def iterations_within(self, work: float, searches: int) -> float:
+        """Return how many iterations some searches may take: so many in steps times directions."""
+        steps = sum(experiment.simulator.steps for experiment in self.experiments)
+        return max(LEAST_ITERATIONS, work / (searches * steps * (1 + len(self.free))))
+
     def iterations_of_side(self, profiles: int) -> int:
         """Return how many iterations a side of some profiles may take: fewer of long records."""
-        steps = sum(experiment.simulator.steps for experiment in self.experiments)
-        of_one = 2 * profiles * steps * (1 + len(self.free))
         share = self.iterations / MOST_ITERATIONS
-        usual = min(MOST_ITERATIONS, max(LEAST_OF_SIDE, WORK_OF_PROFILES / of_one))
+        usual = min(MOST_ITERATIONS, self.iterations_within(WORK_OF_PROFILES, 2 * profiles))
         return round(max(1.0, share) * usual)
 
     @property
