@@ -90,7 +90,7 @@ class Scenario(NamedTuple):
     def simulator(self, step, located=False):
         """Return the simulator on a grid; with ``located`` crossings are located within steps."""
         more = {"located": True} if located else {}
-        return Simulator(self.system, self.inputs, self.times, step, **more)
+        return Simulator(self.system, self.inputs, self.times, step, memory=np.inf, **more)
 
     @property
     def test_key(self) -> str:
