@@ -5,8 +5,11 @@ from dataclasses import dataclass, field, replace
 from math import copysign
 from types import MappingProxyType
 
+import numpy as np
+
 from exfit.case.schema import SINGLE
 from exfit.case.suggestion import Base
+from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.errors import ExfitError, FileError
 from exfit.records.contradictions import (
     LARGEST_STEP,
@@ -15,6 +18,7 @@ from exfit.records.contradictions import (
     size_in_words,
 )
 from exfit.records.inspection import Inspection
+from exfit.records.phasors import in_radians
 from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
 from exfit.records.rejection import REMEDY, BreakerOpening
 from exfit.records.steps import RecordedStep
@@ -48,9 +52,10 @@ def starting_tests(
 ) -> tuple[StartingTest, ...]:
     """Return the tests of records: every other one, from the second on, validates.
 
-    All tests of the ``validating`` records validate. ``sizes`` (pu) are by a word in the names of
-    their tests, such as up, or all; they are amounts, or have the sign of the step. Of a single
-    record without steps, or of a load rejection, it is one test.
+    Of grid events it is the half that shows least. All tests of the ``validating`` records do.
+    ``sizes`` (pu) are by a word in the names of their tests, such as up, or all; they are amounts,
+    or have the sign of the step. Of a single record without steps, or of a load rejection, it is
+    one test.
 
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
     for a record in which the breaker opens beside other tests, for one of several that shows no
@@ -120,7 +125,8 @@ def _events(
 ) -> tuple[StartingTest, ...]:
     """Return the grid events that measurement units recorded, or tests of a governor, one a record.
 
-    Of the first ``alternate`` each second one validates, of the others all.
+    Of the first ``alternate`` the half whose Q moves least above its noise validates, of the others
+    all: an event that shows little determines little of what a larger one needs.
 
     Raises ExfitError for sizes of steps, and for a record of another kind beside them.
     """
@@ -137,13 +143,38 @@ def _events(
     return tuple(
         StartingTest(
             "fit" if single else f"{name}{k}",
+    shown = [_shown(inspection) for inspection in inspections[:alternate]]
+    weakest = sorted(range(alternate), key=lambda k: (shown[k], k % 2 == 0))[: alternate // 2]
+    return tuple(
+        StartingTest(
+            "fit" if single else f"event{k + 1}",
             inspection,
             (),
             bases=bases,
-            validates=k % 2 == 0 or k > alternate,
+            validates=k in weakest or k >= alternate,
         )
-        for k, inspection in enumerate(inspections, 1)
+        for k, inspection in enumerate(inspections)
     )
+
+
+def _shown(inspection: Inspection) -> float:
+    """Return by how many times its noise the reactive power of a grid event moves, 0 if unknown."""
+    channel, pmu, samples = inspection.channel_of("q"), inspection.pmu, inspection.samples
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if channel is not None:
+            q = samples[channel.name]
+        elif pmu is not None and pmu.current is not None:
+            phasors = [
+                samples[each.magnitudes[0]]
+                * np.exp(1j * in_radians(samples[each.angles[0]], each.angle_unit or "deg"))
+                for each in (pmu.voltage, pmu.current)
+            ]
+            q = (phasors[0] * np.conj(phasors[1])).imag
+        else:
+            return 0.0
+        q = q[np.isfinite(q)]
+        shown = np.std(q) / noise(q) if len(q) > NEIGHBOURS else 0.0
+    return float(shown) if np.isfinite(shown) else 0.0
 
 
 def _amounts(

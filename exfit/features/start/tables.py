@@ -173,8 +173,9 @@ def tests_of_table(
 ) -> tuple[StartingTest, ...]:
     """Return the tests that rows name, whose files are all inspected, in order of the rows.
 
-    Where no row says which tests validate, every other one does. Raises ExfitError where a record
-    shows no step at the instant of a row, and for an instant or a size of a grid event.
+    Where no row says which tests validate, it is as `starting_tests` has it. Raises ExfitError
+    where a record shows no step at the instant of a row, and for an instant or a size of a grid
+    event.
     """
     alternate = all(row.validates is None for row in rows)
     files = [row.file for row in rows if row.file is not None]
@@ -188,6 +189,7 @@ def tests_of_table(
         own = bases if row.base is None else {**bases, "vt": row.base}
         validates = k % 2 == 1 if alternate else bool(row.validates)
         if event is not None:
+            validates = event.validates if alternate else validates
             tests.append(replace(event, bases=own, validates=validates))
             continue
         test = _nearest(row, tests_of(inspection))

@@ -26,9 +26,16 @@ def workplace(empty_folder):
     return empty_folder
 
 
-def event(kv=KV, angle="V Angle (deg)", power=True, frequency="Freq (Hz)", name="9_1.csv"):
-    """Write the record of a swing of the unit at bus 9, its voltage at a side with this kV."""
+def event(
+    kv=KV, angle="V Angle (deg)", power=True, frequency="Freq (Hz)", name="9_1.csv", share=1.0
+):
+    """Write the record of a swing of the unit at bus 9, its voltage at a side with this kV.
+
+    Q moves by a share of its swing, with noise.
+    """
     course = smooth_course()
+    noise = 1e-5 * np.random.default_rng(9).standard_normal(len(course.time))
+    course = course.with_(q=course.q[0] + share * (course.q - course.q[0]) + noise)
     voltage, current = phasors_of(course, kv)
     columns = {
         "Time (UTC)": stamps(course.time),
@@ -219,6 +226,16 @@ def test_a_table_may_list_several_events_of_a_unit(run, validates, fitted):
     case = load_case(imported(run, "--raw", "net.raw", records="records/table.csv"))
     assert [recording.name for recording in case.recordings] == fitted
     assert len(case.validations) == 3 - len(fitted)
+
+
+@pytest.mark.parametrize(
+    ("shares", "validating"), [((0.3, 1.0), "9_1.csv"), ((1.0, 0.3), "9_1-b.csv")]
+)
+def test_of_two_events_the_one_in_which_q_moves_less_validates(run, shares, validating):
+    for name, share in zip(("9_1.csv", "9_1-b.csv"), shares, strict=True):
+        event(name=name, share=share)
+    case = load_case(imported(run, "--kv", KV, "--mva", MVA))
+    assert [Path(each.record.file).name for each in case.validations] == [validating]
 
 
 def test_an_instant_of_an_event_and_an_event_twice_are_refused(run):
