@@ -125,8 +125,9 @@ def _events(
 ) -> tuple[StartingTest, ...]:
     """Return the grid events that measurement units recorded, or tests of a governor, one a record.
 
-    Of the first ``alternate`` the half whose Q moves least above its noise validates, of the others
-    all: an event that shows little determines little of what a larger one needs.
+    Of the first ``alternate`` events the half whose Q moves least above its noise validates: an
+    event that shows little determines little of what a larger one needs. Of tests of a governor it
+    is each second one. All others validate.
 
     Raises ExfitError for sizes of steps, and for a record of another kind beside them.
     """
@@ -140,14 +141,11 @@ def _events(
             )
     single = len(inspections) == 1
     name = "event" if first.is_event else "governor"
-    return tuple(
-        StartingTest(
-            "fit" if single else f"{name}{k}",
-    shown = [_shown(inspection) for inspection in inspections[:alternate]]
+    shown = [_shown(each) if each.is_event else 0.0 for each in inspections[:alternate]]
     weakest = sorted(range(alternate), key=lambda k: (shown[k], k % 2 == 0))[: alternate // 2]
     return tuple(
         StartingTest(
-            "fit" if single else f"event{k + 1}",
+            "fit" if single else f"{name}{k + 1}",
             inspection,
             (),
             bases=bases,
