@@ -187,9 +187,8 @@ def tests_of_table(
     for k, (row, file, event) in enumerate(zip(rows, files, events, strict=True)):
         inspection = inspections[file]
         own = bases if row.base is None else {**bases, "vt": row.base}
-        validates = k % 2 == 1 if alternate else bool(row.validates)
+        validates = _usual(k, event) if alternate else bool(row.validates)
         if event is not None:
-            validates = event.validates if alternate else validates
             tests.append(replace(event, bases=own, validates=validates))
             continue
         test = _nearest(row, tests_of(inspection))
@@ -201,6 +200,11 @@ def tests_of_table(
     if all(test.validates for test in tests):
         raise ExfitError(f"{rows[0].place}: every test validates; at least one must be fitted")
     return renamed(tests, recorded) if recorded else tuple(tests)
+
+
+def _usual(place: int, event: StartingTest | None) -> bool:
+    """Test whether a row validates of which no row says so."""
+    return place % 2 == 1 if event is None else event.validates
 
 
 def _refuse_as_events(rows: Sequence[TableRow]) -> None:
