@@ -41,6 +41,8 @@ FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FEWEST_AT_REST = 20  # samples from which a drift at rest is taken
 FINER = 8  # points of the spectrum for each of a transform without padding
 INSIDE = 1e-4  # of a frequency: so far within what a record shows its bounds are, as written
+LEAST_OF_PERIOD = 0.25  # of a folded ripple in a record: less of it is a drift
+LARGEST = 0.01  # pu, of the mains in a record: a recorder's own filter leaves less
 SLOW_FREQUENCIES = 40  # of a folded ripple, of which linear theory chooses where to start
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
@@ -144,18 +146,17 @@ def aliased_ripple(evidence: Evidence) -> Iterator[Suspicion]:
             pair = cosine_and_sine(frequency, own.time - middle)
             return linear.with_columns(own.columns(len(linear.errors), pair)).cost
 
-        start = min(np.linspace(0.0, slowest, SLOW_FREQUENCIES + 1)[1:], key=explained)
+        least = LEAST_OF_PERIOD / float(np.ptp(own.time))
+        start = min(np.linspace(least, slowest, SLOW_FREQUENCIES), key=explained)
         name, signal, number = "cause", own.channel.signal, own.number
         experiment = evidence.residuals.experiments[number]
         sine = Sine(name, signal, middle, None)
         wavy = replace(experiment, sines=(*experiment.sines, sine))
-        largest = float(np.ptp(own.channel.measured[own.channel.kept]))
+        of_frequency = Nuisance(f"{name}.{FREQUENCY}", "frequency", signal=signal)
         opened = [
-            Opened(
-                Nuisance(f"{name}.{FREQUENCY}", "frequency", signal=signal), start, 0.0, slowest
-            ),
-            Opened.around(Nuisance(f"{name}.{COSINE}", "cosine", signal=signal), 0.0, largest),
-            Opened.around(Nuisance(f"{name}.{SINE}", "sine", signal=signal), 0.0, largest),
+            Opened(of_frequency, start, least, slowest),
+            Opened.around(Nuisance(f"{name}.{COSINE}", "cosine", signal=signal), 0.0, LARGEST),
+            Opened.around(Nuisance(f"{name}.{SINE}", "sine", signal=signal), 0.0, LARGEST),
         ]
         residuals = with_experiment(evidence.residuals, number, wavy)
         if trial := refitted(evidence, with_opened(residuals, number, opened)):
