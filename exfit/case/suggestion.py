@@ -201,20 +201,25 @@ def suggested_event(inspection: Inspection, file: str, bases: Mapping[str, Base]
 
 def governor_sections(inspection: Inspection, file: str, bases: Mapping[str, Base]) -> Section:
     """Suggest ``plant``, ``governor``, ``test`` and ``record`` of a test of a governor."""
+    from exfit.plants.infinite_bus import INFINITE_BUS
+    from exfit.plants.isolated import ISOLATED
+    from exfit.plants.playback import GOVERNOR_PLAYBACK
+
     kind, f0 = inspection.kind.name, Noted(QUESTION, "Hz, rated frequency")
     level = _per_unit_level(inspection, "p")
     network: Section
     if kind in (ISOLATED_LOAD, REJECTION):
         load = Noted(level, "the load before, pu of the machine at 1 pu of voltage")
         network = {"f0": f0, "YP": load, "YQ": Noted(QUESTION, "as YP; Q is -YQ")}
-        plant = {"type": Noted("isolated", "the unit feeds this load alone"), "network": network}
+        alone = "the unit feeds this load alone"
+        plant = {"type": Noted(ISOLATED.name, alone), "network": network}
     elif kind == FOLLOWING:
         drives = "the recorded speed drives governor and turbine"
-        plant = {"type": Noted("governor-playback", drives)}
+        plant = {"type": Noted(GOVERNOR_PLAYBACK.name, drives)}
     else:
         network = {"f0": f0, "R": 0.0, "X": Noted(QUESTION, "pu, reactance to the source")}
         network |= {"P": Noted(level, "pu of the machine, before"), "Q": Noted(QUESTION, "pu")}
-        plant = {"type": Noted("infinite-bus", "on load"), "network": network}
+        plant = {"type": Noted(INFINITE_BUS.name, "on load"), "network": network}
     channels = channels_section(inspection, OF_GOVERNOR_TEST, bases)
     if inspection.channel_of("vt") is None:
         channels.pop("vt", None)

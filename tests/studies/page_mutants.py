@@ -28,7 +28,7 @@ def main():
             shutil.copytree(ROOT / name, Path(folder, name))
         os.chdir(folder)
         session, rng = Session(Path("configs/ac1a_good.yaml")), random.Random(SEED)
-        session.open()
+        session.read()
         told = Counter(outcome(session, mutant(rng)).partition(":")[0] for _ in range(COUNT))
         session.close()
         os.chdir(ROOT)

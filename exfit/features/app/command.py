@@ -45,7 +45,7 @@ def app(case: Path, browser: bool) -> None:
         path = result.case
     first = Session(path, result, record)
     try:
-        first.open()  # what is wrong is said here
+        first.read()  # what is wrong is said here
     finally:
         first.close()
     server, address = page_server(lambda: Session(path, result, record))

@@ -82,7 +82,7 @@ class Session:
 
     # ---- the case and its draft
 
-    def open(self) -> Content:
+    def read(self) -> Content:
         """Read the case, or its draft, and describe all that the page shows of it."""
         if self.record is not None:
             return inspected(self.record)
@@ -217,7 +217,7 @@ class Session:
             case messages.Validate():
                 return self._validate(asked.values)
         plain: Mapping[str, Callable[[], Content]] = {
-            "open": self.open,
+            "open": self.read,
             "stop": self._stop,
             "save case": self._save_case,
             "save result": self._save_result,
@@ -276,7 +276,7 @@ class Session:
         self._refuse_changed()
         self.draft.unlink(missing_ok=True)
         self.result, self.bounds = None, {}
-        return self.open()
+        return self.read()
 
     # ---- from a record
 
@@ -306,7 +306,7 @@ class Session:
             raise ExfitError("record: there is none: drop one on the page")
         path, command = made(self.record, asked)
         self.case_path, self.record, self.result, self.bounds = path, None, None, {}
-        said = {**self.open(), "words": f"written: {path}"}
+        said = {**self.read(), "words": f"written: {path}"}
         # no option gives machine data: the case that is there has them
         return said if asked.machine else {**said, "command": command}
 
@@ -458,7 +458,7 @@ class Session:
         run_folder.write_fit(self._fitted(), folder)
         applied = write_applied(path, str(number), folder)
         self.case_path, self.result, self.bounds = applied.path, None, {}
-        return {**self.open(), "words": f"written: {applied.path}: {applied.sentence}"}
+        return {**self.read(), "words": f"written: {applied.path}: {applied.sentence}"}
 
 
 def _text(path: Path) -> str | None:

@@ -28,7 +28,7 @@ def case(empty_folder):
 @pytest.fixture
 def session(case):
     made = Session(case)
-    made.open()
+    made.read()
     yield made
     made.close()
 
@@ -70,7 +70,7 @@ def test_a_held_value_is_fixed_and_free_again_within_its_bounds(session, case):
 def test_the_draft_is_what_the_next_page_begins_with_until_it_is_saved(session, case):
     text = ask(session, **GOOD["store"]) and session.draft.read_text()
     other = Session(case)
-    assert other.open()["draft"] == session.draft.name
+    assert other.read()["draft"] == session.draft.name
     other.close()
     ask(session, do="save case")
     assert case.read_text() == text
