@@ -38,7 +38,7 @@ from exfit.output import live, terminal
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "gallery.md"
 FOLDER = PAGE.parent / "img"
-OTHERS = ("thesis_", "verdict_")  # pictures of other pages: those of tests/studies
+OTHERS = ("thesis_", "verdict_", "app_")  # made by tests/studies, and by tests/benchmarks/slider.py
 BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
 COLUMNS = 80  # of the terminal

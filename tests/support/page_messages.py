@@ -6,7 +6,7 @@ from exfit.errors import ExfitError
 from exfit.features.app.messages import read_message
 
 GOOD = {
-    "try": {"do": "try", "values": {"KA": 500.0}},
+    "try": {"do": "try", "values": {"KA": 500.0}, "moving": True},
     "store": {"do": "store", "values": {"KA": 500.0, "TE": 1.2}},
     "bound": {"do": "bound", "name": "KA", "low": 10.0, "high": 900.0},
     "lock": {"do": "lock", "name": "KC", "value": 0.5},

@@ -26,10 +26,11 @@ class Form(BaseModel):
 
 
 class Try(Form):
-    """Values that a slider passes through."""
+    """Values that a slider passes through while it is ``moving``, or where it rests."""
 
     do: Literal["try"]
     values: Values
+    moving: bool = False
 
 
 class Store(Form):

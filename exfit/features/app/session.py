@@ -194,7 +194,7 @@ class Session:
         self._refuse_without_case(asked.do)
         match asked:
             case messages.Try():
-                return self.response(asked.values)
+                return self.response(asked.values, asked.moving)
             case messages.Store():
                 places = {f"{self._place(n)}.start": v for n, v in asked.values.items()}
                 self.change({place: number_text(value) for place, value in places.items()})
@@ -227,8 +227,8 @@ class Session:
         }
         return plain[asked.do]()
 
-    def response(self, values: Mapping[str, float]) -> Content:
-        """Simulate the tests at values of free parameters."""
+    def response(self, values: Mapping[str, float], moving: bool = False) -> Content:
+        """Simulate the tests at values of free parameters; roughly while a slider is ``moving``."""
         unknown = [name for name in values if name not in self.case.free()]
         if unknown:
             raise ExfitError(f"{unknown[0]}: {near(unknown[0], self.case.free())}")
@@ -238,7 +238,7 @@ class Session:
             for each in self.explorer.residuals.free
             if each.name in of_record
         }
-        compared = self.explorer.at({**of_record, **values})
+        compared = self.explorer.at({**of_record, **values}, quick=moving)
         records = [_record(each) for each in compared]
         return {"of": "try", "records": records, "cost": sum(each.cost for each in compared)}
 

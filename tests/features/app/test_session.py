@@ -44,6 +44,9 @@ def test_a_slider_shows_the_response_that_simulate_gives(session, case):
     (signal,) = said["records"][0]["signals"]
     np.testing.assert_array_equal(signal["current"], simulated.overlays["vt"].simulated)
     assert said["cost"] == simulated.cost
+    moving = ask(session, do="try", values=values, moving=True)
+    (roughly,) = moving["records"][0]["signals"]
+    np.testing.assert_allclose(roughly["current"], signal["current"], rtol=0.0, atol=1e-6)
 
 
 def test_a_change_is_in_the_draft_with_its_comments_and_the_case_stays(session, case):

@@ -121,6 +121,13 @@ function move(p, value) {
   show(p);
   state.began ??= performance.now(); // of the oldest movement that is not drawn yet
   state.wanted = values();
+  state.moving = true;
+  ask();
+}
+
+function rest() { // the steps of what is shown while a slider moves are those of the start values
+  state.wanted = values();
+  state.moving = false;
   ask();
 }
 
@@ -129,11 +136,14 @@ function ask() { // one question at a time: what the hand has done meanwhile is 
   state.waiting = true;
   state.asked = state.began;
   state.began = null;
-  send({ do: "try", values: state.wanted });
+  send({ do: "try", values: state.wanted, moving: state.moving });
   state.wanted = null;
 }
 
-const store = (p) => send({ do: "store", values: { [p.name]: p.value } });
+function store(p) {
+  send({ do: "store", values: { [p.name]: p.value } });
+  rest();
+}
 
 // ---- responses
 
@@ -284,8 +294,8 @@ const handlers = {
       ...(said.causes.length ? [make("h3", {}, "Likely causes"), causes] : []),
       ...(said.validation.length ? [make("h3", {}, "Validation"), validation] : []));
     bands(said.parameters);
-    state.wanted = follow(Object.fromEntries(said.parameters.filter((p) => !p.of_record).map((p) => [p.name, p.value])));
-    ask();
+    follow(Object.fromEntries(said.parameters.filter((p) => !p.of_record).map((p) => [p.name, p.value])));
+    rest();
   },
   profile(said) {
     say("");
@@ -323,7 +333,6 @@ function follow(found) {
     const p = state.parameters.get(name);
     if (p && !p.locked) { p.value = value; show(p); }
   }
-  return values();
 }
 
 function drafted(name) {

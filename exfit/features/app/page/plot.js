@@ -61,8 +61,10 @@ export class Plot {
     }
     pen.textAlign = "center";
     pen.textBaseline = "top";
-    for (const tick of ticks(begin, end, width / 110)) {
-      pen.fillText(tick.text, Math.min(x(tick.at), width - ROOM.right - 12), height - ROOM.bottom + 6);
+    const instants = ticks(begin, end, width / 110);
+    if (instants.length) instants[instants.length - 1].text += ` ${this.unit}`;
+    for (const tick of instants) {
+      pen.fillText(tick.text, Math.min(x(tick.at), width - ROOM.right - 14), height - ROOM.bottom + 6);
     }
     for (const name of shown) {
       pen.strokeStyle = colour(name);
@@ -143,5 +145,7 @@ export function ticks(low, high, most) {
   return found;
 }
 
-export const number = (value) =>
-  Number.isFinite(value) ? String(Number(value.toPrecision(5))) : "–";
+export function number(value) {
+  if (!Number.isFinite(value)) return "–";
+  return value && Math.abs(value) < 1e-3 ? value.toExponential(4) : String(Number(value.toPrecision(5)));
+}
