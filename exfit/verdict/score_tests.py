@@ -240,7 +240,8 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Arr
     count = len(evidence.solution.x)
     theta = np.append(evidence.solution.x, extended.start[count:])
     if evidence.weighted_by_noise:
-        extended, _ = parts("INPUT_NOISE")["without bias"].load()(extended, theta)
+        setups = [record.setup for record in evidence.records]
+        extended, _ = parts("INPUT_NOISE")["without bias"].load()(extended, setups, theta)
     sizes = slopes_of(extended, theta)
     errors, slopes = extended.errors(theta, range(count + len(of_test)))
     slopes /= sizes[: slopes.shape[1]]

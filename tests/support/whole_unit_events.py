@@ -21,7 +21,7 @@ COURSES = (  # that no limit is reached
     (20.0, 0.6, 0.30, 0.04, 0.9),
 )
 RATE = 30.0  # samples a second
-NOISE = {"vt": 5e-5, "angle": 6e-5, "p": 2e-4, "q": 2e-4}  # pu and rad
+NOISE = {"vt": 1e-4, "angle": 6e-5, "p": 2e-4, "q": 2e-4}  # pu and rad
 FREE = {  # start, and what factor the bounds are away
     "": {"K": (120.0, 5), "TE": (0.12, 5)},
     "machine": {"H": (2.8, 2), "Tpd0": (4.5, 2), "Xd": (1.2, 1.5)},

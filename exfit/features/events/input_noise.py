@@ -15,7 +15,7 @@ Source: Seber & Wild 1989, sections 2.1.4 and 10.2 (generalised least squares; e
 Carroll, Ruppert, Stefanski & Crainiceanu 2006, chapter 5 (simulation-extrapolation).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -73,6 +73,17 @@ class RestNoise(NamedTuple):
 
     rest: Rows
     moved: Array
+
+
+class RestLevels(NamedTuple):
+    """What the samples (R,) at ``rest`` decide of a signal, by ``weights`` (K, R).
+
+    The K ``courses`` (K, M) over all its samples are its level and, for an angle, an even turn.
+    """
+
+    rest: Rows
+    courses: Array
+    weights: Array
 
 
 def noise_of_inputs(simulator: Simulator) -> dict[str, float]:
@@ -175,38 +186,63 @@ def between_pulses(pulses: Array, places: Rows) -> Array:
     return responses
 
 
-def rest_noise(
-    setup: ExperimentSetup, experiment: Experiment, values: Values
-) -> dict[str, RestNoise]:
-    """Effect of noise at rest by the levels of the signals, beside what it does itself."""
-    steady = setup.test.steady
+def rest_levels(
+    setup: ExperimentSetup, experiment: Experiment, driving: Iterable[str]
+) -> dict[str, RestLevels]:
+    """What the samples at rest decide of each signal that drives or is compared."""
+    steady, time = setup.test.steady, setup.record.time
     if steady is None:
         return {}
-    simulator, own = experiment.with_inputs(values), experiment.own
-    driving, rest = simulator.inputs.recorded, np.flatnonzero(setup.record.time < steady)
-    usual = experiment.samples(values)[0]
-
-    def response(signal: str, course: Array, first: bool) -> Array:
-        level = initial(signal)
-        at = {**own, level: own[level] + PULSE} if first and level in own else own
-        taken = {signal: -PULSE * course} if signal in driving else {}
-        moved = replace(experiment, own=at, simulator=with_added(simulator, taken))
-        change = (moved.samples(values)[0] - usual) / PULSE
-        return errors_of(experiment, [own[None] for own in change.T])[:, 0]
-
-    noises, time = {}, setup.record.time
+    levels, rest = {}, np.flatnonzero(time < steady)
     for signal in dict.fromkeys([*driving, *experiment.signals]):
         given = signal == "vt" and setup.test.vt0 is not None
-        if given or not (signal in driving or initial(signal) in own):
+        if given or not (signal in driving or initial(signal) in experiment.own):
             continue
-        angle = driving.get(signal) if signal == "angle" else None
+        angle = experiment.simulator.inputs.recorded.get(signal) if signal == "angle" else None
         turning = isinstance(angle, SplinedInput) and not angle.integrated
         # what turns may do so evenly at rest (`fitting.event`)
         level = np.ones(len(time))
         courses = np.stack([level, time - time[0]] if turning else [level])
-        weights = np.linalg.pinv(courses[:, rest].T)
-        moved = np.stack([response(signal, course, k == 0) for k, course in enumerate(courses)])
-        noises[signal] = RestNoise(rest, moved.T @ weights)
+        levels[signal] = RestLevels(rest, courses, np.linalg.pinv(courses[:, rest].T))
+    return levels
+
+
+def with_noise(
+    experiment: Experiment,
+    simulator: Simulator,
+    levels: Mapping[str, RestLevels],
+    added: Mapping[str, Array],
+    sizes: Mapping[str, Array],
+) -> Experiment:
+    """Return an experiment with noise ``added`` to samples (M,) of recorded inputs.
+
+    By ``sizes`` (K,) the levels at rest are others: the simulation starts there, and what drives is
+    taken from there.
+    """
+    own, added = {**experiment.own}, {**added}
+    for signal, size in sizes.items():
+        level = initial(signal)
+        if level in own:
+            own[level] += size[0]
+        if signal in simulator.inputs.recorded:
+            added[signal] = added.get(signal, 0.0) - size @ levels[signal].courses
+    return replace(experiment, own=own, simulator=with_added(simulator, added))
+
+
+def rest_noise(
+    setup: ExperimentSetup, experiment: Experiment, values: Values
+) -> dict[str, RestNoise]:
+    """Effect of noise at rest by the levels of the signals, beside what it does itself."""
+    simulator = experiment.with_inputs(values)
+    levels = rest_levels(setup, experiment, simulator.inputs.recorded)
+    usual, noises = experiment.samples(values)[0], {}
+    for signal, own in levels.items():
+        moved = []
+        for size in PULSE * np.eye(len(own.courses)):
+            there = with_noise(experiment, simulator, levels, {}, {signal: size})
+            change = (there.samples(values)[0] - usual) / PULSE
+            moved.append(errors_of(experiment, [each[None] for each in change.T])[:, 0])
+        noises[signal] = RestNoise(own.rest, np.transpose(moved) @ own.weights)
     return noises
 
 
@@ -247,7 +283,7 @@ def weighted_search(
             if _far(theta, at):
                 at, white = theta, whitened(own, setups, theta)
             before = bias
-            unbiased, bias = without_bias(white, theta)
+            unbiased, bias = without_bias(white, setups, theta)
             end = descent_near(unbiased, theta)
             theta = end.x
             if not _far(theta, at) and np.max(np.abs(bias - before)) < SMALL_BIAS:
@@ -312,29 +348,40 @@ def whitened(
     return replace(residuals, experiments=experiments)
 
 
-def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
+def without_bias(
+    residuals: Residuals, setups: Sequence[ExperimentSetup], theta: Array
+) -> tuple[Residuals, Array]:
     """Return white residuals whose minimum near theta (N,) the driving noise does not move.
 
     With the bias (N,) that is gone, in standard errors of each parameter. As much noise again, of
     either sign, shows how it moves the gradient: only what is of second order is left on average.
+    As in the record, noise at rest moves the level that the simulation starts at.
     """
     generator = np.random.default_rng(SEED)
     values, moves = residuals.values(theta), residuals.moves(theta)
     gradient, jacobians = np.zeros(len(theta)), []
-    for whole in residuals.experiments:
+    for whole, setup in zip(residuals.experiments, setups, strict=True):
         experiment = whole.coarse()
         simulator = experiment.with_inputs(values)
         errors, own = experiment.tangents(values, moves)
         jacobians.append(own)
         recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
+        levels = rest_levels(setup, experiment, recorded)
         for _ in range(PAIRS):
             drawn = {
                 signal: deviation * generator.standard_normal(len(recorded[signal].samples))
                 for signal, deviation in deviations.items()
             }
+            sizes = {
+                signal: own.weights @ drawn[signal][own.rest]
+                for signal, own in levels.items()
+                if signal in drawn
+            }
             for sign in (1.0, -1.0):
-                more = {signal: sign * added for signal, added in drawn.items()}
-                noisy = replace(experiment, simulator=with_added(simulator, more))
+                more, moved = (
+                    {signal: sign * each for signal, each in of.items()} for of in (drawn, sizes)
+                )
+                noisy = with_noise(experiment, simulator, levels, more, moved)
                 noisy_errors, slopes = noisy.tangents(values, moves)
                 gradient += (slopes.T @ noisy_errors - own.T @ errors) / (2 * PAIRS)
     jacobian = np.concatenate(jacobians)

@@ -13,7 +13,13 @@ from grid_events import TRUTH, event_case, recorded
 from exfit.case.load import load_case
 from exfit.estimate import Stop
 from exfit.features.events import input_noise
-from exfit.features.events.input_noise import noise_of_inputs, propagated_noise, with_added
+from exfit.features.events.input_noise import (
+    noise_of_inputs,
+    propagated_noise,
+    rest_levels,
+    with_added,
+    with_noise,
+)
 from exfit.fitting.build import build_experiments
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.workflows import fit
@@ -79,6 +85,31 @@ def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, m
             after = np.tile(columns["t"] >= setup.test.steady, 2)
         off = np.linalg.norm((change - carried[:, first + place])[after])
         assert off < 0.04 * np.linalg.norm(change[after]), place
+
+
+def test_added_noise_does_to_a_simulation_what_it_does_in_a_record(folder):
+    """Its mean at rest is in the level that the simulation starts at, and is no step there."""
+    columns = recorded(folder / "quiet.csv")
+    case = load_case(event_case(folder, "quiet", free=False))
+    (setup,) = build_experiments(case)
+    experiment, values = setup.experiment, case.values()
+    simulator = experiment.with_inputs(values)
+    drawn = {
+        name: NOISE * np.random.default_rng(k).standard_normal(len(columns["t"]))
+        for k, name in enumerate(("vt", "angle"))
+    }
+    levels = rest_levels(setup, experiment, simulator.inputs.recorded)
+    sizes = {name: levels[name].weights @ drawn[name][levels[name].rest] for name in drawn}
+    added = with_noise(experiment, simulator, levels, drawn, sizes).samples(values)[0]
+    noisy = {**columns, **{name: columns[name] + drawn[name] for name in drawn}}
+    rows = np.transpose([*noisy.values()])
+    path = folder / "with_noise.csv"
+    np.savetxt(path, rows, delimiter=",", header=",".join(noisy), comments="", fmt="%.15g")
+    until = {"test": {"steady_until": setup.test.steady}}
+    (other,) = build_experiments(load_case(event_case(folder, "with_noise", free=False, **until)))
+    in_record = other.experiment.samples(values)[0]
+    moved = np.max(np.abs(in_record - experiment.samples(values)[0]))
+    np.testing.assert_allclose(added, in_record, rtol=0.0, atol=1e-3 * moved)
 
 
 @pytest.mark.long
