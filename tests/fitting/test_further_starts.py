@@ -140,7 +140,6 @@ def test_a_minimum_that_the_record_does_not_refute_is_named():
     assert any("1.003 times the lowest one:" in text for text in result.notes)
     ends = sorted(minimum.values["KPR"] for minimum in likely)
     assert f"KPR {rounded_value(ends[0])} ... {rounded_value(ends[1])}" in note
-    assert f"(here {rounded_value(result.values['KPR'])})" in note
 
 
 def test_starts_for_a_recorded_event_have_a_stable_rest_where_the_bounds_hold_one(tmp_path):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from exfit.cli import main
 
 COMMANDS = {name: main.get_command(None, name) for name in main.list_commands(None)}
+ENDING = COMMANDS.keys() - {"app"}  # of themselves: a page is served until someone ends it
 
 
 class Ran(NamedTuple):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
-from commands import COMMANDS
+from commands import ENDING
 from grid_events import event_case, recorded
 from places import CONFIGS, SAMPLES
 
@@ -76,8 +76,7 @@ OTHERS = {
 }  # fmt: skip
 NAMED = {**WRITERS, **OTHERS}
 EVERY = NAMED | {
-    name: (name, "case.yaml")
-    for name in COMMANDS.keys() - {arguments[0] for arguments in NAMED.values()}
+    name: (name, "case.yaml") for name in ENDING - {arguments[0] for arguments in NAMED.values()}
 }
 
 
