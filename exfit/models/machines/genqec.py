@@ -39,9 +39,9 @@ efd ─►(+)─►[   1   ]─┬─ EQP ─┬──────────�
 ifd (1 - Kw id) = (1 + S) EQP + (Xd - Xpd) (id + k (1 + S) u), u the input of
 PSID's integrator, k = (Xpd - Xppd) / (Xpd - Xl)^2, and
 Xds = (Xppd - Xl) / (1 + S) + Xl. S is the saturation at the air-gap flux, of
-GENQEJ plus Kis it: with SATFLG = 0 a power of the flux, 1 a quadratic over the
-flux, 2 a quadratic. The q axis mirrors the d axis without an excitation. On open
-circuit id and iq are 0, and the q axis rests."""
+GENQEJ plus Kis it: with SATFLG = 0 a power of the flux, 1 a quadratic over
+the flux, 2 a quadratic. The q axis mirrors the d axis without an excitation.
+On open circuit id and iq are 0, and the q axis rests."""
 
 MOST = 0.25  # of Kw id, up and down
 DOUBT = "limits Kw id to 0.25 as PowerWorld's equations do; InterPSS has 0.4"
