@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from PIL import Image
 from rich.console import Console
 from rich.table import Table
 
@@ -25,6 +26,7 @@ from browsers import chromium
 
 SAMPLES, MOVES = 2000, 300
 PAUSE = 16  # ms between two movements: a frame
+COLOURS = 32  # of a picture: few make it small
 FIT = 120_000  # ms, at most
 SCREEN = {"width": 1280, "height": 900}
 TELEPHONE = {"width": 390, "height": 844}
@@ -93,8 +95,11 @@ def take_pictures(browser, address: str, folder: Path) -> None:
         page.get_by_role("button", name="Fit", exact=True).click()
         page.locator("#save-report:enabled").wait_for(timeout=FIT)
         page.wait_for_timeout(500)
-        page.screenshot(path=folder / f"app_{name}.png", full_page=name == "light")
+        path = folder / f"app_{name}.png"
+        page.screenshot(path=path, full_page=name == "light")
         page.close()
+        with Image.open(path) as picture:
+            picture.convert("RGB").quantize(COLOURS).save(path, optimize=True)
 
 
 if __name__ == "__main__":
