@@ -130,6 +130,8 @@ def telling_form(residuals: Residuals) -> Residuals:
     That holds for each direction that the free parameters can take, so that a record that alone
     shows one of them is among them.
     """
+    if len(residuals.experiments) == 1:
+        return residuals
     try:
         values, moves = residuals.values(residuals.start), residuals.moves(residuals.start)
         slopes = [each.tangents(values, moves)[1] for each in residuals.experiments]

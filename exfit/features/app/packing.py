@@ -43,7 +43,7 @@ def packed(content: Mapping[str, Any]) -> bytes:
     """Write a message: its length, its JSON with blanks to a multiple of four bytes, its arrays.
 
     In the JSON an array is {"at": ..., "n": ...}: its place and length among the numbers behind it,
-    of four bytes each, in the order of the bytes of this machine's opposite side: little.
+    of four bytes each, the least significant first.
     """
     arrays, at = list[Array](), 0
 

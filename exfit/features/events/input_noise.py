@@ -15,7 +15,7 @@ Source: Seber & Wild 1989, sections 2.1.4 and 10.2 (generalised least squares; e
 Carroll, Ruppert, Stefanski & Crainiceanu 2006, chapter 5 (simulation-extrapolation).
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -187,7 +187,7 @@ def between_pulses(pulses: Array, places: Rows) -> Array:
 
 
 def rest_levels(
-    setup: ExperimentSetup, experiment: Experiment, driving: Iterable[str]
+    setup: ExperimentSetup, experiment: Experiment, driving: Mapping[str, object]
 ) -> dict[str, RestLevels]:
     """What the samples at rest decide of each signal that drives or is compared."""
     steady, time = setup.test.steady, setup.record.time
@@ -198,7 +198,7 @@ def rest_levels(
         given = signal == "vt" and setup.test.vt0 is not None
         if given or not (signal in driving or initial(signal) in experiment.own):
             continue
-        angle = experiment.simulator.inputs.recorded.get(signal) if signal == "angle" else None
+        angle = driving.get(signal) if signal == "angle" else None
         turning = isinstance(angle, SplinedInput) and not angle.integrated
         # what turns may do so evenly at rest (`fitting.event`)
         level = np.ones(len(time))
