@@ -19,7 +19,6 @@ DRIFTS = {
     **dict.fromkeys(("psse_ieeest", "psse_pss3c"), 1.2),
     "powerworld_dc4b": 1.5,
     "powerworld_exst1": 1.2,
-    "powerworld_genqec": 2.5,
     "powerworld_st6b": 1.8,
     "psse_gentpj1": 4.0,
     "psse_gentra": 2.0,

@@ -93,6 +93,28 @@ def genqec_of_powerworld():
     return genqec.GENQEC._replace(q_slopes=q_slopes)
 
 
+def by_the_last_saturation():
+    """Solve the network at the saturation of the solution before, as PowerWorld 24 does.
+
+    The slopes have the saturation at the flux that this shows.
+    """
+    whole, last = loaded.connected, list[float]()
+
+    def connected(machine, source, drives, fluxes, p, speed):
+        if last:
+            fluxes.SAT = last.pop()
+            at = source()
+            i = drives(at)
+            gap_d, gap_q = at.voltage.d + (at.xq - p.Xl) * i.q, at.voltage.q - (at.xd - p.Xl) * i.d
+            fluxes.SAT = machine.saturated(np.hypot(gap_d, gap_q) / speed, np.hypot(i.d, i.q), p)
+        else:
+            at, i = whole(machine, source, drives, fluxes, p, speed)
+        last.append(fluxes.SAT)
+        return at, i
+
+    return patch.object(loaded, "connected", connected)
+
+
 class TwoBuses:
     """The unit of a case, with the values that its records are imported as, or some changed."""
 
@@ -142,6 +164,7 @@ class TwoBuses:
             load = {"YP": LOAD[0] / square, "YQ": -LOAD[1] / square}
         self.values = values | prefixed(NETWORK, network | load) | {VT0: 1.0} | changes
         self.step = told.get("step")
+        self.saturates = by_the_last_saturation if "form_of_powerworld" in told else nullcontext
         self.load, self.pulse, self.boost = frozenset(load), told.get("vref"), told.get("boost")
         boosted, disturbed = self.boost is not None, not self.pulse
         self.moved = ("vref", *(["vs"] if boosted else []), *(["fault_B"] if disturbed else []))
@@ -177,7 +200,8 @@ class TwoBuses:
     def shown(self, times):
         """Return what the unit shows at some instants, in the steps of a case that has some."""
         if self.step:
-            return self.stepped(times)
+            with self.saturates():
+                return self.stepped(times)
         inputs = self.inputs(max(times) + STEP)
         with without_bus_frequency() if self.unit.hears_frequency else nullcontext():
             simulator = Simulator(self.system, inputs, np.array(times, dtype=float), STEP)
@@ -188,7 +212,7 @@ class TwoBuses:
         """Return the same by Heun's rule, in steps that a switching divides."""
         system, shown = self.system, {}
         states, setpoints = system.rest(self.values)
-        ends = np.union1d(np.arange(0.0, max(times) + self.step, self.step), FAULT)
+        ends = np.union1d(np.arange(0.0, max(times) + 2 * self.step, self.step).round(9), FAULT)
         for start, end in pairwise(ends):
             fault = -1.0 / SHUNT if FAULT[0] <= start < FAULT[1] else 0.0
             inputs = {**dict.fromkeys(self.moved, 0.0), "fault_B": fault}
