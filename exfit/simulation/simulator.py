@@ -317,9 +317,10 @@ class Simulator:
     ) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
 
-        With an accuracy its step is divided until halving it would move no signal by more than
-        that, but where the rest is so unstable that rounding alone would. Raises SimulationError
-        where that response does not stay finite.
+        With an accuracy its step is divided until a quarter of it would move no signal by more
+        than that, but where the rest is so unstable that rounding alone would. (Behind a crossing,
+        half a step may err as much as a whole one.) Raises SimulationError where that response does
+        not stay finite.
         """
         asked = signals, self._of_system(values)
         return self._answer("fine", asked, lambda: self._fine(values, signals)) or self
@@ -331,8 +332,8 @@ class Simulator:
             return None if simulator is self else simulator
         judged = signals or tuple(name for name in OF_STEP if name in self.system.outputs)
         while simulator.step > SHORTEST_STEP:
-            errors = simulator.step_errors(values, judged or self.system.outputs, relative=True)
-            excess = max(errors.values()) / (SAFE * self.accuracy)
+            moved, sizes = simulator._divided(values, judged or self.system.outputs, 4)
+            excess = float(np.max(moved / np.maximum(sizes, 1.0))) / (SAFE * self.accuracy)
             if not excess > 1.0:
                 break
             # the error grows with the fourth power of the step
@@ -359,24 +360,21 @@ class Simulator:
             simulator = self.remade(least=required).with_responder(self.responder)
         return simulator
 
-    def step_errors(
-        self, values: Values, outputs: tuple[str, ...], relative: bool = False
-    ) -> dict[str, float]:
+    def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
         """Largest change of each output by halving every step, per unit.
-
-        It is ``relative`` to the size of outputs that are larger than 1 pu.
 
         With located crossings at the sample times, else at the points of the grid: a record with
         many more samples shows no more. Beside a smooth jump of what is recorded the step itself is
         another there.
         """
         asked = outputs, self._of_system(values)
-        moved, sizes = self._answer("halved", asked, lambda: self._halved(values, outputs))
-        errors = moved / np.maximum(sizes, 1.0) if relative else moved
-        return dict(zip(outputs, map(float, errors), strict=True))
+        moved, _ = self._answer("halved", asked, lambda: self._divided(values, outputs, 2))
+        return dict(zip(outputs, map(float, moved), strict=True))
 
-    def _halved(self, values: Values, outputs: tuple[str, ...]) -> tuple[Array, Array]:
-        """Largest change of outputs (ny,) by halving every step, and their largest value."""
+    def _divided(
+        self, values: Values, outputs: tuple[str, ...], division: int
+    ) -> tuple[Array, Array]:
+        """Largest change of outputs (ny,) by dividing every step, and their largest value."""
         coarse = self.remade(memory=inf)  # that of a run allows for this
         if not self.located:
             times = distinct(np.concatenate([segment.times for segment in self._grid]))
@@ -385,7 +383,7 @@ class Simulator:
                     times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
             coarse = self.remade(times=times, delay=0.0, memory=inf)
         samples, parts = coarse.samples(values, outputs)
-        finer = coarse.remade(step=coarse.step / 2.0, least=parts)
+        finer = coarse.remade(step=coarse.step / division, least=parts)
         moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
         return moved, np.max(np.abs(samples), axis=0)
 
