@@ -31,8 +31,6 @@ COARSE_ITERATIONS = 50  # where limits make the cost creep from kink to kink
 NEAR = 1e-3  # of the cost: what the next leg gains in an iteration or two
 NEAR_STEP = 1e-6  # units
 MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
-WORK = 3e8  # steps times directions of all starts: thirty seconds, which few need
-PHASES = 5  # of a start, as a rule
 TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
 LAST_STEP = 1e-8  # units: no error of a parameter is as small
 TOLD = 0.25  # of what all records say of each direction: errors twice as large are near enough
@@ -68,9 +66,6 @@ def further_starts(
     """
     residuals = problem.residuals.counted_by(counter)
     legs, why_direct = legs_of(residuals, last_leg(problem, counter))
-    most = round(residuals.iterations_within(WORK, PHASES * count))
-    if most < LINEAR_ITERATIONS:  # the fewest of any leg
-        legs = tuple(replace(leg, max_iterations=most) for leg in legs)
     linear: tuple[Way, ...] = ("linear",)
     direct: tuple[Way, ...] = ("direct",)
     if why_direct:

@@ -112,16 +112,12 @@ class Residuals:
         alone = all(test.responder is None for test in tests)
         return 1 if alone and sum(test.steps for test in tests) <= SHORT_RUNS else None
 
-    def iterations_within(self, work: float, searches: int) -> float:
-        """Return how many iterations some searches may take: so many in steps times directions."""
-        steps = sum(experiment.simulator.steps for experiment in self.experiments)
-        return max(LEAST_ITERATIONS, work / (searches * steps * (1 + len(self.free))))
-
     def iterations_of_side(self, profiles: int) -> int:
         """Return how many iterations a side of some profiles may take: fewer of long records."""
         share = self.iterations / MOST_ITERATIONS
-        usual = min(MOST_ITERATIONS, self.iterations_within(WORK_OF_PROFILES, 2 * profiles))
-        return round(max(1.0, share) * usual)
+        steps = sum(experiment.simulator.steps for experiment in self.experiments)
+        within = WORK_OF_PROFILES / (2 * profiles * steps * (1 + len(self.free)))
+        return round(max(1.0, share) * min(MOST_ITERATIONS, max(LEAST_ITERATIONS, within)))
 
     @property
     def of_records(self) -> dict[str, Nuisance]:

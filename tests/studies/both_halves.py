@@ -15,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+from truths import holds
 from whole_unit_events import NOISE, TRUTH, write_case, write_records
 
 from exfit.case.load import load_case
@@ -41,11 +42,9 @@ def main():
             if parameter.interval is None:
                 counts["none"] += 1
                 continue
-            low, high = parameter.interval
-            truth = TRUTH[name]
-            holds = (low is None or low <= truth) and (high is None or truth <= high)
-            counts["hold" if holds else "miss"] += 1
-            if not holds:
+            inside = holds(parameter.interval, TRUTH[name])
+            counts["hold" if inside else "miss"] += 1
+            if not inside:
                 out.append(name)
         missed.update(out)
         closed = counts["hold"] + counts["miss"]

@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from coverage_cases import HARD_CASES, noisy, truth_of
 from dense_profiles import dense_intervals
+from truths import holds
 
 from exfit.util.files import write
 from exfit.workflows.case_search import STAGES
@@ -79,12 +80,6 @@ def record_of(task):
         outcome["dense"] = dense_intervals(name, problem, search, printed)
         outcome["dense_seconds"] = round(time.process_time() - began - seconds, 3)
     return name, number, outcome
-
-
-def holds(interval, truth):
-    """Return whether an interval, with None for an open side, holds the truth."""
-    low, high = interval
-    return (low is None or low <= truth) and (high is None or truth <= high)
 
 
 def width(interval, parameter):

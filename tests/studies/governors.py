@@ -15,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from drawn_units import FAULTS, DrawnUnit
+from truths import holds
 
 import exfit
 from exfit.results.verdict import GOOD, MATCHES
@@ -34,10 +35,8 @@ def held(result, truth):
     """Return whether each interval holds the truth, None where there is none."""
     found = {}
     for name, parameter in result.parameters.items():
-        low, high = parameter.interval or (None, None)
-        none = parameter.interval is None
-        inside = (low is None or low <= truth[name]) and (high is None or truth[name] <= high)
-        found[name] = None if none else inside
+        known = parameter.interval
+        found[name] = None if known is None else holds(known, truth[name])
     return found
 
 

@@ -27,6 +27,7 @@ from scipy.stats import binomtest
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from programme_files import BUS, programme_file
+from truths import holds
 
 from exfit.case.load import load_case
 from exfit.cli import main as command
@@ -87,12 +88,6 @@ def names_of(case):
     """Return the names of all records in order of their time."""
     recordings = [*case.recordings, *case.validations]
     return [each.name for each in sorted(recordings, key=lambda each: each.test.instants[0])]
-
-
-def holds(interval, truth):
-    """Return whether an interval, with None for an open side, holds the truth."""
-    low, high = interval
-    return (low is None or low <= truth) and (high is None or truth <= high)
 
 
 def main():

@@ -35,6 +35,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from planted_cases import Task, WrongCase, cause_line, drawn, planner_tasks, tasks
+from truths import holds
 
 from exfit.errors import ExfitError
 from exfit.features.planner.export import export
@@ -75,7 +76,7 @@ def outcome(task: Task) -> Outcome:
     found["causes"] = [cause.sentence for cause in causes]
     found["line"] = cause_line(case.names, causes)
     found["corrected"] = any(
-        re.search(name, fitted) and holds(*known)
+        re.search(name, fitted) and holds(known[:2], known[2])
         for name in case.names
         for fitted, known in found["intervals"].items()
     )
@@ -95,7 +96,7 @@ def left_over(result: FitResult, case: WrongCase) -> float:
 def silent(result: FitResult, known: dict[str, list[float | None]]) -> list[str]:
     """Return the intervals that miss the truth without a line in the exported record."""
     text = export(result).text
-    missing = [name for name, each in known.items() if not holds(*each)]
+    missing = [name for name, each in known.items() if not holds(each[:2], each[2])]
     return [name for name in missing if f"interval of {name} rests on data" not in text]
 
 
@@ -106,11 +107,6 @@ def intervals(result: FitResult, truth: dict[str, float]) -> dict[str, list[floa
         for name, parameter in result.parameters.items()
         if parameter.interval is not None and name in truth
     }
-
-
-def holds(low: float | None, high: float | None, truth: float) -> bool:
-    """Return whether an interval, with None for an open side, holds the truth."""
-    return (low is None or low <= truth) and (high is None or truth <= high)
 
 
 def misses_widely(low: float | None, high: float | None, truth: float) -> bool:
@@ -147,7 +143,7 @@ def is_answered(each: Outcome) -> bool:
 
 def held(outcomes: Sequence[Outcome]) -> tuple[int, int]:
     """Return how many intervals hold the truth, and how many are printed."""
-    known = [holds(*each) for of in outcomes for each in of["intervals"].values()]
+    known = [holds(each[:2], each[2]) for of in outcomes for each in of["intervals"].values()]
     return sum(known), len(known)
 
 

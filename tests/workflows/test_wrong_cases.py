@@ -2,6 +2,7 @@
 
 import pytest
 from planted_cases import Task, cause_line, drawn
+from truths import holds
 
 from exfit.results.verdict import GOOD
 from exfit.workflows import fit
@@ -15,9 +16,7 @@ def holding(result, truth):
     """Return for each interval whose truth is known whether it holds that."""
     intervals = {name: own.interval for name, own in result.parameters.items() if own.interval}
     return {
-        name: (low is None or low <= truth[name]) and (high is None or truth[name] <= high)
-        for name, (low, high) in intervals.items()
-        if name in truth
+        name: holds(interval, truth[name]) for name, interval in intervals.items() if name in truth
     }
 
 
@@ -26,9 +25,9 @@ def test_a_case_with_certificates_stays_good(unit):
     case = drawn(Task("right", 0, unit, (2026, {"AC1A": 0, "DC4B": 4}[unit])))
     result = fit(case.case)
     assert result.verdict.verdict == GOOD
-    holds = holding(result, case.truth)
-    assert len(holds) >= 3
-    assert all(holds.values()), holds
+    held = holding(result, case.truth)
+    assert len(held) >= 3
+    assert all(held.values()), held
 
 
 @pytest.mark.parametrize(
@@ -37,9 +36,9 @@ def test_a_case_with_certificates_stays_good(unit):
 def test_intervals_hold_the_truth_where_four_given_values_are_off(level, unit, number):
     """2 to 5, 5 to 10 and 10 to 15 %: of a case that states no source."""
     case = drawn(Task("values", level, unit, (2026, number)))
-    holds = holding(fit(case.case), case.truth)
-    assert len(holds) >= 4
-    assert all(holds.values()), holds
+    held = holding(fit(case.case), case.truth)
+    assert len(held) >= 4
+    assert all(held.values()), held
 
 
 @pytest.mark.parametrize(

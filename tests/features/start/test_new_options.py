@@ -9,6 +9,7 @@ from programme_files import BUS, programme_file
 from records import workbook_of
 from stepped_record import stepped_record
 from tiers import few_of
+from truths import holds
 
 from exfit.case.load import load_case
 from exfit.case.stated_values import taken_apart
@@ -239,9 +240,3 @@ def test_three_commands_lead_from_a_long_file_to_a_report(empty_folder, run, num
     ]  # fmt: skip
     assert len(missed) <= 1
     assert MODELS[made.model].name == made.model
-
-
-def holds(interval, truth):
-    """Return whether an interval, with None for an open side, holds the truth."""
-    low, high = interval
-    return (low is None or low <= truth) and (high is None or truth <= high)

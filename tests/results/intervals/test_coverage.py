@@ -10,6 +10,7 @@ import pytest
 from coverage_cases import HARD_CASES, covariance_of, exact, noisy, truth_of
 from scipy.stats import binom
 from tiers import few_of
+from truths import holds
 
 from exfit.inference.confidence import LEVEL
 from exfit.workflows.case_search import STAGES
@@ -30,12 +31,6 @@ def printed(name, seed):
         parameter: known.interval
         for parameter, known in determined.uncertainty.confidence.parameters.items()
     }
-
-
-def holds(interval, truth):
-    """Return whether an interval, with None for an open side, holds the truth."""
-    low, high = interval
-    return (low is None or low <= truth) and (high is None or truth <= high)
 
 
 @pytest.mark.long
