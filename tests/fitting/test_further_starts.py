@@ -7,15 +7,8 @@ from event_sets import recorded, set_case
 
 from exfit.case.load import load_case
 from exfit.estimate import spread
-from exfit.fitting.further_starts import (
-    COARSE_ITERATIONS,
-    LINEAR_ITERATIONS,
-    MOST_ITERATIONS,
-    PHASES,
-    WORK,
-    further_starts,
-)
-from exfit.fitting.residuals import LEAST_ITERATIONS, UNSTABLE
+from exfit.fitting.further_starts import further_starts
+from exfit.fitting.residuals import UNSTABLE
 from exfit.fitting.search import fitted
 from exfit.util.text import rounded_value
 from exfit.workflows import fit
@@ -56,17 +49,6 @@ def test_where_the_linear_phase_has_no_meaning_all_go_directly():
     assert starts.ways == ("direct",) * COUNT
     assert {*starts.first_legs} == {0}
     assert len(starts.legs) == 2
-
-
-def test_more_starts_of_a_long_record_take_fewer_iterations_but_never_too_few():
-    problem = fitted(local_case("ac1a_typical"))[1]
-    usual, fewer, fewest = (
-        [leg.max_iterations for leg in further_starts(problem, count, None).legs]
-        for count in (COUNT, 25, 1000)
-    )
-    assert usual == [LINEAR_ITERATIONS, COARSE_ITERATIONS, MOST_ITERATIONS]
-    assert fewer == [round(WORK / (PHASES * 25 * 10_000 * 8))] * 3
-    assert fewest == [LEAST_ITERATIONS] * 3
 
 
 def test_they_are_the_same_at_every_run():
