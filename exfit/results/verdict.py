@@ -56,6 +56,11 @@ class ResidualTests:
     carried: Annotated[float, nan] = 0.0
 
     @property
+    def probabilities(self) -> tuple[float, ...]:
+        """Those of all tests that were made."""
+        return tuple(p for p in (self.whiteness, self.pattern, self.excess) if p is not None)
+
+    @property
     def are_white(self) -> bool:
         """Whether neither test of whiteness rejects the residuals.
 
@@ -96,6 +101,19 @@ class Verdict(NamedTuple):
     def explained(self) -> bool:
         """Whether nothing but noise is left of the residuals."""
         return all(test.are_noise for test in self.residuals)
+
+    @property
+    def refuted(self) -> tuple[ResidualTests, ...]:
+        """The residuals that are no noise, by all tests at once.
+
+        One of 100 fits of the true model is refuted, however many tests it has (Bonferroni).
+        """
+        count = sum(len(test.probabilities) for test in self.residuals)
+        return tuple(
+            test
+            for test in self.residuals
+            if not test.are_noise and count * min(test.probabilities) < REJECTED
+        )
 
     @property
     def misfit(self) -> str:

@@ -33,19 +33,26 @@ from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference.whitening import ROWS_BEFORE, PropagatedNoise, whitening
+from exfit.plants import NETWORK, VT0
 from exfit.plants.parts import initial
+from exfit.records.record import Record
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, median_step
 from exfit.util.text import digits, listed
 
 ORDER = 4  # of the differences that show the noise of a signal which swings
+WINDOW = 0.5  # variance of a window, of the time between samples squared: C37.118.1, class M
+PHASORS = {"it": 1.0, "p": 2.0, "q": 2.0}  # how many of them a signal is made of
+F0 = f"{NETWORK}f0"
+FAR_OUT = 4.0  # times the median: no noise
 PULSE = 1e-5  # pu or rad: the response to it is linear, and far above rounding
 LONGEST_BETWEEN_PULSES = 1.0  # s: the response changes little while the unit swings
 FEWEST_PULSES, MOST_PULSES, ROUGH_PULSES = 9, 33, 3
 ROUGH_ROWS = 200  # of errors before that tell what noise comes next
 SAMPLES_AT_ENDS = 4  # of a record, where a spline through them is another: each has a pulse
 Rows = NDArray[np.intp]
+ComplexArray = NDArray[np.complex128]
 Values = Mapping[str, float]
 SEED = 0
 PAIRS = 6  # of realisations of noise, with either sign: what is of first order cancels
@@ -109,27 +116,85 @@ def propagated_noise(
     """
     experiment = setup.experiment.coarse()
     by_rest = rest_noise(setup, experiment, values)
-    columns = list[Array]()
-    for signal, deviation in noise_of_inputs(experiment.with_inputs(values)).items():
+    simulator = experiment.with_inputs(values)
+    deviations, powers = noise_of_inputs(simulator), phasor_in_powers(setup.record)
+    carried = dict[str, Array]()
+    for signal, deviation in deviations.items():
         responses = responses_to_samples(experiment, values, signal, rough)
         if signal in by_rest:
             responses[:, by_rest[signal].rest] += by_rest[signal].moved
-        responses *= deviation
-        columns.append(responses)
-    own, first = [], 0
+        carried[signal] = responses * deviation
+    columns, own, first = list[Array](), list[Array](), 0
+    no_rest = RestNoise(np.arange(0), np.zeros((sum(experiment.sizes), 0)))
     for channel in experiment.channels:
-        deviation = noise_of_channel(channel)
-        variance = np.full(channel.size, (channel.weight * deviation) ** 2)
-        if channel.signal in by_rest:  # its mean at rest is in all errors
-            rest, moved = by_rest[channel.signal]
-            by_level = deviation * moved
-            # at rest the mean of the errors is zero: with a variance of zero, rounding of the
-            # record and of the simulation would have all the weight; no parameter moves it
-            by_level[first + np.flatnonzero(np.isin(np.flatnonzero(channel.kept), rest))] = 0.0
-            columns.append(by_level)
-        own.append(variance)
+        rows, kept = np.arange(first, first + channel.size), np.flatnonzero(channel.kept)
         first += channel.size
-    return PropagatedNoise(np.concatenate(own), np.hstack(columns))
+        variance = noise_of_channel(channel) ** 2
+        rest, by_level = by_rest.get(channel.signal, no_rest)
+        # at rest the mean of the errors is zero: with a variance of zero, rounding of the
+        # record and of the simulation would have all the weight; no parameter moves it
+        by_level = np.array(by_level)
+        by_level[rows[np.isin(kept, rest)]] = 0.0
+        for signal, in_power in powers.items() if channel.signal in ("p", "q") else ():
+            part = in_power.real if channel.signal == "p" else in_power.imag
+            noise_there = part * deviations[signal]
+            variance -= float(np.mean(noise_there[kept] ** 2))
+            carried[signal][rows, kept] -= channel.weight * noise_there[kept]
+            carried[signal][:, rest] += by_level * noise_there[rest]
+        variance = max(variance, LEAST_NOISE**2)
+        columns.append(np.sqrt(variance) * by_level)
+        own.append(np.full(channel.size, channel.weight**2 * variance))
+    window = effect_of_window(setup, experiment, values)
+    together = [*carried.values(), *columns, window[:, None]]
+    return PropagatedNoise(np.concatenate(own), np.hstack(together))
+
+
+def phasor_in_powers(record: Record) -> dict[str, ComplexArray]:
+    """By how much (M,) noise of the voltage and its angle is in p + jq of the same phasors.
+
+    None is where fourth differences of the powers do not show it.
+    """
+    signals = {name: np.nan_to_num(samples) for name, samples in record.signals.items()}
+    if "p" not in signals or "q" not in signals:
+        return {}
+    vt: ComplexArray = np.maximum(signals["vt"], LEAST_NOISE).astype(complex)
+    power: ComplexArray = signals["p"] + 1j * signals["q"]
+    in_power, phasor = {"vt": power / vt}, np.log(vt)
+    if "angle" in signals:
+        phasor += 1j * np.unwrap(signals["angle"])
+        in_power["angle"] = 1j * power
+    shown = np.diff(power, ORDER)
+    own = power[ORDER // 2 : -ORDER // 2] * np.diff(phasor, ORDER)
+    usual = np.all([np.abs(each) < FAR_OUT * np.median(np.abs(each)) for each in (shown, own)], 0)
+    follows = np.vdot(own[usual], shown[usual]).real
+    return in_power if follows > 0.5 * np.vdot(own[usual], own[usual]).real else {}
+
+
+def effect_of_window(setup: ExperimentSetup, experiment: Experiment, values: Values) -> Array:
+    """Effect on all errors (M,) of a window of usual length, from which a PMU takes its phasors.
+
+    A window of variance s^2 lowers a phasor that turns at w by (s w)^2 / 2: the voltage that
+    drives, and the current; powers by twice that. What it does else passes through a linear unit
+    as through the record.
+    """
+    record, parameters = setup.record, experiment.parameters(values)
+    if "angle" in record.signals:
+        turning = np.gradient(np.unwrap(record.signals["angle"]), record.time)
+    else:
+        turning = TURN * (record.signals["frequency"] - parameters[F0])
+    square = turning**2
+    if setup.test.steady is not None:
+        square -= np.mean(square[record.time < setup.test.steady])
+    lower = 0.5 * WINDOW * median_step(record.time) ** 2 * square
+    simulator, usual = experiment.with_inputs(values), experiment.samples(values)[0]
+    own = lower * (parameters[VT0] + simulator.inputs.recorded["vt"].samples)
+    scale = PULSE / max(float(np.max(np.abs(own))), PULSE)
+    moved = replace(experiment, simulator=with_added(simulator, {"vt": scale * own}))
+    response = (moved.samples(values)[0] - usual) / scale
+    for k, channel in enumerate(experiment.channels):
+        if channel.signal in PHASORS:
+            response[:, k] -= PHASORS[channel.signal] * lower * channel.measured
+    return errors_of(experiment, [each[None] for each in response.T])[:, 0]
 
 
 def responses_to_samples(
@@ -214,7 +279,7 @@ def with_noise(
     added: Mapping[str, Array],
     sizes: Mapping[str, Array],
 ) -> Experiment:
-    """Return an experiment with noise ``added`` to samples (M,) of recorded inputs.
+    """Return an experiment with noise ``added`` to samples (M,) of recorded signals.
 
     By ``sizes`` (K,) the levels at rest are others: the simulation starts there, and what drives is
     taken from there.
@@ -226,7 +291,13 @@ def with_noise(
             own[level] += size[0]
         if signal in simulator.inputs.recorded:
             added[signal] = added.get(signal, 0.0) - size @ levels[signal].courses
-    return replace(experiment, own=own, simulator=with_added(simulator, added))
+    driving = {signal: added[signal] for signal in added.keys() & simulator.inputs.recorded.keys()}
+    channels = tuple(
+        replace(channel, measured=channel.measured + added.get(channel.signal, 0.0))
+        for channel in experiment.channels
+    )
+    noisy = with_added(simulator, driving)
+    return replace(experiment, own=own, simulator=noisy, channels=channels)
 
 
 def rest_noise(
@@ -366,12 +437,9 @@ def without_bias(
         errors, own = experiment.tangents(values, moves)
         jacobians.append(own)
         recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
-        levels = rest_levels(setup, experiment, recorded)
+        levels, powers = rest_levels(setup, experiment, recorded), phasor_in_powers(setup.record)
         for _ in range(PAIRS):
-            drawn = {
-                signal: deviation * generator.standard_normal(len(recorded[signal].samples))
-                for signal, deviation in deviations.items()
-            }
+            drawn = drawn_noise(generator, deviations, len(setup.record.time), powers)
             sizes = {
                 signal: own.weights @ drawn[signal][own.rest]
                 for signal, own in levels.items()
@@ -400,6 +468,23 @@ def without_bias(
     some = deviations > 0.0
     relative = np.where(some, bias, 0.0) / np.where(some, deviations, 1.0)
     return replace(residuals, experiments=experiments), relative
+
+
+def drawn_noise(
+    generator: np.random.Generator,
+    deviations: Mapping[str, float],
+    samples: int,
+    in_power: Mapping[str, ComplexArray],
+) -> dict[str, Array]:
+    """Draw noise (M,) of the driving signals, and what it is in powers of the same phasors."""
+    drawn: dict[str, Array] = {
+        signal: deviation * generator.standard_normal(samples)
+        for signal, deviation in deviations.items()
+    }
+    if in_power:
+        power = np.sum([in_power[signal] * drawn[signal] for signal in in_power], axis=0)
+        drawn |= {"p": power.real, "q": power.imag}
+    return drawn
 
 
 def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str]:

@@ -157,11 +157,10 @@ def _why_not_verified(result: FitResult) -> str | None:
     """
     if not result.holds:
         return f"{outcome_of(result)}: {explanation_of(result)}"
-    tests = result.verdict.residuals if result.comparison.is_event else ()
+    tests = result.verdict.refuted if result.comparison.is_event else ()
     others = [
         f"{test.signal} of {test.record}" if len(result.comparisons) > 1 else test.signal
         for test in tests
-        if not test.are_noise
     ]
     if not others:
         return None

@@ -14,7 +14,9 @@ from exfit.case.load import load_case
 from exfit.estimate import Stop
 from exfit.features.events import input_noise
 from exfit.features.events.input_noise import (
+    effect_of_window,
     noise_of_inputs,
+    phasor_in_powers,
     propagated_noise,
     rest_levels,
     with_added,
@@ -74,9 +76,7 @@ def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, m
     driven = signal in ("vt", "angle")
     for place in (0, 40, 100, 300) if driven else (0, 40):
         moved = {**columns, signal: columns[signal] + STEP * (np.arange(samples) == place)}
-        path = folder / "moved.csv"
-        rows = np.transpose([*moved.values()])
-        np.savetxt(path, rows, delimiter=",", header=",".join(moved), comments="", fmt="%.15g")
+        written(folder / "moved.csv", moved)
         until = {"test": {"steady_until": setup.test.steady}}
         (other,) = build_experiments(load_case(event_case(folder, "moved", free=False, **until)))
         change = (other.experiment.errors(values)[0] - usual) / STEP
@@ -85,6 +85,93 @@ def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, m
             after = np.tile(columns["t"] >= setup.test.steady, 2)
         off = np.linalg.norm((change - carried[:, first + place])[after])
         assert off < 0.04 * np.linalg.norm(change[after]), place
+
+
+def written(path, columns):
+    rows = np.transpose([*columns.values()])
+    header = ",".join(columns)
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.15g")
+
+
+@pytest.mark.parametrize("driving", ["angle", "frequency"])
+def test_a_window_moves_the_errors_as_it_is_said_to_while_the_angle_turns(folder, driving):
+    """A unit follows the frequency down; the window averages phasors over seven of 240 samples."""
+    rate, every, half = 240.0, 4, 3
+    time = np.arange(0.0, 12.0, 1.0 / rate)
+    after = np.maximum(time - 3.0, 0.0)
+    fall = -0.6 * (1.0 - np.exp(-after / 1.5)) ** 2  # Hz
+    angle = 2.0 * np.pi * np.cumsum(fall) / rate
+    columns = {"t": time, "vt": np.ones_like(time), "angle": angle, "p": 0.8 - fall, "q": fall}
+    until = {"test": {"steady_until": 3.0}}
+    written(folder / "fine.csv", columns)
+    case = load_case(event_case(folder, "fine", free=False, **until))
+    (setup,) = build_experiments(case)
+    p, q = setup.experiment.samples(case.values())[0].T
+    phasor = columns["vt"] * np.exp(1j * angle)
+    current = np.conj((p + 1j * q) / phasor)
+    errors = []
+    for width in (1, 2 * half + 1):
+        window = np.ones(width) / width
+        v, i = (
+            np.convolve(np.pad(each, width // 2, "edge"), window, "valid")
+            for each in (phasor, current)
+        )
+        power = v * np.conj(i)
+        turned = np.unwrap(np.angle(v))
+        shown = {
+            "t": time, "vt": np.abs(v), "angle": turned,
+            "frequency": 60.0 + np.gradient(turned, time) / (2.0 * np.pi),
+            "p": power.real, "q": power.imag,
+        }  # fmt: skip
+        written(folder / "pmu.csv", {name: each[::every] for name, each in shown.items()})
+        signals = ("vt", driving, "p", "q")
+        path = event_case(folder, "pmu", free=False, signals=signals, **until)
+        (setup,) = build_experiments(load_case(path))
+        errors.append(setup.experiment.errors(case.values())[0])
+    variance = half * (half + 1) / 3.0 / every**2  # of the time between samples squared
+    foretold = effect_of_window(setup, setup.experiment, case.values())
+    foretold *= -variance / input_noise.WINDOW
+    change = errors[1] - errors[0]
+    assert np.linalg.norm(change - foretold) < 0.05 * np.linalg.norm(change)
+
+
+@pytest.mark.parametrize("signal", ["vt", "angle"])
+def test_a_phasor_moves_the_errors_by_what_it_drives_and_by_its_powers(folder, monkeypatch, signal):
+    """Powers of other phasors do not follow it; means at rest do, to a few per cent."""
+    columns = recorded(folder / "apart.csv", noise=NOISE)
+    case = load_case(event_case(folder, "apart", free=False))
+    (setup,) = build_experiments(case)
+    assert phasor_in_powers(setup.record) == {}
+    quiet, rng = recorded(folder / "quiet.csv"), np.random.default_rng(3)
+
+    def of_phasors(in_vt, in_angle):
+        power = (quiet["p"] + 1j * quiet["q"]) * (1.0 + in_vt + 1j * in_angle)
+        vt = quiet["vt"] * (1.0 + in_vt)
+        return quiet | {
+            "vt": vt,
+            "angle": quiet["angle"] + in_angle,
+            "p": power.real,
+            "q": power.imag,
+        }
+
+    drawn = [NOISE * rng.standard_normal(len(columns["t"])) for _ in range(2)]
+    place, setups = 300, []
+    for size in (0.0, STEP):
+        own = [each + 0.0 for each in drawn]
+        own[signal == "angle"][place] += size
+        written(folder / "phasors.csv", of_phasors(*own))
+        (setup,) = build_experiments(load_case(event_case(folder, "phasors", free=False)))
+        setups.append(setup)
+    monkeypatch.setattr(input_noise, "noise_of_inputs", lambda _: {"vt": 1.0, "angle": 1.0})
+    monkeypatch.setattr(input_noise, "noise_of_channel", lambda _: 2.0)
+    before, after = (each.experiment.errors(case.values())[0] for each in setups)
+    change = (after - before) / STEP
+    samples = len(columns["t"])
+    foretold = propagated_noise(setups[0], case.values()).carried
+    foretold = foretold[:, place + samples * (signal == "angle")]
+    if signal == "vt":
+        foretold = foretold * quiet["vt"][place]
+    assert np.linalg.norm(change - foretold) < 0.04 * np.linalg.norm(change)
 
 
 def test_added_noise_does_to_a_simulation_what_it_does_in_a_record(folder):
@@ -102,9 +189,7 @@ def test_added_noise_does_to_a_simulation_what_it_does_in_a_record(folder):
     sizes = {name: levels[name].weights @ drawn[name][levels[name].rest] for name in drawn}
     added = with_noise(experiment, simulator, levels, drawn, sizes).samples(values)[0]
     noisy = {**columns, **{name: columns[name] + drawn[name] for name in drawn}}
-    rows = np.transpose([*noisy.values()])
-    path = folder / "with_noise.csv"
-    np.savetxt(path, rows, delimiter=",", header=",".join(noisy), comments="", fmt="%.15g")
+    written(folder / "with_noise.csv", noisy)
     until = {"test": {"steady_until": setup.test.steady}}
     (other,) = build_experiments(load_case(event_case(folder, "with_noise", free=False, **until)))
     in_record = other.experiment.samples(values)[0]
@@ -158,11 +243,13 @@ def fit_of(folder):
 
 
 @pytest.mark.long
-def test_without_noise_of_what_drives_a_fit_is_that_of_least_squares(fit_of):
+def test_without_noise_of_what_drives_a_fit_is_that_of_least_squares(fit_of, monkeypatch):
     """But for the means at rest, known to 1/11 of the noise: the intervals hold that, too.
 
-    The scatter of p and q is that of the residuals to 6 %: so much do the weights differ.
+    The phasors are known to be of no window here. The scatter of p and q is that of the residuals
+    to 6 %: so much do the weights differ.
     """
+    monkeypatch.setattr(input_noise, "WINDOW", 0.0)
     weighted = fit_of(0.0, weights="balanced")
     with mock.patch(WHY_NOT, return_value="here"):
         plain = fit_of(0.0)
