@@ -22,6 +22,7 @@ from exfit.errors import (
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.features.app.notebook import app
     from exfit.features.compare.agreement import compare
     from exfit.features.design.designed_test import design_test
     from exfit.features.design.experiment_design import identify
@@ -65,6 +66,7 @@ __all__ = [
     "RecordError",
     "SimulationError",
     "__version__",
+    "app",
     "batch",
     "cases_of_table",
     "check",

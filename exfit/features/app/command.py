@@ -7,9 +7,8 @@ from pathlib import Path
 
 import click
 
-from exfit.cli.given_files import RECORDS, GivenFile, Kind
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.streams import echo
-from exfit.errors import ExfitError
 
 
 @click.command(short_help="Drag sliders, see the response, fit, in a page.")
@@ -30,25 +29,9 @@ def app(case: Path, browser: bool) -> None:
     The page is served to this computer alone, under the address that is printed. Ctrl-C ends it, or
     the last page when it has been closed for a minute. Needs: pip install 'exfit[app]'.
     """
-    try:
-        from exfit.features.app.server import page_server
-    except ModuleNotFoundError as fault:
-        raise ExfitError(f"app needs {fault.name}: pip install 'exfit[app]'") from fault
-    from exfit.features.app.session import Session
-    from exfit.results.io import load_result
+    from exfit.features.app.server import page_server
 
-    result, path, record = None, case, None
-    if case.suffix.lower() in RECORDS:
-        record = case
-    elif case.is_dir() or case.suffix == ".json":
-        result = load_result(case)
-        path = result.case
-    first = Session(path, result, record)
-    try:
-        first.read()  # what is wrong is said here
-    finally:
-        first.close()
-    server, address = page_server(lambda: Session(path, result, record))
+    server, address = page_server(case)
     echo(f"{address}\nCtrl-C ends it", err=False)
     if browser and has_display():
         webbrowser.open(address)

@@ -33,10 +33,10 @@ class Try(Form):
     moving: bool = False
 
 
-class Store(Form):
-    """Values that someone has chosen: the starts of the draft."""
+class Chosen(Form):
+    """Values that someone has chosen: to start from, or to compare with records not fitted."""
 
-    do: Literal["store"]
+    do: Literal["store", "validate"]
     values: Values
 
 
@@ -57,17 +57,10 @@ class Lock(Form):
     value: FiniteFloat
 
 
-class Free(Form):
-    """A given value that the fit finds, too."""
+class Named(Form):
+    """A given value that the fit finds, too, or the free parameter of a profile."""
 
-    do: Literal["free"]
-    name: Name
-
-
-class Look(Form):
-    """A profile of a free parameter."""
-
-    do: Literal["profile"]
+    do: Literal["free", "profile"]
     name: Name
 
 
@@ -76,13 +69,6 @@ class Apply(Form):
 
     do: Literal["apply"]
     cause: Annotated[int, Field(ge=1, le=99)]
-
-
-class Validate(Form):
-    """Comparison with records that were not fitted, at values."""
-
-    do: Literal["validate"]
-    values: Values
 
 
 class Inspect(Form):
@@ -116,7 +102,7 @@ class Plain(Form):
 
 
 Message = Annotated[
-    Try | Store | Bound | Lock | Free | Look | Apply | Validate | Inspect | Draw | Make | Plain,
+    Try | Chosen | Bound | Lock | Named | Apply | Inspect | Draw | Make | Plain,
     Field(discriminator="do"),
 ]
 FORMS: TypeAdapter[Message] = TypeAdapter(Message)

@@ -5,26 +5,30 @@ import secrets
 import socket
 import time
 import traceback
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import uvicorn
-from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
-from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
-
 from exfit.errors import ExfitError
+
+try:
+    import uvicorn
+    from starlette.applications import Starlette
+    from starlette.concurrency import run_in_threadpool
+    from starlette.requests import HTTPConnection, Request
+    from starlette.responses import PlainTextResponse, Response
+    from starlette.routing import Route, WebSocketRoute
+    from starlette.types import ASGIApp, Receive, Scope, Send
+    from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+except ModuleNotFoundError as fault:
+    raise ExfitError(f"app needs {fault.name}: pip install 'exfit[app]'") from fault
+
 from exfit.features.app.beginning import LARGEST, dropped
-from exfit.features.app.messages import LONGEST, read_message
+from exfit.features.app.messages import LONGEST, Message, read_message
 from exfit.features.app.packing import packed
-from exfit.features.app.session import Content, Session
+from exfit.features.app.session import Content, Given, Session
 
 HERE = "127.0.0.1"
+BESIDE = ("fit", "profile")  # what runs beside the other messages of its page
 LINGER = 60.0  # s after the last page was closed: time to load it again
 PAGE = Path(__file__).parent / "page"
 FILES = {
@@ -33,10 +37,11 @@ FILES = {
     "plot.js": ("plot.js", "text/javascript"),
     "style.css": ("style.css", "text/css"),
 }
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors "
+)
 HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
-    "connect-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; "
-    "frame-ancestors 'none'",
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -88,36 +93,50 @@ class Doorkeeper:
             await WebSocket(scope, receive, send).close(1008)
 
 
-def page_server(make: Callable[[], Session], linger: float = LINGER) -> tuple["PageServer", str]:
-    """Make the server of pages, each with a session of its own; return its address, too."""
+def page_server(
+    given: Given, linger: float = LINGER, within: str = "'none'"
+) -> tuple["PageServer", str]:
+    """Make the server of pages, each with a session of its own; return its address, too.
+
+    It ends ``linger`` s after its last page; pages of the sources ``within`` may frame it. Raises
+    ExfitError for what cannot be shown.
+    """
+    first = Session(given)
+    try:
+        first.prepare()
+    except BaseException:
+        first.close()
+        raise
+    waiting = [first]
     listening = socket.create_server((HERE, 0))
     port, token = listening.getsockname()[1], secrets.token_urlsafe(24)
-    pages = Pages()
+    pages, headers = Pages(), {**HEADERS, "Content-Security-Policy": POLICY + within}
 
     async def file(request: Request) -> Response:
         name, kind = FILES.get(request.path_params.get("name", ""), ("", ""))
         if not name:
-            return PlainTextResponse("not found\n", 404, HEADERS)
-        return Response((PAGE / name).read_bytes(), 200, HEADERS, kind)
+            return PlainTextResponse("not found\n", 404, headers)
+        return Response((PAGE / name).read_bytes(), 200, headers, kind)
 
     async def drop(request: Request) -> Response:
         data = bytearray()
         async for part in request.stream():
             data += part
             if len(data) > LARGEST:
-                return PlainTextResponse(f"record: more than {LARGEST} bytes", 413, HEADERS)
+                return PlainTextResponse(f"record: more than {LARGEST} bytes", 413, headers)
         try:
             name = request.query_params.get("name", "")
             place = await run_in_threadpool(dropped, name, bytes(data))
         except ExfitError as fault:
-            return PlainTextResponse(str(fault), 400, HEADERS)
-        return PlainTextResponse(place.name, 200, HEADERS)
+            return PlainTextResponse(str(fault), 400, headers)
+        return PlainTextResponse(place.name, 200, headers)
 
     async def live(socket: WebSocket) -> None:
         await socket.accept()
         pages.opened()
         try:
-            await PageConversation(socket, make()).hold()
+            session = waiting.pop() if waiting else Session(given)
+            await PageConversation(socket, session).hold()
         finally:
             pages.left()
 
@@ -132,17 +151,23 @@ def page_server(make: Callable[[], Session], linger: float = LINGER) -> tuple["P
         app, log_level="critical", lifespan="off", ws="websockets-sansio",
         ws_max_size=4 * LONGEST, timeout_graceful_shutdown=1,
     )  # fmt: skip
-    return PageServer(config, listening, pages, linger), f"http://{HERE}:{port}/{token}/"
+    server = PageServer(config, listening, pages, linger, first)
+    return server, f"http://{HERE}:{port}/{token}/"
 
 
 class PageServer(uvicorn.Server):
     """A server that ends when the last page has been closed for a while."""
 
     def __init__(
-        self, config: uvicorn.Config, listening: socket.socket, pages: Pages, linger: float
+        self,
+        config: uvicorn.Config,
+        listening: socket.socket,
+        pages: Pages,
+        linger: float,
+        first: Session,
     ) -> None:
         super().__init__(config)
-        self.listening, self.pages, self.linger = listening, pages, linger
+        self.listening, self.pages, self.linger, self.first = listening, pages, linger, first
 
     async def on_tick(self, counter: int) -> bool:
         """Look whether it is time to end."""
@@ -152,11 +177,14 @@ class PageServer(uvicorn.Server):
 
     def serve_pages(self) -> None:
         """Serve until the last page is closed; raises KeyboardInterrupt at Ctrl-C."""
-        self.run([self.listening])
+        try:
+            self.run([self.listening])
+        finally:
+            self.first.close()  # of a page that was never opened
 
 
 class PageConversation:
-    """A page's messages and their answers: in turn, but for a fit, which runs beside the others."""
+    """A page's messages and their answers: in turn, but for a fit or a profile."""
 
     def __init__(self, socket: WebSocket, session: Session) -> None:
         self.socket, self.session = socket, session
@@ -169,23 +197,27 @@ class PageConversation:
         try:
             while True:
                 text = await self.socket.receive_text()
-                if '"fit"' in text or '"profile"' in text:
-                    task = asyncio.create_task(self._answer(text))
+                try:
+                    asked = read_message(text)
+                except ExfitError as fault:
+                    await self._send(refusal(fault))
+                    continue
+                if asked.do in BESIDE:
+                    task = asyncio.create_task(self._answer(asked))
                     self.beside.add(task)
                     task.add_done_callback(self.beside.discard)
                 else:
-                    await self._answer(text)
+                    await self._answer(asked)
         except (WebSocketDisconnect, KeyError):  # KeyError: of a message that is no text
             pass
         finally:
             await run_in_threadpool(self.session.close)
 
-    async def _answer(self, text: str) -> None:
+    async def _answer(self, asked: Message) -> None:
         try:
-            asked = read_message(text)
             content = await run_in_threadpool(self.session.answer, asked, self._send_from_thread)
         except ExfitError as fault:
-            content = {"of": "fault", "lines": str(fault).splitlines()}
+            content = refusal(fault)
         except OSError as fault:
             content = {"of": "fault", "lines": [f"{fault.filename}: {fault.strerror}"]}
         except KeyboardInterrupt:
@@ -206,3 +238,8 @@ class PageConversation:
                     await self.socket.send_bytes(data)
                 except (WebSocketDisconnect, RuntimeError):
                     return
+
+
+def refusal(fault: ExfitError) -> Content:
+    """Say why something is not done."""
+    return {"of": "fault", "lines": str(fault).splitlines()}

@@ -18,6 +18,7 @@ from exfit.case.changes import Changes, between, freed, number_text, part_of
 from exfit.case.load import load_case, parse_case
 from exfit.case.rewriting import with_changes
 from exfit.case.yaml import read_text
+from exfit.cli.given_files import RECORDS
 from exfit.cli.options import Output
 from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
@@ -29,6 +30,7 @@ from exfit.fitting.program import program_of
 from exfit.output import run_folder
 from exfit.output.live import STAGES
 from exfit.results.comparisons import Comparison
+from exfit.results.io import load_result
 from exfit.results.model import FitResult, Iteration
 from exfit.signals import label_of
 from exfit.util.files import on_disk, within, write
@@ -38,6 +40,7 @@ from exfit.workflows.exploring import Explorer, explorer
 from exfit.workflows.responses import LiveResponse
 
 Content = dict[str, Any]
+Given = Path | FitResult | None
 Send = Callable[[Content], None]
 
 WITHOUT_CASE = ("open", "inspect", "drawing", "make", "stop")
@@ -48,21 +51,31 @@ BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
 class Session:
     """One page: its case as it is on disk or in its draft, and what was made of it.
 
-    With a ``record`` there is no case yet: the page begins with what is in it.
+    It is ``given`` a case, the result of a fit, or a record. Of a record, or of nothing, there is
+    no case yet.
 
     ``seen`` are the texts of both files as this page knows them, None for one that is not there: a
     file that another page or program has changed is not written over.
     """
 
-    def __init__(
-        self, case: Path, result: FitResult | None = None, record: Path | None = None
-    ) -> None:
-        self.case_path, self.result, self.record = case, result, record
+    def __init__(self, given: Given = None) -> None:
         self.stack = ExitStack()
+        self.begun: Content | None = None
         self.seen = dict[Path, str | None]()
-        self.bounds = dict[str, tuple[float, float]]()
+        self.bounds: dict[str, tuple[float, float]]
         self.stopped = self.fitting = False
         self.explorer: Explorer
+        self._take(given)
+
+    def _take(self, given: Given) -> None:
+        """Turn to a case, a result or a record; raises ExfitError for a result that is none."""
+        if isinstance(given, Path) and (given.is_dir() or given.suffix == ".json"):
+            given = load_result(given)
+        self.result = given if isinstance(given, FitResult) else None
+        path = given.case if isinstance(given, FitResult) else given
+        self.record = path if path is not None and path.suffix.lower() in RECORDS else None
+        self.case_path = Path() if path is None or self.record else path
+        self.bounds = {}
 
     @property
     def draft(self) -> Path:
@@ -82,10 +95,22 @@ class Session:
 
     # ---- the case and its draft
 
+    def prepare(self) -> None:
+        """Read all that the page begins with, before it is opened; raises what ``read`` does."""
+        self.begun = self.read()
+
+    def _open(self) -> Content:
+        """Describe what the page begins with: as it was read, where it is still so on disk."""
+        begun, self.begun = self.begun, None
+        same = all(_text(path) == text for path, text in self.seen.items())
+        return begun if begun is not None and same else self.read()
+
     def read(self) -> Content:
         """Read the case, or its draft, and describe all that the page shows of it."""
         if self.record is not None:
             return inspected(self.record)
+        if not self.case_path.name:
+            return {"of": "start", "command": "exfit app"}
         files = (self.case_path, self.draft)
         self.seen = {path: _text(path) for path in files}
         if self.seen[self.case_path] is None:
@@ -195,10 +220,9 @@ class Session:
         match asked:
             case messages.Try():
                 return self.response(asked.values, asked.moving)
-            case messages.Store():
-                places = {f"{self._place(n)}.start": v for n, v in asked.values.items()}
-                self.change({place: number_text(value) for place, value in places.items()})
-                return self._changed()
+            case messages.Chosen():
+                choose = self._store if asked.do == "store" else self._validate
+                return choose(asked.values)
             case messages.Bound():
                 place = self._place(asked.name)
                 ends = {"min": number_text(asked.low), "max": number_text(asked.high)}
@@ -206,18 +230,19 @@ class Session:
                 return self._rebuilt(changed)
             case messages.Lock():
                 return self._lock(asked.name, asked.value)
-            case messages.Free():
-                return self._free(asked.name)
-            case messages.Inspect() | messages.Draw() | messages.Make():
-                return self._begin(asked)
-            case messages.Look():
-                return self._profile(asked.name)
+            case messages.Named():
+                look = self._free if asked.do == "free" else self._profile
+                return look(asked.name)
             case messages.Apply():
                 return self._apply(asked.cause)
-            case messages.Validate():
-                return self._validate(asked.values)
+            case messages.Inspect():
+                return self._inspect(asked.file)
+            case messages.Draw():
+                return drawn(asked.model)
+            case messages.Make():
+                return self._make(asked)
         plain: Mapping[str, Callable[[], Content]] = {
-            "open": self.read,
+            "open": self._open,
             "stop": self._stop,
             "save case": self._save_case,
             "save result": self._save_result,
@@ -241,6 +266,10 @@ class Session:
         compared = self.explorer.at({**of_record, **values}, quick=moving)
         records = [_record(each) for each in compared]
         return {"of": "try", "records": records, "cost": sum(each.cost for each in compared)}
+
+    def _store(self, values: Mapping[str, float]) -> Content:
+        self.change({f"{self._place(n)}.start": number_text(v) for n, v in values.items()})
+        return self._changed()
 
     def _changed(self) -> Content:
         return {"of": "store", "draft": self.draft.name, "command": self.command}
@@ -284,15 +313,6 @@ class Session:
         if not hasattr(self, "explorer") and do not in WITHOUT_CASE:
             raise ExfitError(f"{do}: there is no case yet: make one of a record")
 
-    def _begin(self, asked: "messages.Inspect | messages.Draw | messages.Make") -> Content:
-        match asked:
-            case messages.Inspect():
-                return self._inspect(asked.file)
-            case messages.Draw():
-                return drawn(asked.model)
-            case messages.Make():
-                return self._make(asked)
-
     def _inspect(self, file: str) -> Content:
         place = Path(file)
         if place.name != file or "\\" in file:
@@ -305,7 +325,7 @@ class Session:
         if self.record is None:
             raise ExfitError("record: there is none: drop one on the page")
         path, command = made(self.record, asked)
-        self.case_path, self.record, self.result, self.bounds = path, None, None, {}
+        self._take(path)
         said = {**self.read(), "words": f"written: {path}"}
         # no option gives machine data: the case that is there has them
         return said if asked.machine else {**said, "command": command}
@@ -457,7 +477,7 @@ class Session:
         path, folder = self.path, self._folder()
         run_folder.write_fit(self._fitted(), folder)
         applied = write_applied(path, str(number), folder)
-        self.case_path, self.result, self.bounds = applied.path, None, {}
+        self._take(applied.path)
         return {**self.read(), "words": f"written: {applied.path}: {applied.sentence}"}
 
 
@@ -504,4 +524,5 @@ def _record(match: Comparison, whole: bool = False) -> Content:
         for label, unit, (measured, _, simulated) in cells
         if has
     ]
-    return {"name": match.name, "file": match.record, "signals": signals, "features": features}
+    content = {"name": match.name, "file": match.record, "signals": signals, "features": features}
+    return {**content, "notes": list(match.notes)} if whole else content

@@ -153,6 +153,7 @@ function showRecords(records) {
   for (const record of records) {
     const box = make("article", {}, make("h3", {}, record.name === "fit" ? record.file : `${record.name}: ${record.file}`));
     const plots = { box, signals: new Map() };
+    for (const note of record.notes) box.append(make("p", { className: "quiet" }, note));
     if (record.match) box.append(make("p", { className: record.accepted ? "good" : "bad" }, [record.match, record.reason].filter(Boolean).join(": ")));
     for (const signal of record.signals) {
       const figures = make("span", { className: "quiet" }), readout = make("p", { className: "readout" });
