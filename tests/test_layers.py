@@ -19,7 +19,7 @@ IN_ORDER = (  # each of the core may import those above it, the leaves nothing
 LEAVES = {"signals", "dsp", "estimate", "inference", "engine"}
 # beside the core, and another feature only as here
 OTHER_FEATURES = {
-    "app": {"drawings", "report", "start"},
+    "app": {"drawings", "planner", "report", "start"},
     "fleet": {"planner", "programme", "report", "start"},
     "planner": {"start", "fleet", "translate"},
     "programme": {"report"},

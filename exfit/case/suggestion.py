@@ -103,9 +103,9 @@ class RecordSettings:
         table = open_table(file, self.sheet, self.memory)
         inspection = inspect(table, self.clock or None, self.unit)
         inspection = replace(inspection, sheet=self.sheet, memory=self.memory)
-        return inspection if not self.channels else self._with_channels(inspection)
+        return inspection if not self.channels else self.with_channels(inspection)
 
-    def _with_channels(self, inspection: Inspection) -> Inspection:
+    def with_channels(self, inspection: Inspection) -> Inspection:
         """Return an inspection in which given columns are the channels of signals."""
         channels = {channel.name: channel for channel in inspection.channels}
         named, faults = dict[str, InspectedChannel](), list[str]()

@@ -74,7 +74,9 @@ class FreeParameter:
 
     def scaled(self, value: float) -> float:
         """Number that the estimator moves for a value."""
-        return float(np.log(value)) if self.logarithmic else value / self._linear_scale
+        if not self.logarithmic:
+            return value / self._linear_scale
+        return float(np.log(value)) if value else -inf
 
     def value(self, scaled: float) -> float:
         """Return the parameter's own value; at a bound, exactly that bound."""

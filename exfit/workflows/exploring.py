@@ -19,6 +19,7 @@ from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.results.compare_with_record import compare_with_record, overlays_of
 from exfit.results.comparisons import Comparison
 from exfit.util.arrays import Array
+from exfit.workflows.given_values import changed_values
 
 Values = Mapping[str, float]
 
@@ -74,8 +75,10 @@ class Explorer:
         """Simulate each record's test at values of free parameters; others are at their starts.
 
         ``quick`` takes the steps that suffice at the start values, where these give a response.
-        Raises SimulationError where there is no response, and for ties without a value.
+        Raises CaseError for values that the equations exclude, SimulationError where there is no
+        response, and for ties without a value.
         """
+        changed_values(self.case, values, "values")
         starts = {each.name: each.start for each in self.residuals.free}
         try:
             whole = self.residuals.completed({**starts, **values})

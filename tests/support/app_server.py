@@ -7,8 +7,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def served(case, folder):
-    """Serve a case from a folder; give the process and the address that it prints."""
-    command = [sys.executable, "-m", "exfit", "app", str(case), "--no-browser"]
+    """Serve a case, None for none, from a folder; give the process and its address."""
+    given = [] if case is None else [str(case)]
+    command = [sys.executable, "-m", "exfit", "app", *given, "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
     try:
         yield process, process.stdout.readline().strip()

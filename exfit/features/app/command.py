@@ -13,14 +13,18 @@ from exfit.cli.streams import echo
 
 @click.command(short_help="Drag sliders, see the response, fit, in a page.")
 @click.argument(
-    "case", type=GivenFile(Kind.CASE, Kind.RECORD, Kind.RESULT), metavar="CASE|RECORD|RESULT"
+    "case",
+    type=GivenFile(Kind.CASE, Kind.RECORD, Kind.RESULT),
+    required=False,
+    metavar="[CASE|RECORD|RESULT]",
 )
 @click.option("--browser/--no-browser", default=True, help="Open the browser (default: yes).")
-def app(case: Path, browser: bool) -> None:
+def app(case: Path | None, browser: bool) -> None:
     """Open a page in the browser that shows CASE, or the RESULT of its fit.
 
-    Of a RECORD it shows the channels, as exfit inspect reads them, and makes the case, as exfit new
-    does. A record can be dropped on the page, too: it is kept in the working folder.
+    Of a RECORD it shows the channels, as exfit inspect reads them, to be corrected, and makes the
+    case, as exfit new does. Such files, and a planner's (.dyr, .dyd), can be dropped on the page or
+    chosen there, too: they are kept in the working folder.
 
     A slider for each free parameter moves the response beside the record. Fit shows each iteration,
     then the verdict, the intervals and the causes. Each change is stored in CASE-draft.yaml until

@@ -16,6 +16,7 @@ from exfit.errors import ExfitError
 
 LONGEST = 100_000  # characters of a message
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+Text = Annotated[str, StringConstraints(max_length=100)]
 Values = Annotated[dict[Name, FiniteFloat], Field(max_length=200)]
 
 
@@ -71,11 +72,20 @@ class Apply(Form):
     cause: Annotated[int, Field(ge=1, le=99)]
 
 
-class Inspect(Form):
-    """A record in the working folder, which was dropped there."""
+class Look(Form):
+    """A record, case, result or planner's file in the working folder, which was dropped there."""
 
-    do: Literal["inspect"]
+    do: Literal["look"]
     file: Name
+
+
+class Correct(Form):
+    """What a column of the record is: its signal ("" for none), its unit ("" as it is read)."""
+
+    do: Literal["correct"]
+    column: Name
+    signal: Text
+    unit: Text
 
 
 class Draw(Form):
@@ -86,10 +96,14 @@ class Draw(Form):
 
 
 class Make(Form):
-    """The case of the record that is shown: model, step (pu), rated voltage (kV), machine data."""
+    """The case of the record that is shown: model, step (pu), rated voltage (kV), machine data.
+
+    With a planner's file its ``unit``, counted from 0, has the model.
+    """
 
     do: Literal["make"]
-    model: Name
+    model: Text
+    unit: Annotated[int, Field(ge=0, le=99_999)] = 0
     step: FiniteFloat | None
     kv: FiniteFloat | None
     machine: Values
@@ -102,7 +116,7 @@ class Plain(Form):
 
 
 Message = Annotated[
-    Try | Chosen | Bound | Lock | Named | Apply | Inspect | Draw | Make | Plain,
+    Try | Chosen | Bound | Lock | Named | Apply | Look | Correct | Draw | Make | Plain,
     Field(discriminator="do"),
 ]
 FORMS: TypeAdapter[Message] = TypeAdapter(Message)

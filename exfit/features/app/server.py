@@ -123,7 +123,7 @@ def page_server(
         async for part in request.stream():
             data += part
             if len(data) > LARGEST:
-                return PlainTextResponse(f"record: more than {LARGEST} bytes", 413, headers)
+                return PlainTextResponse(f"file: more than {LARGEST} bytes", 413, headers)
         try:
             name = request.query_params.get("name", "")
             place = await run_in_threadpool(dropped, name, bytes(data))
@@ -142,7 +142,7 @@ def page_server(
 
     routes = [
         Route(f"/{token}/", file),
-        Route(f"/{token}/record", drop, methods=["POST"]),
+        Route(f"/{token}/file", drop, methods=["POST"]),
         Route(f"/{token}/{{name}}", file),
         WebSocketRoute(f"/{token}/live", live),
     ]

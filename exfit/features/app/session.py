@@ -18,17 +18,27 @@ from exfit.case.changes import Changes, between, freed, number_text, part_of
 from exfit.case.load import load_case, parse_case
 from exfit.case.rewriting import with_changes
 from exfit.case.yaml import read_text
-from exfit.cli.given_files import RECORDS
+from exfit.cli.given_files import DYNAMICS_FILES, RECORDS
 from exfit.cli.options import Output
 from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
 from exfit.estimate import Progress
 from exfit.features.app import messages
-from exfit.features.app.beginning import drawn, inspected, made
+from exfit.features.app.beginning import (
+    Planned,
+    channels_content,
+    corrected,
+    drawn,
+    made,
+    planned,
+    planner_content,
+    record_content,
+)
 from exfit.features.app.packing import thinned
 from exfit.fitting.program import program_of
 from exfit.output import run_folder
 from exfit.output.live import STAGES
+from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
 from exfit.results.io import load_result
 from exfit.results.model import FitResult, Iteration
@@ -43,7 +53,7 @@ Content = dict[str, Any]
 Given = Path | FitResult | None
 Send = Callable[[Content], None]
 
-WITHOUT_CASE = ("open", "inspect", "drawing", "make", "stop")
+WITHOUT_CASE = ("open", "look", "correct", "drawing", "make", "stop")
 DRAFT = "-draft"  # behind the name of a case: the file of its draft
 BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
 
@@ -61,10 +71,12 @@ class Session:
     def __init__(self, given: Given = None) -> None:
         self.stack = ExitStack()
         self.begun: Content | None = None
-        self.seen = dict[Path, str | None]()
+        self.seen: dict[Path, str | None]
         self.bounds: dict[str, tuple[float, float]]
-        self.stopped = self.fitting = False
+        self.stopped = self.fitting = self.corrected = False
         self.explorer: Explorer
+        self.found: Inspection | None = None
+        self.planner: Planned | None = None
         self._take(given)
 
     def _take(self, given: Given) -> None:
@@ -75,7 +87,20 @@ class Session:
         path = given.case if isinstance(given, FitResult) else given
         self.record = path if path is not None and path.suffix.lower() in RECORDS else None
         self.case_path = Path() if path is None or self.record else path
-        self.bounds = {}
+        self.seen, self.bounds = {}, {}
+        vars(self).pop("explorer", None)
+
+    def _turn_to(self, given: Given) -> Content:
+        """Read another case, result or record; where that fails, what was there stays."""
+        if self.fitting:
+            raise ExfitError("fit: one runs; stop it first")
+        kept = vars(self).copy()
+        try:
+            self._take(given)
+            return self.read()
+        except BaseException:
+            vars(self).update(kept)
+            raise
 
     @property
     def draft(self) -> Path:
@@ -108,7 +133,9 @@ class Session:
     def read(self) -> Content:
         """Read the case, or its draft, and describe all that the page shows of it."""
         if self.record is not None:
-            return inspected(self.record)
+            self.found, self.corrected = workflows.inspect(self.record), False
+            units = None if self.planner is None else planner_content(self.planner)
+            return {**record_content(self.found), "planner": units}
         if not self.case_path.name:
             return {"of": "start", "command": "exfit app"}
         files = (self.case_path, self.draft)
@@ -235,8 +262,10 @@ class Session:
                 return look(asked.name)
             case messages.Apply():
                 return self._apply(asked.cause)
-            case messages.Inspect():
-                return self._inspect(asked.file)
+            case messages.Look():
+                return self._look(asked.file)
+            case messages.Correct():
+                return self._correct(asked)
             case messages.Draw():
                 return drawn(asked.model)
             case messages.Make():
@@ -313,22 +342,29 @@ class Session:
         if not hasattr(self, "explorer") and do not in WITHOUT_CASE:
             raise ExfitError(f"{do}: there is no case yet: make one of a record")
 
-    def _inspect(self, file: str) -> Content:
+    def _look(self, file: str) -> Content:
         place = Path(file)
         if place.name != file or "\\" in file:
             raise ExfitError(f"{file}: not the name of a file in the working folder")
-        said = inspected(place)
-        self.record = place
-        return said
+        if place.suffix.lower() in DYNAMICS_FILES:
+            self.planner = planned(place)
+            return planner_content(self.planner)
+        return self._turn_to(place)
+
+    def _shown_record(self) -> Inspection:
+        if self.record is None or self.found is None:
+            raise ExfitError("record: there is none: drop one on the page")
+        return self.found
+
+    def _correct(self, asked: "messages.Correct") -> Content:
+        self.found, self.corrected = corrected(self._shown_record(), asked), True
+        return channels_content(self.found)
 
     def _make(self, asked: "messages.Make") -> Content:
-        if self.record is None:
-            raise ExfitError("record: there is none: drop one on the page")
-        path, command = made(self.record, asked)
-        self._take(path)
-        said = {**self.read(), "words": f"written: {path}"}
-        # no option gives machine data: the case that is there has them
-        return said if asked.machine else {**said, "command": command}
+        path, command = made(self._shown_record(), self.planner, asked)
+        said = {**self._turn_to(path), "words": f"written: {path}"}
+        # no option gives machine data or a channel: the case that is there has them
+        return said if asked.machine or self.corrected else {**said, "command": command}
 
     # ---- fit, profile, validation
 
@@ -477,8 +513,8 @@ class Session:
         path, folder = self.path, self._folder()
         run_folder.write_fit(self._fitted(), folder)
         applied = write_applied(path, str(number), folder)
-        self._take(applied.path)
-        return {**self.read(), "words": f"written: {applied.path}: {applied.sentence}"}
+        said = self._turn_to(applied.path)
+        return {**said, "words": f"written: {applied.path}: {applied.sentence}"}
 
 
 def _text(path: Path) -> str | None:

@@ -5,6 +5,7 @@ import shutil
 import urllib.error
 import urllib.request
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from app_server import served
@@ -12,7 +13,8 @@ from browsers import WIDTHS, barriers, chromium, html_errors, listened_to
 from places import ROOT
 
 import exfit
-from exfit.features.app.server import PAGE
+from exfit.features.app.server import PAGE, page_server
+from exfit.output import run_folder
 
 pytestmark = pytest.mark.long  # a browser, and a server of its own for each test
 
@@ -99,7 +101,7 @@ def test_from_a_dropped_record_to_a_saved_report(opened, case, tmp_path):
     drop(page, "bump.csv", (tmp_path / "sample_data" / "ac1a_up.csv").read_text())
     page.locator("#drawing img").wait_for()
     assert barriers(page) == ""
-    assert page.locator("#channels tbody tr").all_inner_texts()[0].split()[:2] == ["vt", "vt"]
+    assert page.get_by_label("signal of vt").input_value() == "vt"
     page.fill("#step", "0.05")
     page.click("summary")
     page.fill("#m-Tpd0", "6")
@@ -117,7 +119,7 @@ def test_from_a_dropped_record_to_a_saved_report(opened, case, tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("bump.exe", "t,vt\n", "not the name of a recorder's file"),
+        ("bump.exe", "t,vt\n", "not the name of a file to show"),
         ("bump.csv", "t,vt\n", "bump.csv"),
         ("../bump.csv", "t,vt\n", "not the name"),
     ],
@@ -188,6 +190,120 @@ def test_of_two_pages_the_second_writes_nothing_over_what_the_first_has_stored(o
     second.get_by_label("TE slider").press("ArrowLeft")
     second.locator("#message", has_text="was changed by another page").wait_for()
     assert case.with_name("ac1a_good-draft.yaml").read_text() == stored
+
+
+def test_a_case_that_an_editor_has_changed_is_not_written_over(opened, case):
+    page = opened()
+    case.write_text(case.read_text() + "# mine\n")
+    page.get_by_label("KA slider").press("ArrowRight")
+    page.locator("#message", has_text="was changed by another page or program").wait_for()
+    assert case.read_text().endswith("# mine\n")
+    assert not case.with_name("ac1a_good-draft.yaml").exists()
+
+
+def test_the_result_of_a_fit_is_shown_with_its_bands(browser, case, monkeypatch):
+    monkeypatch.chdir(case.parents[1])
+    result = exfit.fit(case, search="local")
+    run_folder.write_fit(result, Path("runs/one"))
+    with served("runs/one", case.parents[1]) as (_, address):
+        page = listened_to(browser.new_context())
+        page.goto(address)
+        page.locator(".band:visible").first.wait_for()
+        assert page.inner_text("#verdict").startswith(result.verdict.verdict)
+        assert page.locator("#save-report").is_enabled()
+        assert page.faults == []
+
+
+def test_the_server_ends_a_while_after_its_last_page(browser, case, monkeypatch):
+    monkeypatch.chdir(case.parents[1])
+    server, address = page_server(case, linger=0.5)
+    thread = Thread(target=server.serve_pages, daemon=True)
+    thread.start()
+    first, second = browser.new_page(), browser.new_page()
+    for page in (first, second):
+        page.goto(address)
+        page.locator(".parameter").first.wait_for()
+    first.close()
+    thread.join(2.0)  # longer than it lingers without any page
+    assert thread.is_alive()
+    second.reload()
+    second.locator(".parameter").first.wait_for()
+    second.close()
+    thread.join(60.0)
+    assert not thread.is_alive()
+
+
+@pytest.fixture
+def started(browser, case):
+    """Open the page of no file."""
+    with served(None, case.parents[1]) as (_, address):
+        page = listened_to(browser.new_context())
+        page.goto(address)
+        page.locator("#start").wait_for()
+        yield page
+
+
+def test_from_nothing_by_a_planner_s_file_and_a_record_to_the_case_of_a_unit(started, case):
+    page, folder = started, case.parents[1]
+    assert barriers(page) == ""
+    drop(page, "plant.dyr", (folder / "sample_data" / "unit.dyr").read_text())
+    page.locator("#message", has_text="bus 101, id 1").wait_for()
+    page.set_input_files("#file", folder / "sample_data" / "ac1a_up.csv")
+    page.locator("#drawing img").wait_for()
+    assert page.locator("#model").is_disabled()
+    assert page.input_value("#model") == "AC1A"
+    page.fill("#step", "0.05")
+    page.click("#make")
+    page.locator("#message", has_text="written: ac1a_up.yaml").wait_for()
+    words = "exfit new --record ac1a_up.csv --dyr plant.dyr --bus 101 --id 1 -o ac1a_up.yaml"
+    assert page.inner_text("#command") == f"{words} --step 0.05"
+    made = exfit.load_case(folder / "ac1a_up.yaml").values()
+    assert (made["KA"], made["machine.Tpd0"]) == (766.0, 6.0)
+    assert page.faults == []
+
+
+def test_a_channel_is_corrected_by_a_choice(started, case):
+    page, folder = started, case.parents[1]
+    text = (folder / "sample_data" / "ac1a_up.csv").read_text().replace("vt", "ifd", 1)
+    drop(page, "odd.csv", text)
+    page.get_by_label("signal of ifd").select_option("vt")
+    page.get_by_label("unit of ifd").fill("furlong")
+    page.get_by_label("unit of ifd").press("Enter")
+    page.locator("#message.bad", has_text="furlong").wait_for()
+    page.get_by_label("unit of ifd").fill("pu")
+    page.get_by_label("unit of ifd").press("Enter")
+    page.locator("#message.bad").wait_for(state="hidden")
+    page.fill("#step", "0.05")
+    page.click("#make")
+    page.locator("#message", has_text="written: odd.yaml").wait_for()
+    (recording,) = exfit.load_case(folder / "odd.yaml").recordings
+    assert recording.record.channels["vt"].column == "ifd"
+
+
+@pytest.mark.parametrize(("which", "way"), [("lower", -1), ("upper", 1)])
+def test_a_bound_is_dragged_by_the_mouse_and_by_keys(opened, case, which, way):
+    page = opened()
+    handle = page.get_by_label(f"drag the {which} bound of KA")
+    bound = page.get_by_label(f"{which} bound of KA", exact=True)
+    before = float(bound.input_value())
+    box = handle.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 20 * way, box["y"] + 5, steps=4)
+    page.mouse.up()
+    page.locator("#draft", has_text="draft").wait_for()
+    dragged = float(bound.input_value())
+    assert (dragged - before) * way > 0.0
+    handle.focus()
+    page.keyboard.press("ArrowLeft" if which == "upper" else "ArrowRight")
+    page.wait_for_function(
+        "([label, value]) => document.activeElement.getAttribute('aria-label') === label"
+        " && Number(document.activeElement.getAttribute('aria-valuenow')) !== value",
+        arg=[f"drag the {which} bound of KA", dragged],
+    )
+    free = exfit.load_case(case.with_name("ac1a_good-draft.yaml")).free()["KA"]
+    assert (free.min if which == "lower" else free.max) == float(bound.input_value())
+    assert page.faults == []
 
 
 def answered(address, **headers):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_messages import GOOD, mutant, outcome
+from page_messages import GOOD, mutant, odd, outcome
 from places import ROOT
 
 import exfit
@@ -151,6 +151,61 @@ def test_a_fit_that_is_stopped_keeps_its_best_point(session):
     assert not interrupted()
 
 
+# ---- from a record and a planner's file
+
+
+@pytest.fixture
+def looking(case):
+    """Begin a page with no file, in the folder of some."""
+    shutil.copy("sample_data/ac1a_up.csv", "up.csv")
+    shutil.copy("sample_data/unit.dyr", "unit.dyr")
+    made = Session()
+    assert ask(made, do="open") == {"of": "start", "command": "exfit app"}
+    yield made
+    made.close()
+
+
+def test_the_case_of_a_record_is_that_of_the_command_that_is_shown(looking, run, tmp_path):
+    ask(looking, do="look", file="up.csv")
+    said = ask(looking, do="make", model="ST1A", step=0.05, kv=None, machine={})
+    made = Path("up.yaml").read_text()
+    Path("up.yaml").unlink()
+    assert run(*said["command"].split()[1:]).code == 0
+    assert Path("up.yaml").read_text() == made
+
+
+def test_a_unit_of_a_planner_s_file_has_its_own_data(looking):
+    ask(looking, do="look", file="up.csv")
+    (unit,) = ask(looking, do="look", file="unit.dyr")["units"]
+    assert unit["exciter"] == "AC1A"
+    assert {row["name"]: row["typical"] for row in unit["machine"]}["Tpd0"] == 6.0
+    with pytest.raises(ExfitError, match=r"unit: 1: unit\.dyr has 1"):
+        ask(looking, do="make", model="", unit=1, step=0.05, kv=None, machine={})
+    ask(looking, do="make", model="", step=0.05, kv=None, machine={"Tpd0": 7.0})
+    assert looking.case.values()["machine.Tpd0"] == 7.0
+    assert looking.case.values()["KA"] == 766.0
+
+
+def test_a_corrected_channel_is_in_the_case(looking):
+    ask(looking, do="look", file="up.csv")
+    said = ask(looking, do="correct", column="efd", signal="", unit="")
+    assert {each["name"]: each["signal"] for each in said["channels"]}["efd"] == ""
+    ask(looking, do="correct", column="ifd", signal="vt", unit="pu")
+    said = ask(looking, do="make", model="AC1A", step=0.05, kv=None, machine={})
+    assert looking.case.recordings[0].record.channels["vt"].column == "ifd"
+    assert said["command"] == "exfit fit up.yaml"
+
+
+def test_a_file_that_cannot_be_read_leaves_what_is_shown(session):
+    Path("bad.yaml").write_text("plant: {type: nothing}\n")
+    shown = ask(session, do="open")
+    for file in ("bad.yaml", "nothing.csv", "../configs"):
+        with pytest.raises(ExfitError):
+            ask(session, do="look", file=file)
+    assert ask(session, do="open")["name"] == shown["name"]
+    ask(session, **GOOD["store"])
+
+
 # ---- mutants
 
 
@@ -161,3 +216,13 @@ def test_a_mutant_of_a_message_is_answered_or_refused_in_words(session, seed):
         text = mutant(rng)
         assert outcome(session, text), text
     assert load_case(session.path)
+
+
+@pytest.mark.parametrize("given", [None, "up.csv", "configs/ac1a_good.yaml"])
+def test_odd_values_in_the_right_form_are_answered_or_refused_in_words(looking, given):
+    session, rng = Session(given and Path(given)), random.Random(str(given))
+    session.prepare()
+    for _ in range(30):
+        text = odd(rng)
+        assert outcome(session, text), text
+    session.close()

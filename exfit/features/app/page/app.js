@@ -90,7 +90,10 @@ function addParameter(p) {
     "aria-label": `${which === "low" ? "lower" : "upper"} bound of ${p.name}`,
     onchange: (event) => send({ do: "bound", name: p.name, low: p.low, high: p.high, [which]: Number(event.target.value) }),
   });
+  p.ends = { low: end("low"), high: end("high") };
   p.band = make("div", { className: "band", hidden: true });
+  p.inner = make("div", { className: "inner" }, p.band, p.slider);
+  const handles = p.locked || !bounded ? [] : ["low", "high"].map((which) => handle(p, which));
   const lock = make("button", {
     type: "button", className: "small", "aria-pressed": String(p.locked), "aria-label": `Hold ${p.name}`,
     onclick: () => send(p.locked ? { do: "free", name: p.name } : { do: "lock", name: p.name, value: p.value }),
@@ -102,11 +105,48 @@ function addParameter(p) {
   p.text = make("div", { className: "quiet" });
   $("parameters").append(make("div", { className: "parameter" },
     make("div", { className: "head" }, make("label", { htmlFor: id, title: words }, p.name), p.box, make("span", { className: "quiet" }, p.unit)),
-    make("div", { className: "track" }, p.band, p.slider),
-    make("div", { className: "ends" }, end("low"), make("span", { className: "buttons" }, lock, profile), end("high")),
+    make("div", { className: "track" }, p.inner, ...handles),
+    make("div", { className: "ends" }, p.ends.low, make("span", { className: "buttons" }, lock, profile), p.ends.high),
     p.text));
   state.parameters.set(p.name, p);
   show(p);
+}
+
+function handle(p, which) { // drags a bound: within the track up to the value, without it as far as there is room
+  const upper = which === "high", room = 0.14, own = make("div", { className: `handle ${which}`, role: "slider", tabIndex: 0, "aria-label": `drag the ${upper ? "upper" : "lower"} bound of ${p.name}` });
+  let place = upper ? 1 : 0, dragged = false;
+  const valueOf = (k) => Number((p.logarithmic ? p.low * (p.high / p.low) ** k : p.low + k * (p.high - p.low)).toPrecision(3));
+  const told = () => {
+    own.style.setProperty("--place", place);
+    own.setAttribute("aria-valuenow", valueOf(place));
+    own.setAttribute("aria-valuetext", `${number(valueOf(place))} ${p.unit}`);
+  };
+  const to = (wanted) => {
+    const value = placeOf(p, p.value);
+    place = upper ? Math.max(value, Math.min(1 + room, wanted)) : Math.min(value, Math.max(-room, wanted));
+    p.ends[which].value = valueOf(place);
+    told();
+  };
+  const done = () => {
+    if (place !== (upper ? 1 : 0)) send({ do: "bound", name: p.name, low: p.low, high: p.high, [which]: valueOf(place) });
+  };
+  own.setAttribute("aria-valuemin", valueOf(-room));
+  own.setAttribute("aria-valuemax", valueOf(1 + room));
+  told();
+  own.addEventListener("pointerdown", (event) => { dragged = true; own.setPointerCapture(event.pointerId); });
+  own.addEventListener("pointermove", (event) => {
+    const box = p.inner.getBoundingClientRect();
+    if (dragged) to((event.clientX - box.left) / box.width);
+  });
+  own.addEventListener("pointerup", () => { dragged = false; done(); });
+  own.addEventListener("keydown", (event) => {
+    const way = { ArrowLeft: -0.01, ArrowDown: -0.01, ArrowRight: 0.01, ArrowUp: 0.01, PageDown: -0.1, PageUp: 0.1 }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    to(place + way);
+  });
+  own.addEventListener("keyup", done);
+  return own;
 }
 
 function show(p) {
@@ -196,19 +236,66 @@ function table(into, heads, rows) {
     make("tbody", {}, ...rows.map((row) => make("tr", {}, ...row.map((cell) => make("td", {}, cell))))));
 }
 
+function refocused(rebuild) { // what is made anew has the keyboard where it was
+  const name = document.activeElement?.getAttribute("aria-label"), id = document.activeElement?.id;
+  rebuild();
+  const again = id ? $(id) : name && [...document.querySelectorAll("[aria-label]")].find((each) => each.getAttribute("aria-label") === name);
+  if (again && again !== document.activeElement) again.focus({ preventScroll: true });
+}
+
+function corrections(channel) {
+  const changed = () => send({ do: "correct", column: channel.name, signal: is.value, unit: unit.value });
+  const unit = make("input", { type: "text", className: "unit", value: channel.unit, placeholder: "pu", "aria-label": `unit of ${channel.name}`, onchange: changed });
+  const is = make("select", { "aria-label": `signal of ${channel.name}`, onchange: changed },
+    ...["", ...state.signals].map((name) => make("option", { value: name, selected: name === channel.signal }, name || "–")));
+  return [unit, is];
+}
+
+function machineForm(rows) {
+  $("machine").replaceChildren(...rows.map((row) => make("p", { className: "field" },
+    make("label", { htmlFor: `m-${row.name}`, title: row.meaning }, `${row.name}, ${row.unit}`),
+    make("input", { id: `m-${row.name}`, type: "number", step: "any", placeholder: String(row.typical), min: row.low, max: row.high }))));
+}
+
+function planned() { // the planner's file has the model, and the machine's data where no others are given
+  const unit = state.planner.units[$("unit").selectedIndex];
+  machineForm(unit.machine);
+  $("model").value = unit.exciter;
+  $("model").disabled = true;
+  if (state.signals) send({ do: "drawing", model: unit.exciter });
+}
+
 // ---- what the server says
 
 const handlers = {
+  start() {
+    only("start");
+    $("title").textContent = "nothing open yet";
+  },
+  channels(said) {
+    refocused(() => {
+      const channels = make("table");
+      table(channels, ["channel", "unit", "is", "level", "noise"], said.channels.map((c) => [c.name, ...corrections(c), c.level, c.noise]));
+      $("channels").replaceChildren(channels);
+    });
+    $("findings").replaceChildren(...said.findings.map((finding) => make("li", {}, finding)));
+    say("");
+  },
+  planner(said) {
+    state.planner = said;
+    $("planner").hidden = false;
+    $("unit").replaceChildren(...said.units.map((unit) => make("option", {}, unit.name)));
+    planned();
+    say(state.signals ? "" : `${said.file}: ${said.units.map((unit) => unit.name).slice(0, 5).join("; ")}: open the record of a unit`);
+  },
   record(said) {
-    $("begin").hidden = false;
-    $("work").hidden = $("actions").hidden = true;
+    only("begin");
+    $("actions").hidden = true;
     drafted(false);
     $("name").textContent = said.file;
     $("title").textContent = "a record";
-    const channels = make("table");
-    table(channels, ["channel", "unit", "seems to be", "level", "noise"], said.channels.map((c) => [c.name, c.unit, c.signal, c.level, c.noise]));
-    $("channels").replaceChildren(channels);
-    $("findings").replaceChildren(...said.findings.map((finding) => make("li", {}, finding)));
+    state.signals = said.signals;
+    handlers.channels(said);
     $("curves").replaceChildren();
     for (const [name, curve] of Object.entries(said.curves)) {
       const canvas = make("canvas", { className: "low", "aria-label": `channel ${name} over time` }), readout = make("p", { className: "readout" });
@@ -216,9 +303,10 @@ const handlers = {
       new Plot(canvas, readout, ["current"], "s").set(said.time, { current: curve });
     }
     $("model").replaceChildren(...said.models.map((name) => make("option", { selected: name === "AC1A" }, name)));
-    $("machine").replaceChildren(...said.machine.map((row) => make("p", { className: "field" },
-      make("label", { htmlFor: `m-${row.name}`, title: row.meaning }, `${row.name}, ${row.unit}`),
-      make("input", { id: `m-${row.name}`, type: "number", step: "any", placeholder: String(row.typical), min: row.low, max: row.high }))));
+    state.machine = said.machine;
+    $("model").disabled = false;
+    if (said.planner) handlers.planner(said.planner);
+    else machineForm(said.machine);
     send({ do: "drawing", model: $("model").value });
     say("");
   },
@@ -227,16 +315,18 @@ const handlers = {
     $("drawing").replaceChildren(said.svg ? make("img", { src, alt: `block diagram: ${said.title}` }) : "no drawing");
   },
   open(said) {
-    $("begin").hidden = true;
-    $("work").hidden = $("actions").hidden = false;
+    only("work");
+    $("actions").hidden = false;
     $("name").textContent = said.name;
     document.title = `${said.name} – exfit`;
     $("title").textContent = said.title;
-    $("parameters").replaceChildren();
     state.parameters.clear();
     state.began = state.wanted = null;
     state.waiting = false;
-    said.parameters.forEach(addParameter);
+    refocused(() => {
+      $("parameters").replaceChildren();
+      said.parameters.forEach(addParameter);
+    });
     $("given").replaceChildren(make("option", { value: "" }, "choose …"), ...said.given.map((name) => make("option", {}, name)));
     $("more").hidden = !said.given.length;
     $("from").textContent = `at the start ${number(said.cost)}`;
@@ -359,25 +449,35 @@ $("copy").onclick = async () => {
   await navigator.clipboard.writeText($("command").textContent);
   $("copy").textContent = "Copied";
 };
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => state.plots.forEach((record) => record.signals.forEach((s) => { s.upper.draw(); s.lower.draw(); })));
 
 // ---- from a record
 
+const only = (id) => ["start", "begin", "work"].forEach((each) => { $(each).hidden = each !== id; });
 const given = (id) => ($(id).value === "" ? null : Number($(id).value));
+$("unit").onchange = planned;
 $("model").onchange = () => send({ do: "drawing", model: $("model").value });
 $("make").onclick = () => {
   const boxes = [...document.querySelectorAll("#machine input")].filter((box) => box.value !== "");
   const machine = Object.fromEntries(boxes.map((box) => [box.id.slice(2), Number(box.value)]));
-  send({ do: "make", model: $("model").value, step: given("step"), kv: given("kv"), machine });
+  const unit = state.planner ? $("unit").selectedIndex : 0;
+  send({ do: "make", model: $("model").value, unit, step: given("step"), kv: given("kv"), machine });
 };
 addEventListener("dragover", (event) => event.preventDefault());
-addEventListener("drop", async (event) => {
+addEventListener("drop", (event) => {
   event.preventDefault();
-  const [file] = event.dataTransfer.files;
-  if (!file || state.ended) return;
-  say(`reads ${file.name} …`);
-  const answer = await fetch(`record?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
-  const text = await answer.text();
-  if (answer.ok) send({ do: "inspect", file: text });
-  else say(text, true);
+  take([...event.dataTransfer.files]);
 });
+$("file").onchange = () => {
+  take([...$("file").files]);
+  $("file").value = "";
+};
+
+async function take(files) { // of a COMTRADE record all files are kept, then its .cfg is read
+  if (!files.length || state.ended) return;
+  say(`reads ${files.map((file) => file.name).join(", ")} …`);
+  for (const file of files) {
+    const answer = await fetch(`file?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+    if (!answer.ok) return say(await answer.text(), true);
+  }
+  send({ do: "look", file: (files.find((file) => /\.cfg$/i.test(file.name)) ?? files[0]).name });
+}
