@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -73,10 +73,12 @@ class FreeParameter:
         return {self.scaled(bound): bound for bound in (self.high, self.low)}
 
     def scaled(self, value: float) -> float:
-        """Number that the estimator moves for a value."""
+        """Number that the estimator moves for a value; nan for one that its scale does not have."""
         if not self.logarithmic:
             return value / self._linear_scale
-        return float(np.log(value)) if value else -inf
+        if value > 0.0:
+            return float(np.log(value))
+        return -inf if value == 0.0 else nan
 
     def value(self, scaled: float) -> float:
         """Return the parameter's own value; at a bound, exactly that bound."""
