@@ -15,7 +15,7 @@ from exfit.fitting.nuisances import OF_SYSTEM, Nuisance
 from exfit.records.record import Record
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import LARGEST_STEP, Response, Simulator
-from exfit.util.arrays import Array, Places
+from exfit.util.arrays import Array
 
 if TYPE_CHECKING:
     from exfit.dsp.filtering import Averages, Filtering
@@ -474,32 +474,6 @@ class ExperimentSetup:
         """Return everything that the simulation gives, on the clock of the record."""
         simulator, parameters = self.experiment.at(self.with_start_values(values))
         return simulator.response(parameters)
-
-
-def at_samples(setup: ExperimentSetup, places: Places) -> ExperimentSetup:
-    """Take a test at some of its samples alone; its channels are plain."""
-
-    def some(record: Record) -> Record:
-        signals = {name: samples[places] for name, samples in record.signals.items()}
-        return replace(record, time=record.time[places], signals=signals)
-
-    experiment = setup.experiment
-    channels = tuple(
-        replace(
-            each,
-            measured=each.measured[places],
-            filtering=each.filtering
-            and replace(each.filtering, time=each.filtering.time[places], kept=each.kept[places]),
-        )
-        for each in experiment.channels
-    )
-    simulator = experiment.simulator.at_times(experiment.simulator.times[places])
-    return replace(
-        setup,
-        record=some(setup.record),
-        whole=setup.whole and some(setup.whole),
-        experiment=replace(experiment, simulator=simulator, channels=channels),
-    )
 
 
 def compared(channel: Channel, samples: Array) -> Array:

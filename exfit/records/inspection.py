@@ -293,7 +293,6 @@ def _clock_of(
         raise RecordError(
             f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
         )
-    table.read_ahead(table.names)
     stamps = table.instants(clock.columns, unit)
     if len(stamps) < FEWEST_SAMPLES:
         raise RecordError(

@@ -108,12 +108,11 @@ def read_record(
     """
     table = open_table(path, sheet, memory)
     _check_units(table, channels, per_unit)
-    names = [name for channel in channels.values() for name in _column_names(channel)]
-    table.read_ahead([*clock.columns, *names])
     time = table.instants(clock.columns, clock.unit)
     check_finite(time, clock.label, table.place)
     check_increasing(time, clock.label, table.place, may_repeat=True)
     check_steps(time, clock.label, table.place)
+    names = [name for channel in channels.values() for name in _column_names(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
     columns = _numbers(table, phasors, names, gappy)
     refuse_uneven(path, {clock.columns[0]: time} | columns)

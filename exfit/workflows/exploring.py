@@ -11,14 +11,15 @@ from exfit.case.case import Case
 from exfit.dsp.features import Features
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.experiment import ExperimentSetup, at_samples
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import UNREACHABLE, Residuals
+from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record, overlays_of
 from exfit.results.comparisons import Comparison
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, Places
 from exfit.workflows.given_values import changed_values
 
 Values = Mapping[str, float]
@@ -128,7 +129,33 @@ def _looked(setup: ExperimentSetup) -> Looked:
     noted = replace(setup, record=replace(setup.record, notes=(*setup.record.notes, note)))
     extremes = (place for each in setup.channels for place in _extremes(each.measured))
     drawn = np.union1d([0, count - 1], [*extremes])
-    return Looked(at_samples(noted, places), at_samples(setup, drawn), count / len(places))
+    return Looked(_at_samples(noted, places), _at_samples(setup, drawn), count / len(places))
+
+
+def _at_samples(setup: ExperimentSetup, places: Places) -> ExperimentSetup:
+    """Take a test at some of its samples alone; its channels are plain."""
+
+    def some(record: Record) -> Record:
+        signals = {name: samples[places] for name, samples in record.signals.items()}
+        return replace(record, time=record.time[places], signals=signals)
+
+    experiment = setup.experiment
+    channels = tuple(
+        replace(
+            each,
+            measured=each.measured[places],
+            filtering=each.filtering
+            and replace(each.filtering, time=each.filtering.time[places], kept=each.kept[places]),
+        )
+        for each in experiment.channels
+    )
+    simulator = experiment.simulator.at_times(experiment.simulator.times[places])
+    return replace(
+        setup,
+        record=some(setup.record),
+        whole=setup.whole and some(setup.whole),
+        experiment=replace(experiment, simulator=simulator, channels=channels),
+    )
 
 
 def _extremes(samples: Array) -> Iterator[int]:

@@ -33,9 +33,6 @@ class Columns:
             except RecordError as fault:
                 yield name, fault
 
-    def read_ahead(self, names):
-        """Read nothing: all is here."""
-
     def instants(self, columns, unit=None):
         return self.content[columns[0]]
 

@@ -31,19 +31,19 @@ MACHINE = "GENROU"
 SHOWN = (*RECORDS, *CASES, *DYNAMICS_FILES, ".json")
 
 
-class Planned(NamedTuple):
+class PlannersFile(NamedTuple):
     """A planner's file and its units."""
 
     file: Path
     units: Sequence[Unit]
 
 
-def planned(file: Path) -> Planned:
+def planned(file: Path) -> PlannersFile:
     """Read a planner's file; raises DynamicsError where it cannot be read, or has no unit."""
-    return Planned(file, units_of_file(file).units or (import_unit(file),))  # which says why
+    return PlannersFile(file, units_of_file(file).units or (import_unit(file),))  # which says why
 
 
-def planner_content(planner: Planned) -> dict[str, Any]:
+def planner_content(planner: PlannersFile) -> dict[str, Any]:
     """Describe the units of a planner's file."""
     units = [
         {
@@ -129,7 +129,7 @@ def drawn(name: str) -> dict[str, Any]:
     return {"of": "drawing", "title": model.title, "svg": document(diagram) if diagram else ""}
 
 
-def made(found: Inspection, planner: Planned | None, asked: Make) -> tuple[Path, str]:
+def made(found: Inspection, planner: PlannersFile | None, asked: Make) -> tuple[Path, str]:
     """Write the case of a record in the working folder, and return it with its command.
 
     Its unit is one of a planner's file, where there is one. Raises ExfitError, and writes nothing,

@@ -25,7 +25,7 @@ from exfit.errors import ExfitError
 from exfit.estimate import Progress
 from exfit.features.app import messages
 from exfit.features.app.beginning import (
-    Planned,
+    PlannersFile,
     channels_content,
     corrected,
     drawn,
@@ -76,7 +76,7 @@ class Session:
         self.stopped = self.fitting = self.corrected = False
         self.explorer: Explorer
         self.found: Inspection | None = None
-        self.planner: Planned | None = None
+        self.planner: PlannersFile | None = None
         self._take(given)
 
     def _take(self, given: Given) -> None:

@@ -59,9 +59,6 @@ class Columns:
         """The column that holds the time, or those of date and time; empty where none seems to."""
         return self.time_columns or find_clock(self.names, self.stamps, partial(increases, self))
 
-    def read_ahead(self, names: Iterable[str]) -> None:
-        """Read nothing: each column is fetched by itself."""
-
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,), nan for samples that a ``gappy`` one lacks; see RecordTable."""
         columns = self._fetched([*names], gappy)

@@ -57,9 +57,6 @@ class RecordTable(Protocol):
     def clock(self) -> tuple[str, ...]:
         """The column that holds the time, or those of date and time; empty where none seems to."""
 
-    def read_ahead(self, names: Iterable[str]) -> None:
-        """Learn which columns are asked for next, one by one: some files give all faster."""
-
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
 

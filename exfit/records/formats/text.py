@@ -5,7 +5,6 @@ import hashlib
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice
@@ -103,20 +102,6 @@ class TextTable:
         stamps = [name for name, cell in zip(self.names, first, strict=False) if is_timestamp(cell)]
         return find_clock(self.names, stamps, partial(increases, self))
 
-    @cached_property
-    def _ahead(self) -> dict[str, Array]:
-        """Columns that were read before someone asks for them; they go to whoever does."""
-        return {}
-
-    def read_ahead(self, names: Iterable[str]) -> None:
-        """Read columns of numbers in one pass; what is wrong with one is said when it is asked."""
-        with suppress(RecordError, ValueError):
-            places = positions(self.path, self.names, dict.fromkeys(names))
-            self.limit.check_columns([self._count] * len(places), len(self.text.data))
-            if self._even:
-                data = self._loaded(self._numeric_lines(), places.values(), float)
-                self._ahead.update((name, data[:, at]) for at, name in enumerate(places))
-
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,), nan for samples that a ``gappy`` one lacks; see RecordTable."""
         names = [*names]
@@ -142,8 +127,6 @@ class TextTable:
             yield name, refused[name] if name in refused else columns[name]
 
     def _numbers(self, places: Mapping[str, int], gappy: frozenset[str]) -> dict[str, Array]:
-        if places and places.keys() <= self._ahead.keys():
-            return {name: self._ahead.pop(name) for name in places}
         if not self._even:
             self._refuse_first(places, partial(self._fault, gappy))
         try:
@@ -152,8 +135,7 @@ class TextTable:
             self._refuse_first(places, partial(self._fault, gappy))
             one_by_one: dict[int | str, Callable[[str], float]] = {
                 places[name]: lambda cell: np.nan if is_missing(cell) else float(cell)
-                for name in gappy
-                if name in places
+                for name in gappy & places.keys()
             }
             try:
                 data = self._loaded(self._numeric_lines(), places.values(), float, one_by_one)
