@@ -107,6 +107,10 @@ class Commands(click.Group):
         with unfailing_output() as exit_code, endings_as_interruptions() as signals:
             try:
                 return super().main(*arguments, obj=signals, **settings)
+            except Interruption as interruption:
+                interruption.show()
+                code = exit_code(interruption.exit_code)
+                raise SystemExit(code_after(signals, code)) from None
             except SystemExit as ended:
                 code = exit_code(ended.code)
                 if signals and not self.began:  # click makes an error of it

@@ -238,6 +238,9 @@ def announced(progress: str, **arguments: Any) -> "Iterator[Events | None]":
     except KeyboardInterrupt:
         code = Interruption.exit_code
         raise
+    except Interruption as ended:
+        code, error = ended.exit_code, str(ended)
+        raise
     except click.ClickException as fault:
         code, error = fault.exit_code, fault.format_message()
         raise
@@ -280,15 +283,18 @@ class Refusal(click.ClickException):
         echo("Error: " + "\n       ".join(lines), err=True, file=file)
 
 
-class Interruption(click.ClickException):
-    """Ctrl-C where no result is at hand that it could keep: the exit code that shells expect."""
+class Interruption(Exception):
+    """Ctrl-C where no result is at hand that it could keep: the exit code that shells expect.
+
+    None of click's: where a second Ctrl-C meets a message of those, click ends without it.
+    """
 
     exit_code = 130
 
-    def show(self, file: Any = None) -> None:
+    def show(self) -> None:
         """Print the message below the terminal's own ^C."""
-        line = ": ".join(filter(None, ("Interrupted", self.message)))
-        echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
+        line = ": ".join(filter(None, ("Interrupted", str(self))))
+        echo(f"\n{line}" if sys.stderr.isatty() else line, err=True)
 
 
 def refuse_own_files(

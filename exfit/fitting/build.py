@@ -1,6 +1,6 @@
 """The experiments of a case: its tests, ready to be simulated, with or without a record."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -48,19 +48,42 @@ def build_experiments(case: Case, start: Values | None = None) -> tuple[Experime
     """
     if not case.recordings:
         raise CaseError(f"{case.path}: record: missing; a fit needs a record")
-    values = case.values() if start is None else start
-    setups, sizes, free = list[ExperimentSetup](), list[RunSize](), len(case.free())
+    values, setups = case.values() if start is None else start, list[ExperimentSetup]()
     for recording in case.recordings:
-        setup = build_experiment(case, recording, values)
-        setups.append(setup)
-        own, free = setup.experiment.simulator, free + len(setup.free)
-        size = RunSize(own.steps, len(own.times), len(own.system.outputs), len(setup.channels))
-        sizes.append(size)
-        try:
-            check_fit(sizes, free, case.simulation.memory)
-        except SimulationError as fault:
-            raise CaseError(f"{case.path}: {fault}") from None
+        setups.append(build_experiment(case, recording, values))
+        check_memory(case, [setup.experiment for setup in setups])
     return tuple(setups)
+
+
+def build_unseen(
+    case: Case,
+    recordings: Iterable[Recording],
+    values: Values,
+    fitted: Iterable[ExperimentSetup] = (),
+) -> tuple[ExperimentSetup, ...]:
+    """Build the experiments of records that are compared and not fitted, beside those ``fitted``.
+
+    Raises CaseError where they need more memory together than a command may take.
+    """
+    setups, beside = list[ExperimentSetup](), [setup.experiment for setup in fitted]
+    for recording in recordings:
+        setups.append(build_experiment(case, recording, values))
+        check_memory(case, beside, [setup.experiment for setup in setups])
+    return tuple(setups)
+
+
+def check_memory(
+    case: Case, fitted: Sequence[Experiment], unseen: Sequence[Experiment] = ()
+) -> None:
+    """Raise CaseError where tests need more memory together than a command may take."""
+    free = len(case.free()) + sum(len(each.nuisances) for each in fitted)
+    runs = [(each.simulator, len(each.channels)) for each in fitted]
+    runs += [(each.simulator, 0) for each in unseen]
+    sizes = [RunSize(run.steps, len(run.times), len(run.system.outputs), n) for run, n in runs]
+    try:
+        check_fit(sizes, free, case.simulation.memory)
+    except SimulationError as fault:
+        raise CaseError(f"{case.path}: {fault}") from None
 
 
 def build_experiment(case: Case, recording: Recording, values: Values) -> ExperimentSetup:

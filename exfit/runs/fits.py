@@ -11,7 +11,7 @@ from exfit import estimate, workflows
 from exfit.case.case import Case
 from exfit.case.load import CaseOrPath
 from exfit.errors import CaseError, ExfitError
-from exfit.fitting.build import build_experiment
+from exfit.fitting.build import build_unseen
 from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import outcome_of
@@ -144,10 +144,8 @@ def planned(
     def check_fit(source: Any) -> None:
         """Read the records of a case; raises ExfitError where no fit could begin."""
         case = load(source)
-        fitted(case)
-        values = case.values()
-        for recording in case.validations:
-            build_experiment(case, recording, values)
+        setups, _ = fitted(case)
+        build_unseen(case, case.validations, case.values(), setups)
         read.append(case)
 
     files = [case for case in cases if not isinstance(case, Case)]

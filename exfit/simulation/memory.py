@@ -9,7 +9,6 @@ from typing import NamedTuple
 from exfit.errors import SimulationError
 
 GIGABYTE = 1e9
-DEFAULT_MEMORY = 2.0  # GB
 OWN = 0.25e9  # bytes, of Python and the libraries
 NUMBER = 8  # bytes of a float64
 OF_STEP, OF_SAMPLE = 20, 50  # numbers that each of them takes, beside those of outputs
@@ -20,7 +19,7 @@ OF_JACOBIAN = 10  # numbers of each derivative: Jacobians, their factors, what i
 
 
 class RunSize(NamedTuple):
-    """What the memory of the runs of a test follows from."""
+    """What the memory of the runs of a test follows from; of a fit it has ``compared`` outputs."""
 
     steps: float
     samples: int
@@ -40,13 +39,15 @@ def check_run(size: RunSize, step: float, memory: float) -> None:
 def check_fit(sizes: Iterable[RunSize], free: int, memory: float) -> None:
     """Raise SimulationError where a fit of free parameters to records needs more than memory, GB.
 
-    The records of a fit stay in memory together; their runs follow one another in each thread.
+    The records of a command stay in memory together, those that are only compared too; their runs
+    follow one another in each thread.
     """
     from exfit.util.processes import processors
 
     sizes = tuple(sizes)
     kept = sum(
-        OF_STEP * each.steps + (OF_SAMPLE + OF_JACOBIAN * free) * each.samples for each in sizes
+        OF_STEP * each.steps + (OF_SAMPLE + OF_JACOBIAN * free * bool(each.compared)) * each.samples
+        for each in sizes
     )
     whole = max(HALVED * each.outputs * each.steps for each in sizes)
     blocks = -(-free // SIDE_BY_SIDE)
@@ -54,11 +55,8 @@ def check_fit(sizes: Iterable[RunSize], free: int, memory: float) -> None:
     runs = processors() * SIDE_BY_SIDE * blocks * side_by_side
     needed = OWN + NUMBER * (kept + whole + runs)
     steps, samples = (sum(getattr(each, name) for each in sizes) for name in ("steps", "samples"))
-    check(
-        needed,
-        memory,
-        f"a fit of {free} parameters to {samples} samples by {steps:.3g} steps (simulation.step)",
-    )
+    to = f"a fit of {free} parameters to " if any(each.compared for each in sizes) else ""
+    check(needed, memory, f"{to}{samples} samples by {steps:.3g} steps (simulation.step)")
 
 
 def check(needed: float, memory: float, what: str) -> None:

@@ -18,7 +18,7 @@ from exfit.signals import OF_STEP
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
 from exfit.simulation.located_test import LocatedTest, SamplePlaces, exact
-from exfit.simulation.memory import DEFAULT_MEMORY, RunSize, check_run
+from exfit.simulation.memory import RunSize, check_run
 from exfit.simulation.responder import Counts, Kept, Responder, Values
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
@@ -81,7 +81,7 @@ class Simulator:
     ``responder`` gives the response at these times in place of the equations, not that on the grid.
     ``located``, the crossings of limits are found within a step, which starts anew from there; with
     an ``accuracy`` (pu) the step is one by which signals err by less, see ``with_enough_substeps``.
-    Raises SimulationError where that takes more than so much ``memory``, GB.
+    Raises SimulationError where that takes more than so much ``memory``, GB; a case gives it.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Simulator:
         responder: Responder | None = None,
         located: bool = False,
         accuracy: float | None = None,
-        memory: float = DEFAULT_MEMORY,
+        memory: float = inf,
     ) -> None:
         steps = (inputs.end - inputs.start) / step
         check_run(RunSize(steps, len(times), len(system.outputs)), step, memory)

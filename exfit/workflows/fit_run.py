@@ -10,7 +10,7 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.parts import MEANINGS
 from exfit.case.schema import SINGLE, Estimate
-from exfit.fitting.build import build_experiment
+from exfit.fitting.build import build_unseen
 from exfit.fitting.channel_weights import weight_notes
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import scaled_values
@@ -93,7 +93,8 @@ def fit_result(
     timer = clock.process_time if program is None else clock.perf_counter
     search_began = timer()
     setups, problem = fitted(case, program)
-    unseen = _unseen(case, program)
+    unseen = build_unseen(case, case.validations, case.values(), setups)
+    unseen = unseen if program is None else program.simulated(unseen)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     (hashes, names), case_text = inputs_of(case, used), text_of(case)
@@ -244,12 +245,6 @@ def _announce(
         if response is not None:
             live(response)
     progress(_iteration(line, residuals))
-
-
-def _unseen(case: Case, program: Program | None) -> tuple[ExperimentSetup, ...]:
-    start = case.values()
-    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
-    return unseen if program is None else program.simulated(unseen)
 
 
 def _comparisons(

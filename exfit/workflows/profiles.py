@@ -11,7 +11,7 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
 from exfit.errors import CaseError
-from exfit.fitting.build import build_experiment
+from exfit.fitting.build import build_unseen
 from exfit.fitting.channel_weights import as_fitted
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.problem import FitProblem, with_setups
@@ -208,7 +208,7 @@ def _searched(
     """Search a case to its minimum; raises KeyboardInterrupt at an interruption."""
     options = case.estimate.to_the_minimum()
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
-    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
+    unseen = build_unseen(case, judged, start, setups)
     at = case, setups, unseen, problem, options.strategy, options, program
     state = in_turn(SEARCH, SearchState(*at, watch=progress))
     if state.interrupted:

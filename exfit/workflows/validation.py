@@ -11,7 +11,7 @@ from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import SPIKE_LIMIT, noise_of, spikes
 from exfit.errors import CaseError
-from exfit.fitting.build import build_experiment
+from exfit.fitting.build import build_experiments, build_unseen
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import scaled_values
 from exfit.fitting.problem import residuals_of
@@ -115,12 +115,14 @@ def validate(
             f"{case.path}: step and at need a record with them: --record (record in Python)"
         )
     saw: tuple[Recording, ...] = ()
+    setups: Sequence[ExperimentSetup] = ()
     if values is None:
         case, own = model_as_found(case)
     else:
         own = values_of(case, changes_of(case, values))
-        saw = case.recordings if case.free() else ()
-    tests = [_fitted(case, recording, own, program) for recording in saw]
+        if case.free() and case.recordings:
+            saw, setups = case.recordings, build_experiments(case, own)
+    tests = [_fitted(case, *pair, own, program) for pair in zip(saw, setups, strict=True)]
     matches = [test.comparison for test in tests]
     if record is not None:
         case, test = _validated_by_hand(case, matches, own, record, given, program)
@@ -132,10 +134,9 @@ def validate(
         recordings = (*(() if saw else case.recordings), *case.validations)
         if not recordings:
             raise CaseError(f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}")
-        setups = [
-            by_program(program, build_experiment(case, each, own), own) for each in recordings
-        ]
-        pairs = zip(recordings, setups, strict=True)
+        unseen = build_unseen(case, recordings, own, setups)
+        unseen = tuple(by_program(program, setup, own) for setup in unseen)
+        pairs = zip(recordings, unseen, strict=True)
         tests += [_validated(case, matches, *pair, own) for pair in pairs]
     described = other_program_of(case, program, [test.setup for test in tests])
     return Validation(case, own, tuple(tests), described)
@@ -146,10 +147,13 @@ def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
 
 
 def _fitted(
-    case: Case, recording: Recording, values: Values, program: Program | None
+    case: Case,
+    recording: Recording,
+    setup: ExperimentSetup,
+    values: Values,
+    program: Program | None,
 ) -> ComparedTest:
-    setup = build_experiment(case, recording, values).with_enough_substeps(values)
-    setup = by_program(program, setup, values)
+    setup = by_program(program, setup.with_enough_substeps(values), values)
     moves = None
     if program is None:  # a run of it for each would be many
         residuals = residuals_of(case, [setup])

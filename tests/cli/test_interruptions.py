@@ -8,8 +8,9 @@ import signal
 import injected
 import pytest
 from ended_commands import contents
-from writers import EVERY
+from writers import INTERRUPTED
 
+from exfit.cli.options import Interruption
 from exfit.output import events
 from exfit.util import files
 
@@ -25,7 +26,7 @@ FEW = ("profile", "fit")  # the others take longer
 OPTIONS = ("--no-plots", "--progress", "json", "-q", "-o", "folder")
 
 GAPS = (0, 1, 10, 40, 200)  # entries until the second one; 0: none
-QUICK = ("simulate", "check", "show", "import", "trust", "new", "export --plb")
+QUICK = ("app", "simulate", "check", "show", "import", "trust", "new", "export --plb")
 DRAWN = {"verify": 2, "rank": 4}  # which take seconds for each
 
 pytestmark = pytest.mark.usefixtures("in_prepared_folder")
@@ -97,9 +98,16 @@ def test_an_interruption_that_something_swallows_is_an_exit_code(run, monkeypatc
     assert ran.err == "Interrupted: what was done until then is kept\n"
 
 
+def test_an_interruption_is_said_where_another_meets_its_message(monkeypatch):
+    monkeypatch.setattr(Interruption, "show", lambda _: signal.raise_signal(signal.SIGINT))
+    first = injected.Injection(injected.Entry("case/load.py", 1))
+    ran = injected.run(("check", "case.yaml"), first)
+    assert (ran.code, ran.err) == (130, "Interrupted\n")
+
+
 @pytest.mark.parametrize(
     "name",
-    [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in EVERY],
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in INTERRUPTED],
 )
 def test_an_interruption_at_any_module_of_any_command_is_never_swallowed(
     folder_of_all, tmp_path, monkeypatch, name
@@ -107,9 +115,11 @@ def test_an_interruption_at_any_module_of_any_command_is_never_swallowed(
     """One or two at some of the entries; tests/studies/interrupts.py has them at all."""
     monkeypatch.chdir(folder_of_all)
     monkeypatch.setenv("EXFIT_CONFIG", str(tmp_path))
-    entries = injected.entries(EVERY[name])
+    if name == "app":
+        pytest.importorskip("uvicorn")
+    entries = injected.entries(INTERRUPTED[name])
     whole, rng = {*contents(folder_of_all)}, random.Random(name)
     for at in rng.sample(entries, min(DRAWN.get(name, 8), len(entries))):
         gap = rng.choice(GAPS)
-        ended = injected.interrupted(EVERY[name], at, gap, whole, folder_of_all)
+        ended = injected.interrupted(INTERRUPTED[name], at, gap, whole, folder_of_all)
         assert ended.faults == [], (at, gap)

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import yaml
 from extreme_cases import TYPICAL, run, write_case
+from places import SAMPLES
 
+from exfit.cli import main
 from exfit.errors import SimulationError
 from exfit.simulation.memory import GIGABYTE, RunSize, check_fit, check_run
 
@@ -24,6 +26,49 @@ def test_the_records_of_a_fit_share_its_memory():
     check_fit([RECORD] * 3, 5, 2.0)
     with pytest.raises(SimulationError, match=r"5 parameters to 2000000 samples by 1e\+07 steps"):
         check_fit([RECORD] * 100, 5, 2.0)
+
+
+SIMULATING = (
+    ("validate", "case.yaml", "--parameters", "values.yaml"),
+    ("validate", "unseen.yaml"),
+    ("profile", "case.yaml"),
+    ("identify", "case.yaml"),
+    ("identify", "case.yaml", "--design"),
+    ("check", "case.yaml"),
+)
+FITTING = (
+    ("fit", "case.yaml"),
+    ("fit", "case.yaml", "case.yaml"),
+    ("run", "case.yaml"),
+    ("rank", "case.yaml", "--models", "AC1A", "--no-plots"),
+    ("batch", "case.yaml", "--workers", "1"),
+)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [*SIMULATING, *(pytest.param(each, marks=pytest.mark.long) for each in FITTING)],
+    ids=" ".join,
+)
+def test_the_records_of_any_command_share_its_memory(tmp_path, monkeypatch, capfd, arguments):
+    """Each of forty records is within the limit, and all of them are not."""
+    monkeypatch.chdir(tmp_path)
+    free = TYPICAL["parameters"]["free"]
+    case = {**TYPICAL, "simulation": {"memory": 0.26}, "validate": []}
+    record = {**TYPICAL["record"], "file": str(SAMPLES / "ac1a_up.csv")}
+    one = {"test": case.pop("test"), "record": record}
+    case["records"] = [{"name": f"r{k}", **one} for k in range(40)]
+    del case["record"]
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(case), encoding="utf-8")
+    values = {name: row["start"] for name, row in free.items()}
+    (tmp_path / "values.yaml").write_text(yaml.safe_dump({"parameters": values}), encoding="utf-8")
+    fixed = case["parameters"]["fixed"] | values
+    case |= {"parameters": {"fixed": fixed}, "validate": case.pop("records")}
+    (tmp_path / "unseen.yaml").write_text(yaml.safe_dump(case), encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(args=arguments, prog_name="exfit")
+    said = " ".join("".join(capfd.readouterr()).split())
+    assert "simulation.memory raises it" in said
 
 
 @pytest.mark.parametrize(("step", "code"), [(1e-6, 1), (0.02, 0)])

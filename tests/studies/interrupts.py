@@ -10,8 +10,8 @@ Then as many signals as COMMANDS says, of each kind, meet each of some other com
 an exit code that is none of such an end, a traceback, or a file too many or too few.
 
 ``--entries [SHARE [NAME,...]]`` instead interrupts every command, once and twice, where it enters a
-module of exfit for the first time and for the last, and lists what is wrong and the longest time,
-s of the processor, that one went on; of a SHARE of the entries, drawn.
+module of exfit for the first time and for the last, and lists what is wrong and the longest times
+that one went on, s of the processor and of the clock; of a SHARE of the entries, drawn.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 import injected
 from ended_commands import ENDS, WITH_SIGNALS, contents, fault_of, undisturbed
 from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by, seconds_of_fit
-from writers import EVERY, FIT_BEFORE, prepare, prepare_every
+from writers import FIT_BEFORE, INTERRUPTED, prepare, prepare_every
 
 INTERRUPTIONS, KILLS, COMMANDS, SEED = 200, 100, 10, 2026
 WRITING = 0.06  # s: about how long the numbers take
@@ -80,16 +80,19 @@ def study_commands(count, place):
 def study_entries(share, names):
     """Interrupt commands at entries into modules, and print what is wrong."""
     for name in names:
-        entries, wrong, longest = injected.entries(EVERY[name]), [], (0.0, None)
+        entries, wrong, times = injected.entries(INTERRUPTED[name]), [], []
         whole, rng = {*contents(Path.cwd())}, random.Random(f"{SEED} {name}")
         drawn = rng.sample(entries, max(round(share * len(entries)), 1))
         for at in drawn:
             for gap in (0, rng.choice(SECOND)):
-                ended = injected.interrupted(EVERY[name], at, gap, whole, Path.cwd())
+                ended = injected.interrupted(INTERRUPTED[name], at, gap, whole, Path.cwd())
                 wrong += [(at, gap, fault) for fault in ended.faults]
-                longest = max(longest, (ended.seconds, (at, gap)))
+                times.append((*ended.seconds, (*at, gap)))
         print(f"{name}: {2 * len(drawn)} interruptions at {len(drawn)} of {len(entries)} entries: ")
-        print(f"    {len(wrong)} faults, at most {longest[0]:.2f} s, {longest[1]}", flush=True)
+        processor, _, where = max(times)
+        clock = max(time[1] for time in times)
+        print(f"    {len(wrong)} faults, at most {processor:.2f} s of the processor, {where}, "
+              f"{clock:.2f} s by the clock", flush=True)  # fmt: skip
         for fault in wrong[:3]:
             print("   ", *fault)
 
@@ -97,7 +100,7 @@ def study_entries(share, names):
 def main():
     """Print what is left after interruptions and kills."""
     if "--entries" in sys.argv:
-        share, names = (*sys.argv[2:], *("1", ",".join(EVERY))[len(sys.argv) - 2 :])
+        share, names = (*sys.argv[2:], *("1", ",".join(INTERRUPTED))[len(sys.argv) - 2 :])
         with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
             os.environ["EXFIT_CONFIG"] = str(Path(place).with_suffix(".configuration"))
             signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -7,15 +7,18 @@ interrupted when a command enters it for the first time and for the last.
 import contextlib
 import inspect
 import io
+import math
 import os
 import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
+from unittest import mock
 
+import numpy as np
 from ended_commands import contents
 
 from exfit import __main__
@@ -51,7 +54,7 @@ class Injection:
     def __init__(self, at: Entry | None = None, gap: int = 0) -> None:
         self.at, self.gap = at, gap
         self.counts, self.since = Counter[str](), 0
-        self.sent: list[float] = []  # s of processor time, at each that was sent
+        self.sent: list[tuple[float, float]] = []  # s of processor time and of the clock, at each
 
     def __call__(self, frame, event: str, _) -> None:
         code = frame.f_code
@@ -66,7 +69,7 @@ class Injection:
         if self.sent:
             self.since += 1
         if first or (len(self.sent) == 1 and self.gap and self.since == self.gap):
-            self.sent.append(time.process_time())
+            self.sent.append(_now())
             try:
                 signal.raise_signal(signal.SIGINT)
             except KeyboardInterrupt as interruption:  # which takes this function away
@@ -79,20 +82,28 @@ class Injection:
             sys.setprofile(self)
 
 
+def _now() -> tuple[float, float]:
+    return time.process_time(), time.monotonic()
+
+
 class Ran(NamedTuple):
-    """How a command ended, what it wrote to standard error, and what it was given."""
+    """How a command ended, what it wrote to standard error, and how long it went on, s.
+
+    Since the first interruption: by the processor, and by the clock.
+    """
 
     code: int | None
     err: str
-    seconds: float  # of processor time since the first interruption
+    seconds: tuple[float, float]
 
 
 def run(arguments: tuple[str, ...], injection: Injection) -> Ran:
     """Run a command in this process as the program does, with an injection."""
     out, err, code = io.StringIO(), io.StringIO(), None
     given, sys.argv = sys.argv, ["exfit", *arguments]
+    ending = _page_that_ends() if arguments[0] == "app" else contextlib.nullcontext()
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        with ending, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             sys.setprofile(injection)
             try:
                 __main__.main()
@@ -102,9 +113,9 @@ def run(arguments: tuple[str, ...], injection: Injection) -> Ran:
                 sys.setprofile(None)
     finally:
         sys.argv = given
-    since = time.process_time() - injection.sent[0] if injection.sent else 0.0
+    processor, clock = np.subtract(_now(), injection.sent[0]) if injection.sent else (0.0, 0.0)
     injection.gap = 0
-    return Ran(code, err.getvalue(), since)
+    return Ran(code, err.getvalue(), (processor, clock))
 
 
 def entries(arguments: tuple[str, ...]) -> list[Entry]:
@@ -116,11 +127,25 @@ def entries(arguments: tuple[str, ...]) -> list[Entry]:
     return sorted(Entry(*end) for end in ends)
 
 
+@contextlib.contextmanager
+def _page_that_ends() -> Iterator[None]:
+    """Let the server of a page end when nobody opens it: without an interruption, with 0."""
+    from exfit.features.app import server
+
+    class Closed(server.Pages):
+        def __init__(self) -> None:
+            super().__init__()
+            self.closed = -math.inf
+
+    with mock.patch.object(server, "Pages", Closed):
+        yield
+
+
 class Ended(NamedTuple):
-    """What is wrong after interruptions of a command, and how long it went on, s of processor."""
+    """What is wrong after interruptions of a command, and how long it went on, as in Ran."""
 
     faults: list[str]
-    seconds: float
+    seconds: tuple[float, float]
 
 
 def interrupted(
@@ -130,10 +155,11 @@ def interrupted(
     injection, faults = Injection(at, gap), []
     ran = run(arguments, injection)
     if not injection.sent:
-        return Ended([], 0.0)
-    if ran.code not in CODES:
+        return Ended([], (0.0, 0.0))
+    served = arguments[0] == "app" and ran.code == 0  # Ctrl-C ends it so; one swallowed, with 3
+    if not served and ran.code not in CODES:
         faults.append(f"exit code {ran.code}: {ran.err}")
-    if "nterrupted" not in ran.err:
+    if not served and "nterrupted" not in ran.err:
         faults.append(f"not said: {ran.code} {ran.err!r}")
     if "Traceback" in ran.err:
         faults.append(ran.err)

@@ -78,6 +78,7 @@ NAMED = {**WRITERS, **OTHERS}
 EVERY = NAMED | {
     name: (name, "case.yaml") for name in ENDING - {arguments[0] for arguments in NAMED.values()}
 }
+INTERRUPTED = EVERY | {"app": ("app", "case.yaml", "--no-browser")}
 
 
 def prepare_every(place: Path, run: Callable[..., object]) -> None:

@@ -30,7 +30,7 @@ from exfit.features.design.candidates import (
     extremes_of,
 )
 from exfit.features.design.experiment_design import noise_levels, refuse_noise
-from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.build import build_experiments, check_memory, planned
 from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
 from exfit.fitting.nuisances import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
@@ -163,6 +163,8 @@ def design_test(
     if not shortest < duration <= LONGEST:
         limits_of_it = f"must exceed {shortest:g} s and be at most {LONGEST:g} s"
         raise CaseError(f"duration: {duration:g} s: {limits_of_it}")
+    longest = replace(bench.base, simulator=bench.simulator((), duration))
+    check_memory(case, [replace(longest, channels=bench.candidates)])
     stages = [*_stages(bench, duration)]
     moves, best = stages[-1]
     single = best_single_step(partial(bench.cost, signals=best.channels, duration=duration))

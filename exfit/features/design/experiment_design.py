@@ -18,7 +18,7 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.dsp.noise import noise as noise_of
 from exfit.errors import CaseError
-from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.build import build_experiments, check_memory, planned
 from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import free_parameters, problem_of
@@ -134,6 +134,7 @@ def _uncertainty_after(
     ``records`` names what is found about the records themselves. Steps whose sizes a fit would
     find have those of the tests.
     """
+    check_memory(case, experiments)
     starts = {parameter.name: parameter.start for parameter in free}
     fixed = {name: value for name, value in case.values().items() if name not in starts}
     sizes = {
