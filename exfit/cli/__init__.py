@@ -109,8 +109,7 @@ class Commands(click.Group):
                 return super().main(*arguments, obj=signals, **settings)
             except Interruption as interruption:
                 interruption.show()
-                code = exit_code(interruption.exit_code)
-                raise SystemExit(code_after(signals, code)) from None
+                raise SystemExit(code_after(signals, exit_code(interruption.exit_code))) from None
             except SystemExit as ended:
                 code = exit_code(ended.code)
                 if signals and not self.began:  # click makes an error of it

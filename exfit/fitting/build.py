@@ -33,7 +33,6 @@ from exfit.fitting.system import system_of
 from exfit.plants import BREAKER, FAULT, NETWORK, REFERENCES, SPEED, SWITCHED, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput, SplinedInput
-from exfit.simulation.memory import RunSize, check_fit
 from exfit.simulation.simulator import LARGEST_STEP, Simulator
 from exfit.util.arrays import Array
 
@@ -48,6 +47,8 @@ def build_experiments(case: Case, start: Values | None = None) -> tuple[Experime
     """
     if not case.recordings:
         raise CaseError(f"{case.path}: record: missing; a fit needs a record")
+    from exfit.fitting.memory import check_memory
+
     values, setups = case.values() if start is None else start, list[ExperimentSetup]()
     for recording in case.recordings:
         setups.append(build_experiment(case, recording, values))
@@ -65,25 +66,13 @@ def build_unseen(
 
     Raises CaseError where they need more memory together than a command may take.
     """
+    from exfit.fitting.memory import check_memory
+
     setups, beside = list[ExperimentSetup](), [setup.experiment for setup in fitted]
     for recording in recordings:
         setups.append(build_experiment(case, recording, values))
         check_memory(case, beside, [setup.experiment for setup in setups])
     return tuple(setups)
-
-
-def check_memory(
-    case: Case, fitted: Sequence[Experiment], unseen: Sequence[Experiment] = ()
-) -> None:
-    """Raise CaseError where tests need more memory together than a command may take."""
-    free = len(case.free()) + sum(len(each.nuisances) for each in fitted)
-    runs = [(each.simulator, len(each.channels)) for each in fitted]
-    runs += [(each.simulator, 0) for each in unseen]
-    sizes = [RunSize(run.steps, len(run.times), len(run.system.outputs), n) for run, n in runs]
-    try:
-        check_fit(sizes, free, case.simulation.memory)
-    except SimulationError as fault:
-        raise CaseError(f"{case.path}: {fault}") from None
 
 
 def build_experiment(case: Case, recording: Recording, values: Values) -> ExperimentSetup:

@@ -3,7 +3,6 @@
 Its numbers were measured: peaks of `simulate` and `fit` lie below what is worked out here.
 """
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from exfit.errors import SimulationError
@@ -14,8 +13,6 @@ NUMBER = 8  # bytes of a float64
 OF_STEP, OF_SAMPLE = 20, 50  # numbers that each of them takes, beside those of outputs
 HALVED = 6  # outputs of a step: those of a run, and of one with half the step
 SHOWN = 4  # outputs of a sample: computed, kept, written
-SIDE_BY_SIDE = 32  # numbers of a compared output: of sets in lanes, or with its derivatives
-OF_JACOBIAN = 10  # numbers of each derivative: Jacobians, their factors, what is compressed
 
 
 class RunSize(NamedTuple):
@@ -34,29 +31,6 @@ def check_run(size: RunSize, step: float, memory: float) -> None:
     needed = OWN + NUMBER * (steps + samples)
     what = f"{size.steps:.3g} steps of {step:g} s (simulation.step) and {size.samples} samples"
     check(needed, memory, what)
-
-
-def check_fit(sizes: Iterable[RunSize], free: int, memory: float) -> None:
-    """Raise SimulationError where a fit of free parameters to records needs more than memory, GB.
-
-    The records of a command stay in memory together, those that are only compared too; their runs
-    follow one another in each thread.
-    """
-    from exfit.util.processes import processors
-
-    sizes = tuple(sizes)
-    kept = sum(
-        OF_STEP * each.steps + (OF_SAMPLE + OF_JACOBIAN * free * bool(each.compared)) * each.samples
-        for each in sizes
-    )
-    whole = max(HALVED * each.outputs * each.steps for each in sizes)
-    blocks = -(-free // SIDE_BY_SIDE)
-    side_by_side = max((each.steps + each.samples) * each.compared for each in sizes)
-    runs = processors() * SIDE_BY_SIDE * blocks * side_by_side
-    needed = OWN + NUMBER * (kept + whole + runs)
-    steps, samples = (sum(getattr(each, name) for each in sizes) for name in ("steps", "samples"))
-    to = f"a fit of {free} parameters to " if any(each.compared for each in sizes) else ""
-    check(needed, memory, f"{to}{samples} samples by {steps:.3g} steps (simulation.step)")
 
 
 def check(needed: float, memory: float, what: str) -> None:

@@ -8,7 +8,8 @@ from places import SAMPLES
 
 from exfit.cli import main
 from exfit.errors import SimulationError
-from exfit.simulation.memory import GIGABYTE, RunSize, check_fit, check_run
+from exfit.fitting.memory import check_fit
+from exfit.simulation.memory import GIGABYTE, RunSize, check_run
 
 RUN = RunSize(2e6, 10_000, 11)
 RECORD = RunSize(1e5, 20_000, 11, 2)

@@ -30,8 +30,9 @@ from exfit.features.design.candidates import (
     extremes_of,
 )
 from exfit.features.design.experiment_design import noise_levels, refuse_noise
-from exfit.fitting.build import build_experiments, check_memory, planned
+from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
+from exfit.fitting.memory import check_memory
 from exfit.fitting.nuisances import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals

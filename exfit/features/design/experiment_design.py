@@ -18,8 +18,9 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.dsp.noise import noise as noise_of
 from exfit.errors import CaseError
-from exfit.fitting.build import build_experiments, check_memory, planned
+from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
+from exfit.fitting.memory import check_memory
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import free_parameters, problem_of
 from exfit.fitting.residuals import Residuals
