@@ -93,8 +93,7 @@ def fit_result(
     timer = clock.process_time if program is None else clock.perf_counter
     search_began = timer()
     setups, problem = fitted(case, program)
-    unseen = build_unseen(case, case.validations, case.values(), setups)
-    unseen = unseen if program is None else program.simulated(unseen)
+    unseen = _unseen(case, setups, program)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     (hashes, names), case_text = inputs_of(case, used), text_of(case)
@@ -245,6 +244,13 @@ def _announce(
         if response is not None:
             live(response)
     progress(_iteration(line, residuals))
+
+
+def _unseen(
+    case: Case, setups: Sequence[ExperimentSetup], program: Program | None
+) -> tuple[ExperimentSetup, ...]:
+    unseen = build_unseen(case, case.validations, case.values(), setups)
+    return unseen if program is None else program.simulated(unseen)
 
 
 def _comparisons(
