@@ -20,7 +20,6 @@ from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record, overlays_of
 from exfit.results.comparisons import Comparison
 from exfit.util.arrays import Array, Places
-from exfit.workflows.given_values import changed_values
 
 Values = Mapping[str, float]
 
@@ -79,7 +78,10 @@ class Explorer:
         Raises CaseError for values that the equations exclude, SimulationError where there is no
         response, and for ties without a value.
         """
-        changed_values(self.case, values, "values")
+        rows = self.case.rows()
+        faults = {name: rows[name].range_fault(v) for name, v in values.items() if name in rows}
+        if any(faults.values()):
+            raise CaseError(f"values: {name}: {fault}" for name, fault in faults.items() if fault)
         starts = {each.name: each.start for each in self.residuals.free}
         try:
             whole = self.residuals.completed({**starts, **values})
