@@ -110,10 +110,15 @@ def integrator(u: Signal, x: Signal, T: Signal = 1.0) -> tuple[Signal, Signal]:
     return x, u / T
 
 
+def frozen(slope: Signal, y: Signal, low: Signal, high: Signal) -> Signal:
+    """Hold a slope at 0 while it would push y further beyond a limit."""
+    outward = ((y >= high) & (slope > 0.0)) | ((y <= low) & (slope < 0.0))
+    return where(outward, 0.0, slope)
+
+
 def limited(slope: Signal, x: Signal, low: Signal, high: Signal) -> Limited:
     """Hold a slope while it would push x beyond a limit that it has reached."""
-    outward = ((x >= high) & (slope > 0.0)) | ((x <= low) & (slope < 0.0))
-    return Limited(where(outward, 0.0, slope), low, high)
+    return Limited(frozen(slope, x, low, high), low, high)
 
 
 def limited_lag(
@@ -165,9 +170,7 @@ def pid(
     """
     steep, washed = washout(u, derivative, KD, TD)
     y = KP * u + integral + steep
-    slope = KI * u
-    outward = ((y >= high) & (slope > 0.0)) | ((y <= low) & (slope < 0.0))
-    return clip(y, low, high), where(outward, 0.0, slope), washed
+    return clip(y, low, high), frozen(KI * u, y, low, high), washed
 
 
 def pi_and_derivative(

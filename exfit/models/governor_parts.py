@@ -33,8 +33,12 @@ names a Trate."""
 # symbols of curves over the gate; "" is the first height, 0, and the last gate, 1
 GATE_CURVES = (
     (("G0", "G1", "G2", ""), ("", "P1", "P2", "P3")),
-    tuple(tuple(f"{name}{k}" for k in range(1, 7)) for name in ("GV", "PGV")),
+    *(
+        tuple(tuple(f"{name}{k}" for k in range(1, count + 1)) for name in ("GV", height))
+        for height, count in (("PGV", 6), ("PGV", 10), ("BGV", 10))
+    ),
 )
+TENTH = "GV10"  # of H6E, whose curves go on beyond a gate of 1
 # what records hold that have the rating, or not, and no band
 ON_RATING = {"Trate_Mbase": 1.0}
 PLAIN = {"DBH": 0.0, "DBL": 0.0, **ON_RATING}
@@ -136,20 +140,34 @@ def delayed(u: Signal, x: Signal, v: Signal, T: Signal) -> tuple[Signal, Signal,
 def gate_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) where a curve over the gate does not rise, or ends behind a gate of 1.
 
-    Points may coincide, and those at (0, 0) are none.
+    Points may coincide, and those at (0, 0) are none; of ten points none is one whose gate is 0
+    behind the first, and blades may stay.
     """
     for gates, heights in GATE_CURVES:
-        if not {*gates, *heights} - {""} <= values.keys():
-            continue
-        points = [
-            (values.get(gate, 1.0), values.get(height, 0.0))
-            for gate, height in zip(gates, heights, strict=True)
-        ]
-        names = zip(pairwise(zip(gates, heights, strict=True)), pairwise(points), strict=True)
-        for (_, (gate, height)), (before, after) in names:
-            rises = before[0] < after[0] and before[1] < after[1]
-            if not rises and after not in (before, (0.0, 0.0)):
-                text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
-                yield gate or height, f"the point {text}, ({before[0]:g}, {before[1]:g})"
-        if points[-1][0] > 1.0:
-            yield gates[-1], f"{points[-1][0]:g} is above 1, where the curve ends"
+        known = {*gates, *heights} - {""} <= values.keys()
+        if known and (TENTH in gates) == (TENTH in values):
+            points = [
+                (values.get(gate, 1.0), values.get(height, 0.0))
+                for gate, height in zip(gates, heights, strict=True)
+            ]
+            names = zip(gates[1:], heights[1:], strict=True)
+            for (gate, height), (before, after) in zip(names, pairwise(points), strict=True):
+                text = _does_not_rise(before, after, TENTH in gates, height.startswith("B"))
+                if text:
+                    yield height if height.startswith("B") else gate or height, text
+            if points[-1][0] > 1.0 and TENTH not in gates:
+                yield gates[-1], f"{points[-1][0]:g} is above 1, where the curve ends"
+
+
+def _does_not_rise(
+    before: tuple[float, float], after: tuple[float, float], ten: bool, blades: bool
+) -> str:
+    """Say how a point is not above and behind the one before; nothing where it is, or is none."""
+    if after == before or (after[0] == 0.0 if ten else after == (0.0, 0.0)):
+        return ""
+    if blades and before[1] > after[1]:
+        return f"{after[1]:g} is below that of the point before, {before[1]:g}"
+    if blades or (before[0] < after[0] and before[1] < after[1]):
+        return ""
+    text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
+    return f"the point {text}, ({before[0]:g}, {before[1]:g})"

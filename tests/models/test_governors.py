@@ -23,8 +23,12 @@ from exfit.simulation.simulator import LARGEST_STEP, Simulator
 FREQUENCIES = np.geomspace(0.001, 10.0, 41)  # Hz
 SIDES = ("dw", "p", "pref")
 POWER = 0.7  # pu at the start, within all limits
-SELECTORS = ("Rselect", "Flag", "M", "Feedback", "Cflag")
-VARIANTS = {"PIDGOV": ({}, {"Feedback": 0.0}), "HYG3": ({}, {"Cflag": 0.0})}
+SELECTORS = ("Rselect", "Flag", "M", "Feedback", "Cflag", "Fd")
+VARIANTS = {
+    "PIDGOV": ({}, {"Feedback": 0.0}),
+    "HYG3": ({}, {"Cflag": 0.0}),
+    "H6E": ({}, {"Fd": 0.0}),
+}
 BAND = {"DBH": 0.004, "DBL": -0.003}
 DROOPS = (1.0, 0.0, -1.0, -2.0)  # of GGOV1, by Rselect
 
@@ -38,9 +42,12 @@ def seen(**changes):
     return Names(**{"dw": 0.0, "p": POWER, "pref": 0.0, **changes})
 
 
+NO_CORNER = {"WPIDHY": {"P2": 0.75}, "H6E": {"BGV7": 0.925, "PGV7": 0.690937702}}
+
+
 def usual(model):
-    """Return typical data, of a curve of the gate those whose corner is not at POWER."""
-    return typical(model.sheet) | ({"P2": 0.75} if model.name == "WPIDHY" else {})
+    """Return typical data, of a curve of the power those that have no corner at POWER."""
+    return typical(model.sheet) | NO_CORNER.get(model.name, {})
 
 
 def lively(model):
@@ -240,7 +247,37 @@ def hyg3(s, p):
     return [-of_speed * forward - p["Dturb"] * gate0, -droop * forward, forward]
 
 
+def h6e(s, p):
+    gates, powers, blades, flows = kaplan(p)
+    head, k = p["Hdam"], next(k for k in range(10) if powers[k] * p["Hdam"] > POWER)
+    gain = (powers[k] - powers[k - 1]) / (flows[k] - flows[k - 1])
+    steep = (blades[k] - blades[k - 1]) / (gates[k] - gates[k - 1])
+    flow0 = flows[k] - (powers[k] - POWER / head) / gain
+    off, own = blades[k] - steep * gates[k], 1.0 - p["Bgvmin"]  # the blade is off + steep gate
+    area0 = flow0 / head**0.5
+    gate0 = max(np.roots([own * steep, p["Bgvmin"] + own * off, -area0]).real)
+    servo = p["Kg"] * lag(s, p["Tg"]) / s
+    blade = steep * lag(s, p["Tbd"]) * lag(s, p["Tbs"])
+    area = area0 / gate0 * servo / (1.0 + servo) + gate0 * own * blade
+    flow = 2.0 * head / area0 / (s * p["Tw"] + 2.0 * head / flow0) * area
+    turbine = (head * gain - POWER / head * s * p["Tw"]) * flow
+    controller, of_gate = p["Kp"] + p["Ki"] / s, 1.0 - p["Fd"]
+    turbine /= 1.0 + of_gate * p["Rg"] * controller
+    of_speed = (controller + p["Kd"] * s * lag(s, p["Td"])) * lag(s, p["Tsp"])
+    droop = p["Fd"] * p["Re"] * lag(s, p["Tpe"]) * p["Ki"] / s
+    return [-of_speed * turbine - p["Dturb"] * gate0, -droop * turbine, controller * turbine]
+
+
+def kaplan(p):
+    """Return gates, powers, blades and flows (10,) of the points of H6E."""
+    gates, powers, blades = (
+        np.array([p[f"{name}{k}"] for k in range(1, 11)]) for name in ("GV", "PGV", "BGV")
+    )
+    return gates, powers, blades, gates * (p["Bgvmin"] + (1.0 - p["Bgvmin"]) * blades)
+
+
 FUNCTIONS = {
+    "H6E": h6e,
     "HYG3": hyg3,
     "HYGOV2": hygov2,
     "HYGOVR": hygovr,
@@ -365,7 +402,8 @@ def limits_of(model):
 
 
 OF_LIMIT = {"HYGOV": "C", "IEEEG1": "VALVE", "IEESGO": "V4", "IEEEG2": "WATER"}
-OF_LIMIT |= dict.fromkeys(("HYG3", "HYGOV2", "HYGOVR", "IEEEG3", "PIDGOV", "WPIDHY"), "GATE")
+OF_GATE = ("H6E", "HYG3", "HYGOV2", "HYGOVR", "IEEEG3", "PIDGOV", "WPIDHY")
+OF_LIMIT |= dict.fromkeys(OF_GATE, "GATE")
 BEHIND_WATER = {("WPIDHY", "PMAX"), ("WPIDHY", "PMIN")}  # they stop no state
 
 
@@ -738,10 +776,15 @@ def servo_of(demand, valve, gate, behind, p):
     )
     opening = np.clip(valve, p["VELCLOSE"], p["VELOPEN"])
     opening = stopped(opening, gate, p["PMIN"], p["PMAX"])
+    return pilot, opening, taken_along(gate, behind, opening, p)
+
+
+def taken_along(gate, behind, opening, p):
+    """Return the rate of what is behind a gate's backlash."""
     pushed = (gate - behind >= p["BLG"] - 1e-10 and opening > 0.0) or (
         gate - behind <= 1e-10 - p["BLG"] and opening < 0.0
     )
-    return pilot, opening, opening if pushed else 0.0
+    return opening if pushed else 0.0
 
 
 def typed_hygovr(x, w, pe, ref, p):
@@ -787,7 +830,40 @@ def typed_hyg3(x, w, pe, ref, p):
     ], p["At"] * head * (flow - p["qNL"]) - p["Dturb"] * behind * w
 
 
+def typed_h6e(x, w, pe, ref, p):
+    drooped, speed, integral, slow, valve, gate, behind, asked, blade, flow = x
+    gate, steep = np.clip(gate, p["GMIN"], p["GMAX"]), (speed - slow) / p["Td"]
+    error = ref - felt(speed, p)
+    wanted = p["Kp"] * error + integral - p["Kd"] * steep
+    wanted /= 1.0 if p["Fd"] else 1.0 + p["Kp"] * p["Rg"]
+    demand = np.clip(wanted, p["GMIN"], p["GMAX"])
+    left = error - (drooped if p["Fd"] else p["Rg"] * demand)
+    opening = max(valve, -p["Buv"]) if gate < p["Buf"] else valve
+    opening = stopped(opening, gate, p["GMIN"], p["GMAX"])
+    gates, powers, blades, flows = kaplan(p)
+    head = (flow / behind / (p["Bgvmin"] + (1.0 - p["Bgvmin"]) * blade)) ** 2
+    power = np.interp(flow, flows, powers) - p["Deff"] * (asked - blade) ** 2
+    return [
+        (p["Re"] * pe - drooped) / p["Tpe"],
+        (w - speed) / p["Tsp"],
+        stopped(p["Ki"] * left, wanted, p["GMIN"], p["GMAX"]),
+        steep,
+        stopped((p["Kg"] * (demand - gate) - valve) / p["Tg"], valve, -p["Velm"], p["Velm"]),
+        opening,
+        taken_along(gate, behind, opening, p),
+        (np.interp(demand, gates, blades) - asked) / p["Tbd"],
+        np.clip((asked - blade) / p["Tbs"], -p["Blv"], p["Blv"]),
+        (p["Hdam"] - head) / p["Tw"],
+    ], head * power - p["Dturb"] * behind * w
+
+
 TYPED = {
+    "H6E": (
+        typed_h6e,
+        0.06,
+        {"GMAX": 0.73, "GMIN": 0.62, "Buf": 0.66, "BLG": 0.005, "Blv": 0.02, "Deff": 5.0}
+        | {"Dturb": 0.3, "Hdam": 1.02, "PGV7": 0.685},
+    ),
     "IEEEG2": (typed_ieeeg2, 0.02, {"T1": 1.0, "T2": 0.5}),
     "IEEEG3": (typed_ieeeg3, 0.06, {"PMAX": 0.73, "PMIN": 0.67}),
     "HYGOV2": (typed_hygov2, 0.05, {"GMAX": 0.66, "GMIN": 0.5, "KP": 2.0, "KI": 0.02, "R": 0.5}),
@@ -867,7 +943,7 @@ def test_another_typing_and_method_reach_and_leave_the_limits_together(governor,
     assert np.abs(got[:, 0] - expected).max() < 1e-5
 
 
-EITHER_WAY = {"SERVO", "V3", "VALVE"}  # of a servo, which may close
+EITHER_WAY = {"SERVO", "SPEED", "V3", "VALVE"}  # of a servo, which may close
 
 
 def test_no_parameter_is_inert(governor):
@@ -875,8 +951,8 @@ def test_no_parameter_is_inert(governor):
     values = lively(governor)
     rows = {row.symbol: row for row in governor.sheet}
     changes = {"Rselect": -2.0, "db": 0.01, "Dt": 1.0, "Ldref": 0.0}
-    changes |= {"PRMAX": 0.01, "MIN": 0.5, "T5": 100.0}
-    changes |= {f"GV{k}": values.get(f"GV{k}", 0.0) + 0.05 for k in range(1, 7)}
+    changes |= {"PRMAX": 0.01, "MIN": 0.5, "T5": 100.0, "Fd": 0.0}
+    changes |= {f"GV{k}": values.get(f"GV{k}", 0.0) + 0.05 for k in range(1, 11)}
     changes |= {"DBL": -0.01, "DBH": 0.01, "Trate_Mbase": 0.5}
 
     def felt(changed):
@@ -895,9 +971,10 @@ def test_no_parameter_is_inert(governor):
 
     for symbol in rows:
         rng = np.random.default_rng(2)
-        before = felt(values)
+        own = values | ({"Fd": 0.0} if symbol == "Rg" else {})
+        before = felt(own)
         rng = np.random.default_rng(2)
-        after = felt(values | {symbol: changes.get(symbol, 0.5 * values[symbol] or 1.0)})
+        after = felt(own | {symbol: changes.get(symbol, 0.5 * values[symbol] or 1.0)})
         assert np.abs(after - before).max() > 1e-6, symbol
 
 

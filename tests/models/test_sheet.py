@@ -107,6 +107,8 @@ def test_a_shared_row_is_of_several_exciters(name):
         ("WPIDHY", {"G2": 1.0}, "P3"),
         ("HYG3", {"PGV2": 0.05}, "GV2"),
         ("HYG3", {"GV6": 1.1}, "GV6"),
+        ("H6E", {"PGV9": 0.8}, "GV9"),
+        ("H6E", {"BGV10": 0.9}, "BGV10"),
     ],
 )
 def test_a_curve_over_the_gate_that_does_not_rise_is_a_contradiction(name, change, fault):
@@ -119,3 +121,5 @@ def test_points_of_a_curve_over_the_gate_may_coincide():
     values = typical(GOVERNORS["HYG3"].sheet)
     none = {name: 0.0 for name in values if name.startswith(("GV", "PGV"))}
     assert list(contradictions(values | none)) == []
+    ten = typical(GOVERNORS["H6E"].sheet)
+    assert list(contradictions(ten | {"GV10": 0.0, "BGV10": 1.2, "BGV9": ten["BGV8"]})) == []

@@ -87,7 +87,7 @@ def test_the_power_falls_with_the_frequency_by_the_droop(name):
 
 
 DAMPING = ("Dt", "Dturb")
-SELECTORS = ("Rselect", "Feedback", "Cflag")
+SELECTORS = ("Rselect", "Feedback", "Cflag", "Fd")
 
 
 def test_exact_derivatives_with_a_governor_equal_central_differences(governor):
