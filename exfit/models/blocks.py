@@ -110,15 +110,10 @@ def integrator(u: Signal, x: Signal, T: Signal = 1.0) -> tuple[Signal, Signal]:
     return x, u / T
 
 
-def frozen(slope: Signal, y: Signal, low: Signal, high: Signal) -> Signal:
-    """Hold a slope at 0 while it would push y further beyond a limit."""
-    outward = ((y >= high) & (slope > 0.0)) | ((y <= low) & (slope < 0.0))
-    return where(outward, 0.0, slope)
-
-
 def limited(slope: Signal, x: Signal, low: Signal, high: Signal) -> Limited:
     """Hold a slope while it would push x beyond a limit that it has reached."""
-    return Limited(frozen(slope, x, low, high), low, high)
+    outward = ((x >= high) & (slope > 0.0)) | ((x <= low) & (slope < 0.0))
+    return Limited(where(outward, 0.0, slope), low, high)
 
 
 def limited_lag(
@@ -170,7 +165,9 @@ def pid(
     """
     steep, washed = washout(u, derivative, KD, TD)
     y = KP * u + integral + steep
-    return clip(y, low, high), frozen(KI * u, y, low, high), washed
+    slope = KI * u
+    outward = ((y >= high) & (slope > 0.0)) | ((y <= low) & (slope < 0.0))
+    return clip(y, low, high), where(outward, 0.0, slope), washed
 
 
 def pi_and_derivative(

@@ -163,11 +163,9 @@ def _does_not_rise(
     before: tuple[float, float], after: tuple[float, float], ten: bool, blades: bool
 ) -> str:
     """Say how a point is not above and behind the one before; nothing where it is, or is none."""
-    if after == before or (after[0] == 0.0 if ten else after == (0.0, 0.0)):
-        return ""
-    if blades and before[1] > after[1]:
-        return f"{after[1]:g} is below that of the point before, {before[1]:g}"
-    if blades or (before[0] < after[0] and before[1] < after[1]):
+    none = after[0] == 0.0 if ten else after == (0.0, 0.0)
+    along, up = after[0] - before[0], after[1] - before[1]
+    if none or after == before or (up >= 0.0 if blades else along > 0.0 and up > 0.0):
         return ""
     text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
     return f"the point {text}, ({before[0]:g}, {before[1]:g})"

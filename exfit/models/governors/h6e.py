@@ -5,7 +5,6 @@ from exfit.models.blocks import (
     Signal,
     clip,
     closed,
-    frozen,
     lag,
     larger,
     limited,
@@ -87,13 +86,12 @@ def gate_of(area: Signal, p: Signal) -> Signal:
 def h6e(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """H6E: hydro turbine governor of a Kaplan turbine (WECC; PSS/E H6EU1).
 
-                                   GMAX
-    pref ─►(+)─────►(+)─►[Kp + Ki/s]─►(+)─►[clip]─┬─► c
-           -▲       -▲                -▲    GMIN  │
-            │        └────[Rg, Fd = 0]─│──────────┘
-    dw ─►[   1    ]─┴─────────────►[   sKd   ]
-         [1 + sTsp]                [1 + sTd  ]
-    Fd = 1: Re p / (1 + sTpe) is subtracted before Ki/s.
+                                           GMAX
+    pref ─────────►(+)─►[Kp + Ki/s]─►(+)─►[clip]─► c
+                   -▲                -▲    GMIN
+    dw ─►[   1    ]─┴───────────►[   sKd   ]
+         [1 + sTsp]              [1 + sTd  ]
+    Re p / (1 + sTpe) is subtracted before Ki/s, or with Fd = 0 Rg c before both.
 
                 Velm      GMAX
     c ─►(+)─►[   Kg  ]─►[  1  ]─┬─► gate ─►[backlash]─► g
@@ -112,18 +110,17 @@ def h6e(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     Velm and Blv limit the rates of gate and blades; below Buf the gate closes at
     Buv at most. The limits of velocity and gate are non-windup, the integral is
     frozen while it would push c further beyond a limit; BLG is the play of the gate
-    to each side. The blade is on the lines
-    through the points (GV1, BGV1), (GV2, BGV2), (GV3, BGV3), (GV4, BGV4), (GV5,
-    BGV5), (GV6, BGV6), (GV7, BGV7), (GV8, BGV8), (GV9, BGV9) and (GV10, BGV10). At
-    their flows under a head of 1 the power is PGV1, PGV2, PGV3, PGV4, PGV5, PGV6,
-    PGV7, PGV8, PGV9 and PGV10. The ends of both go on. Blades that are off what is
-    asked cost Deff times the square of it. pref is Re times the electrical power at
-    rest, with Fd = 0 Rg times the gate. A record has its dead band DB1, EPS in Hz.
-    Not modelled: the dead bands and the play of the blades, Pgc, by which the power
-    falls before the first point, a rate Sprate of the reference, and Tsp below 0,
-    the frequency of the bus. InterPSS has all of it, a public script for WECC's
-    model its rest; PowerWorld's curve agrees. The data are near those of that
-    curve, not a sample.
+    to each side. The blade is on the lines through the points (GV1, BGV1), (GV2,
+    BGV2), (GV3, BGV3), (GV4, BGV4), (GV5, BGV5), (GV6, BGV6), (GV7, BGV7), (GV8,
+    BGV8), (GV9, BGV9) and (GV10, BGV10). At their flows under a head of 1 the power
+    is PGV1, PGV2, PGV3, PGV4, PGV5, PGV6, PGV7, PGV8, PGV9 and PGV10. The ends of
+    both go on. Blades that are off what is asked cost Deff times the square of it.
+    pref is Re times the electrical power at rest, with Fd = 0 Rg times the gate. A
+    record has its dead band DB1, EPS in Hz. Not modelled: the dead bands and the
+    play of the blades, Pgc, by which the power falls before the first point, a rate
+    Sprate of the reference, and Tsp below 0, the frequency of the bus. InterPSS has
+    all of it, a public script for WECC's model its rest; PowerWorld's curve agrees.
+    The data are near those of that curve, not a sample.
     """
     low, high = in_use(s.GMIN0, p.GMIN), in_use(s.GMAX0, p.GMAX)
     of_gate = p.Fd < 0.5
@@ -135,7 +132,9 @@ def h6e(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     wanted = p.Kp * closed(error, p.Kp, held, droop) + held
     c = clip(wanted, low, high)
     left = error - where(of_gate, p.Rg * c, power)
-    d.INTEG = frozen(p.Ki * left, wanted, low, high)
+    slope = p.Ki * left
+    outward = ((wanted >= high) & (slope > 0.0)) | ((wanted <= low) & (slope < 0.0))
+    d.INTEG = where(outward, 0.0, slope)
     gate = clip(s.GATE, low, high)
     moved, d.VALVE = limited_lag(c - gate, s.VALVE, p.Kg, p.Tg, -p.Velm, p.Velm)
     velocity = where(gate < p.Buf, larger(moved, -p.Buv), moved)
