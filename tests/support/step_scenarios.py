@@ -39,6 +39,7 @@ UP, DOWN = (
 SIZES = {OPEN_CIRCUIT: 0.05, ON_LOAD: 0.03}  # pu of the reference
 # pu, of the governor's reference: a speed or a power
 PREF = {"GGOV1": 0.004, "HYGOV": 0.004, "TGOV1": 0.005, "GAST": 0.1, "IEEEG1": 0.1, "IEESGO": 0.1}
+OFF_LIMITS = {"GGOV1": {"Ldref": 1.1}}  # with 1.0 the load limiter rests where the valve is open
 SETS = 3  # typical data, and draws
 SPREAD = 1.3
 COARSE = 1e-3  # s, of the runs that choose limits
@@ -145,7 +146,8 @@ def _test(model, kind):
         added = {STABILISER + name: value for name, value in typical(part.sheet).items()}
     elif model in GOVERNORS:
         unit["governor"] = GOVERNORS[model]
-        added = {GOVERNOR + name: v for name, v in typical(GOVERNORS[model].sheet).items()}
+        of_governor = typical(GOVERNORS[model].sheet) | OFF_LIMITS.get(model, {})
+        added = {GOVERNOR + name: value for name, value in of_governor.items()}
     else:
         exciter, place, changed = LIMITING[model]
         limiter = Attached(LIMITERS[model], place)
