@@ -56,7 +56,8 @@ class Rules:
         self.scaled, self.known = descent.x_scale is not None, descent.known
         self.first_cost = start.point.cost if self.scaled else 0.0
         self.first_gradient = start.gradient_norm
-        self.seen = np.zeros(1, dtype=np.bool_) if self.scaled else seen(start)
+        moving = np.any(start.jacobian != 0.0, axis=0)  # by however little
+        self.seen = np.zeros(1, dtype=np.bool_) if self.scaled else moving
 
     def at_rest(self, linear: LinearModel) -> Stop | None:
         """Find a reason to stop at a point: there is nothing to gain, or it is good enough."""

@@ -76,6 +76,14 @@ def test_a_variable_that_got_lost_is_no_success():
     assert not result.success
 
 
+@pytest.mark.parametrize("method", ["auto", "lm", "lm-then-dgn", "dgn"])
+def test_a_variable_that_moved_the_start_by_less_than_differences_err_may_get_lost(method):
+    # at the start the last rate shows in one sample alone, and at the end in none
+    case = CERTIFIED["MGH17"]
+    result = least_squares(case.fun, case.starts[0], "2-point", method=method)
+    assert result.stop is Stop.LOST
+
+
 def test_a_variable_that_was_never_seen_does_no_harm():
     case = CERTIFIED["Misra1a"]
     fun = lambda x: case.fun(x[:2])  # noqa: E731
