@@ -66,6 +66,7 @@ def pytest_configure(config):
     hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _keep_bytecode(str(config.cache.mkdir("bytecode")))
+    os.environ["COLUMNS"] = "80"  # whether or not there is a terminal
     # the tests' own models and programs are trusted
     os.environ["EXFIT_CONFIG"] = str(config.cache.mkdir("configuration"))
     for place in (Path(__file__), Path(tempfile.gettempdir())):

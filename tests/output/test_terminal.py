@@ -210,6 +210,7 @@ def test_every_table_has_three_digits_of_a_value_and_none_beyond_its_bounds(miss
         known = {"interval": interval_of, "interval_method": method, **limited}
         result = replace(
             missed,
+            seconds=1.0,
             parameters={
                 name: replace(parameter, value=0.29966, **known)
                 for name, parameter in missed.parameters.items()

@@ -36,6 +36,7 @@ from exfit.inference.whitening import ROWS_BEFORE, PropagatedNoise, whitening
 from exfit.plants import NETWORK, VT0
 from exfit.plants.parts import initial
 from exfit.records.record import Record
+from exfit.signals import OF_CURRENT_PHASOR
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
 from exfit.util.arrays import Array, median_step
@@ -43,7 +44,6 @@ from exfit.util.text import digits, listed
 
 ORDER = 4  # of the differences that show the noise of a signal which swings
 WINDOW = 0.5  # variance of a window, of the time between samples squared: C37.118.1, class M
-PHASORS = {"it": 1.0, "p": 2.0, "q": 2.0}  # how many of them a signal is made of
 F0 = f"{NETWORK}f0"
 FAR_OUT = 4.0  # times the median: no noise
 PULSE = 1e-5  # pu or rad: the response to it is linear, and far above rounding
@@ -192,8 +192,9 @@ def effect_of_window(setup: ExperimentSetup, experiment: Experiment, values: Val
     moved = replace(experiment, simulator=with_added(simulator, {"vt": scale * own}))
     response = (moved.samples(values)[0] - usual) / scale
     for k, channel in enumerate(experiment.channels):
-        if channel.signal in PHASORS:
-            response[:, k] -= PHASORS[channel.signal] * lower * channel.measured
+        if channel.signal in OF_CURRENT_PHASOR:  # of which powers are the product with the voltage
+            share = lower if channel.signal == "it" else 2.0 * lower
+            response[:, k] -= share * channel.measured
     return errors_of(experiment, [each[None] for each in response.T])[:, 0]
 
 

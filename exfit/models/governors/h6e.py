@@ -91,7 +91,6 @@ def h6e(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
                    -▲                -▲    GMIN
     dw ─►[   1    ]─┴───────────►[   sKd   ]
          [1 + sTsp]              [1 + sTd  ]
-    Re p / (1 + sTpe) is subtracted before Ki/s, or with Fd = 0 Rg c before both.
 
                 Velm      GMAX
     c ─►(+)─►[   Kg  ]─►[  1  ]─┬─► gate ─►[backlash]─► g
@@ -107,6 +106,7 @@ def h6e(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
                              [sTw]                       -▲
     dw ─►[Dturb g]────────────────────────────────────────┘
 
+    Re p / (1 + sTpe) is subtracted before Ki/s, with Fd = 0 Rg c before both gains.
     Velm and Blv limit the rates of gate and blades; below Buf the gate closes at
     Buv at most. The limits of velocity and gate are non-windup, the integral is
     frozen while it would push c further beyond a limit; BLG is the play of the gate

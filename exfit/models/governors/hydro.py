@@ -107,7 +107,7 @@ IEEEG2 = governor(
 def ieeeg3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """IEEEG3: hydro turbine governor with a transient droop (IEEE 1973; PSS/E).
 
-                                  UO    PMAX
+                                   UO      PMAX
     pref ─►(+)─►(+)─►[    1     ]─►[clip]─►[ 1 ]─┬─► gate
           -▲    -▲   [TG (1+sTP)]   UC     [ s ] │
     dw ────┘     │                         PMIN  │

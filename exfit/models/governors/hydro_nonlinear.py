@@ -77,9 +77,10 @@ def hygovr(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """HYGOVR: hydro turbine governor with four lead-lags (PSS/E HYGOVR1).
 
     dw ─►[   1   ]─►[1 + sT1]─►[1 + sT3]─►[1 + sT5]─►[1 + sT7]─┐
-         [1 + sTd]  [1 + sT2]  [1 + sT4]  [1 + sT6]  [1 + sT8] │-
+         [1 + sTd]  [1 + sT2]  [1 + sT4]  [1 + sT6]  [1 + sT8] ▼-
     pref ─────────────────────────────────────────────────────►(+)─►[Kp]─► c
-    p ─►[   R   ]──────────────────────────────────────────────▲-   [s ]
+                                                               ▲-   [s ]
+    p ─►[   R   ]──────────────────────────────────────────────┘
         [1 + sTt]
 
                VELOPEN    PMAX
@@ -175,14 +176,16 @@ def hyg3(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     pref ─►(+)─►[   1   ]─►[Ki/s + K2 + sK1/(1 + sTf)]─►[clip]─┬─► c
           -▲-▲  [1 + sTd]                               PMIN   │
     dw ────┘ └─(+)◄──────────────[ Rgate ]◄────────────────────┘
-                ▲──[  Relec  ]◄── p
+                ▲
+                └──[  Relec  ]◄── p
                    [1 + sTt  ]
 
     Cflag = 0:                                       PMAX
     pref ───────────────────────────────────────►(+)─►[Ki]─┬─► c
-    dw ─►[   1   ]─►[1 +   sK1    +   s²K2   ]───▲-▲  [s ] │
-         [1 + sTd]  [    1 + sTf  (1 + sTf)² ]    -│  PMIN │
-    p ─►[ Relec ]─────────────────────────────────(+)◄─[Rgate]
+                                                -▲-▲  [s ] │
+    dw ─►[   1   ]─►[1 +   sK1    +   s²K2   ]───┘ │  PMIN │
+         [1 + sTd]  [    1 + sTf  (1 + sTf)² ]     │       │
+    p ─►[ Relec ]────────────────────────────────►(+)◄─[Rgate]
         [1 + sTt]
 
                VELOPEN    PMAX
