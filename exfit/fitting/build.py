@@ -45,15 +45,20 @@ def build_experiments(case: Case, start: Values | None = None) -> tuple[Experime
 
     Raises CaseError without any, and where their fit needs more memory than it may take.
     """
-    if not case.recordings:
-        raise CaseError(f"{case.path}: record: missing; a fit needs a record")
     from exfit.fitting.memory import check_memory
 
     values, setups = case.values() if start is None else start, list[ExperimentSetup]()
-    for recording in case.recordings:
+    for recording in recordings_to_fit(case):
         setups.append(build_experiment(case, recording, values))
         check_memory(case, [setup.experiment for setup in setups])
     return tuple(setups)
+
+
+def recordings_to_fit(case: Case) -> Sequence[Recording]:
+    """Return the recordings that a case is fitted to; raises CaseError without any."""
+    if not case.recordings:
+        raise CaseError(f"{case.path}: record: missing; a fit needs a record")
+    return case.recordings
 
 
 def build_unseen(

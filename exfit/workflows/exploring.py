@@ -10,7 +10,7 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.dsp.features import Features
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.build import build_experiment
+from exfit.fitting.build import build_experiment, recordings_to_fit
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import residuals_of
@@ -20,6 +20,7 @@ from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record, overlays_of
 from exfit.results.comparisons import Comparison
 from exfit.util.arrays import Array, Places
+from exfit.workflows.given_values import outside
 
 Values = Mapping[str, float]
 
@@ -78,10 +79,9 @@ class Explorer:
         Raises CaseError for values that the equations exclude, SimulationError where there is no
         response, and for ties without a value.
         """
-        rows = self.case.rows()
-        faults = {name: rows[name].range_fault(v) for name, v in values.items() if name in rows}
-        if any(faults.values()):
-            raise CaseError(f"values: {name}: {fault}" for name, fault in faults.items() if fault)
+        faults = [*outside(self.case.rows(), values)]
+        if faults:
+            raise CaseError(f"values: {fault}" for fault in faults)
         starts = {each.name: each.start for each in self.residuals.free}
         try:
             whole = self.residuals.completed({**starts, **values})
@@ -102,10 +102,8 @@ def explorer(case: Case, program: Program | None) -> Explorer:
 
     Raises ExfitError for a case without a record or a free parameter, or one that cannot be read.
     """
-    if not case.recordings:
-        raise CaseError(f"{case.path}: record: missing; a fit needs a record")
     start = case.values()
-    setups = (build_experiment(case, recording, start) for recording in case.recordings)
+    setups = (build_experiment(case, recording, start) for recording in recordings_to_fit(case))
     looked = tuple(
         (_looked(each) if program is None else Looked(each)).with_enough_substeps(start)
         for each in setups

@@ -42,14 +42,14 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
             faults.append(f"{name}: not a parameter; {near(name, names)}")
         elif name not in rows and (fault := magnitude_fault(value)):
             faults.append(f"{name}: {fault}")
-    faults += _outside(rows, given)
+    faults += outside(rows, given)
     if not faults:
         try:
             values = values_of(case, given)
         except TieError as tied:
             raise CaseError(f"{place}: {tied}") from None
         following = {name: values[name] for name in case.ties.by_name if name not in given}
-        faults += _outside(rows, following)
+        faults += outside(rows, following)
         faults += _contradictions(case, values)
     if faults:
         raise CaseError(f"{place}: {fault}" for fault in faults)
@@ -85,7 +85,8 @@ def with_given_values(
     return changed
 
 
-def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
+def outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
+    """Yield the values of the rows' parameters that the equations exclude, and why."""
     for name, value in values.items():
         fault = rows[name].range_fault(value) if name in rows else None
         if fault is not None:

@@ -18,46 +18,29 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+from generated_cases import content_of, free_and_record
 from places import CONFIGS
 from processes import EXFIT, spent
 
-from exfit import workflows
-from exfit.case.case import Case
 from exfit.models import MODELS
 
 OF_AC1A = (7, 8, 10, 12)
 SIX = 6
 OF_MACHINE = ("Tpd0", "Tppd0", "S10", "S12", "Xppd")
-SPREAD, NOISE, TURNS = 0.25, 1e-4, 3  # of the logarithm of a value; pu
+TURNS = 3
 MODEL_CASES = CONFIGS / "models"
 
 
 def written(folder, model, count):
-    """Write a case with so many free parameters and its record; return the case, None without."""
-    content = yaml.safe_load((MODEL_CASES / f"{model.lower()}.yaml").read_text(encoding="utf-8"))
-    machine = content["plant"]["parameters"]
-    values = {**content["parameters"]["fixed"], **{f"machine.{n}": v for n, v in machine.items()}}
+    """Write a case with so many free parameters, and its record."""
+    content = content_of(model.lower())
+    values = {**content["parameters"]["fixed"]}
+    values |= {f"machine.{name}": v for name, v in content["plant"]["parameters"].items()}
     wanted = [row.symbol for row in MODELS[model].sheet if row.free]
     wanted += ["KE", *(f"machine.{name}" for name in OF_MACHINE)]
     names = [name for name in dict.fromkeys(wanted) if values.get(name)][:count]
     rng = np.random.default_rng([count, *model.encode()])
-    truth = {name: values[name] * rng.lognormal(0.0, SPREAD) for name in names}
-    response = workflows.simulate(Case.from_dict(content), truth).response
-    vt = response.signals["vt"] + NOISE * rng.standard_normal(len(response.time))
-    rows = np.column_stack([response.time, vt])
-    np.savetxt(folder / "record.csv", rows, "%.10g", ",", header="t,vt", comments="")
-    content["parameters"]["free"], content["plant"]["free"] = {}, {}
-    for name in names:
-        start = values[name]
-        searched = {"start": start, "min": start / 10.0, "max": start * 10.0}
-        if name in content["parameters"]["fixed"]:
-            del content["parameters"]["fixed"][name]
-            content["parameters"]["free"][name] = searched
-        else:
-            del machine[name.removeprefix("machine.")]
-            content["plant"]["free"][name.removeprefix("machine.")] = searched
-    del content["test"]["duration"]
-    content["record"] = {"file": "record.csv", "time": "t", "channels": {"vt": "vt"}}
+    free_and_record(content, names, rng, folder / "record.csv")
     (folder / "case.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
 
 

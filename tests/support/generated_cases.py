@@ -24,32 +24,43 @@ def generated_cases(folder, count, seed=11):
 
 def _case(folder, number, rng):
     model = MODELS[number % len(MODELS)]
-    content = yaml.safe_load((CONFIGS / "models" / f"{model}.yaml").read_text(encoding="utf-8"))
+    content = content_of(model)
     fixed = content["parameters"]["fixed"]
     names = [name for name in FITTED if fixed.get(name)][:FREE]
-    starts = {name: float(fixed[name]) for name in names}
+    name = f"{number:04}_{model}"
+    record, case = folder / "records" / f"{name}.csv", folder / "cases" / f"{name}.yaml"
+    content["about"] = {"Unit": f"Unit {number}"}
+    free_and_record(content, names, rng, record)
+    content["record"]["file"] = f"../records/{name}.csv"
+    case.parent.mkdir(parents=True, exist_ok=True)
+    case.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return case
+
+
+def content_of(model):
+    """Return the case of a model with its typical data."""
+    return yaml.safe_load((CONFIGS / "models" / f"{model}.yaml").read_text(encoding="utf-8"))
+
+
+def free_and_record(content, names, rng, record):
+    """Free values of a case, of its model or of the machine, and write a record that shows them.
+
+    The truth is drawn near the values, which are the starts.
+    """
+    fixed, machine = content["parameters"]["fixed"], content["plant"]["parameters"]
+    values = {**fixed, **{f"machine.{name}": value for name, value in machine.items()}}
+    starts = {name: float(values[name]) for name in names}
     truth = {name: start * rng.lognormal(0.0, SPREAD) for name, start in starts.items()}
     response = workflows.simulate(Case.from_dict(content), truth).response
     vt = response.signals["vt"] + NOISE * rng.standard_normal(len(response.time))
-    name = f"{number:04}_{model}"
-    record = folder / "records" / f"{name}.csv"
     record.parent.mkdir(parents=True, exist_ok=True)
     rows = (f"{t:.10g},{v:.9g}" for t, v in zip(response.time, vt, strict=True))
     record.write_text("\n".join(["t,vt", *rows]) + "\n", encoding="utf-8")
     del content["test"]["duration"]
-    free = {
-        name: {"start": start, "min": start * BOUNDS[0], "max": start * BOUNDS[1]}
-        for name, start in starts.items()
-    }
-    content["parameters"] = {
-        "fixed": {name: value for name, value in fixed.items() if name not in names},
-        "free": free,
-    }
-    content["about"] = {"Unit": f"Unit {number}"}
-    content["record"] = {
-        "file": f"../records/{name}.csv", "time": "t", "channels": {"vt": "vt"}
-    }  # fmt: skip
-    case = folder / "cases" / f"{name}.yaml"
-    case.parent.mkdir(parents=True, exist_ok=True)
-    case.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    return case
+    for name, start in starts.items():
+        of_machine, own = name.startswith("machine."), name.removeprefix("machine.")
+        section = content["plant" if of_machine else "parameters"]
+        del section["parameters" if of_machine else "fixed"][own]
+        low, high = start * BOUNDS[0], start * BOUNDS[1]
+        section.setdefault("free", {})[own] = {"start": start, "min": low, "max": high}
+    content["record"] = {"file": record.name, "time": "t", "channels": {"vt": "vt"}}

@@ -39,7 +39,7 @@ from exfit.records.record import Record
 from exfit.signals import OF_CURRENT_PHASOR
 from exfit.simulation.inputs import SplinedInput
 from exfit.simulation.simulator import Simulator
-from exfit.util.arrays import Array, median_step
+from exfit.util.arrays import Array, Complex, median_step
 from exfit.util.text import digits, listed
 
 ORDER = 4  # of the differences that show the noise of a signal which swings
@@ -52,7 +52,6 @@ FEWEST_PULSES, MOST_PULSES, ROUGH_PULSES = 9, 33, 3
 ROUGH_ROWS = 200  # of errors before that tell what noise comes next
 SAMPLES_AT_ENDS = 4  # of a record, where a spline through them is another: each has a pulse
 Rows = NDArray[np.intp]
-ComplexArray = NDArray[np.complex128]
 Values = Mapping[str, float]
 SEED = 0
 PAIRS = 6  # of realisations of noise, with either sign: what is of first order cancels
@@ -149,7 +148,7 @@ def propagated_noise(
     return PropagatedNoise(np.concatenate(own), np.hstack(together))
 
 
-def phasor_in_powers(record: Record) -> dict[str, ComplexArray]:
+def phasor_in_powers(record: Record) -> dict[str, Complex]:
     """By how much (M,) noise of the voltage and its angle is in p + jq of the same phasors.
 
     None is where fourth differences of the powers do not show it.
@@ -157,8 +156,8 @@ def phasor_in_powers(record: Record) -> dict[str, ComplexArray]:
     signals = {name: np.nan_to_num(samples) for name, samples in record.signals.items()}
     if "p" not in signals or "q" not in signals:
         return {}
-    vt: ComplexArray = np.maximum(signals["vt"], LEAST_NOISE).astype(complex)
-    power: ComplexArray = signals["p"] + 1j * signals["q"]
+    vt: Complex = np.maximum(signals["vt"], LEAST_NOISE).astype(complex)
+    power: Complex = signals["p"] + 1j * signals["q"]
     in_power, phasor = {"vt": power / vt}, np.log(vt)
     if "angle" in signals:
         phasor += 1j * np.unwrap(signals["angle"])
@@ -475,7 +474,7 @@ def drawn_noise(
     generator: np.random.Generator,
     deviations: Mapping[str, float],
     samples: int,
-    in_power: Mapping[str, ComplexArray],
+    in_power: Mapping[str, Complex],
 ) -> dict[str, Array]:
     """Draw noise (M,) of the driving signals, and what it is in powers of the same phasors."""
     drawn: dict[str, Array] = {
