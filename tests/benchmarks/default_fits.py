@@ -35,7 +35,7 @@ def written(folder, model, count):
     """Write a case with so many free parameters, and its record."""
     content = content_of(model.lower())
     values = {**content["parameters"]["fixed"]}
-    values |= {f"machine.{name}": v for name, v in content["plant"]["parameters"].items()}
+    values |= {f"machine.{name}": v for name, v in content["plant"].get("parameters", {}).items()}
     wanted = [row.symbol for row in MODELS[model].sheet if row.free]
     wanted += ["KE", *(f"machine.{name}" for name in OF_MACHINE)]
     names = [name for name in dict.fromkeys(wanted) if values.get(name)][:count]
