@@ -312,6 +312,27 @@ def test_a_bound_is_dragged_by_the_mouse_and_by_keys(opened, case, which, way):
     assert page.faults == []
 
 
+def test_a_refused_bound_goes_back_to_the_one_in_force_at_once(opened):
+    page = opened()
+    handle = page.get_by_label("drag the lower bound of KD")
+    bound = page.get_by_label("lower bound of KD", exact=True)
+    box = handle.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 2000, box["y"] + 5, steps=4)
+    assert float(bound.input_value()) == 0.356  # its value, 0.3556, rounded
+    page.mouse.up()
+    page.locator("#message.bad", has_text="0.356").wait_for()
+    assert float(bound.input_value()) == 0.03556
+    assert float(handle.get_attribute("aria-valuenow")) == 0.0356
+    assert handle.bounding_box()["x"] == box["x"]
+    bound.fill("5")  # above the other one
+    bound.press("Enter")
+    page.locator("#message.bad", has_text="5 is not below").wait_for()
+    assert float(bound.input_value()) == 0.03556
+    assert page.faults == []
+
+
 def answered(address, **headers):
     try:
         with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answer:

@@ -86,14 +86,14 @@ function addParameter(p) {
     onchange: () => { move(p, Number(p.box.value)); store(p); },
   });
   const end = (which) => make("input", {
-    type: "number", step: "any", value: bounded || p[which] !== null ? number(p[which]) : "", disabled: p.locked,
+    type: "number", step: "any", value: p[which] === null ? "" : number(p[which]), disabled: p.locked,
     "aria-label": `${which === "low" ? "lower" : "upper"} bound of ${p.name}`,
-    onchange: (event) => send({ do: "bound", name: p.name, low: p.low, high: p.high, [which]: Number(event.target.value) }),
+    onchange: (event) => bound(p, which, Number(event.target.value)),
   });
   p.ends = { low: end("low"), high: end("high") };
   p.band = make("div", { className: "band", hidden: true });
   p.inner = make("div", { className: "inner" }, p.band, p.slider);
-  const handles = p.locked || !bounded ? [] : ["low", "high"].map((which) => handle(p, which));
+  p.handles = p.locked || !bounded ? {} : { low: handle(p, "low"), high: handle(p, "high") };
   const lock = make("button", {
     type: "button", className: "small", "aria-pressed": String(p.locked), "aria-label": `Hold ${p.name}`,
     onclick: () => send(p.locked ? { do: "free", name: p.name } : { do: "lock", name: p.name, value: p.value }),
@@ -105,7 +105,7 @@ function addParameter(p) {
   p.text = make("div", { className: "quiet" });
   $("parameters").append(make("div", { className: "parameter" },
     make("div", { className: "head" }, make("label", { htmlFor: id, title: words }, p.name), p.box, make("span", { className: "quiet" }, p.unit)),
-    make("div", { className: "track" }, p.inner, ...handles),
+    make("div", { className: "track" }, p.inner, ...Object.values(p.handles)),
     make("div", { className: "ends" }, p.ends.low, make("span", { className: "buttons" }, lock, profile), p.ends.high),
     p.text));
   state.parameters.set(p.name, p);
@@ -128,8 +128,9 @@ function handle(p, which) { // drags a bound: within the track up to the value, 
     told();
   };
   const done = () => {
-    if (place !== (upper ? 1 : 0)) send({ do: "bound", name: p.name, low: p.low, high: p.high, [which]: valueOf(place) });
+    if (place !== (upper ? 1 : 0)) bound(p, which, valueOf(place));
   };
+  own.back = () => { place = upper ? 1 : 0; told(); };
   own.setAttribute("aria-valuemin", valueOf(-room));
   own.setAttribute("aria-valuemax", valueOf(1 + room));
   told();
@@ -147,6 +148,14 @@ function handle(p, which) { // drags a bound: within the track up to the value, 
   });
   own.addEventListener("keyup", done);
   return own;
+}
+
+function bound(p, which, value) { // a fault puts back the one in force
+  state.back = () => {
+    p.ends[which].value = p[which] === null ? "" : number(p[which]);
+    p.handles[which]?.back();
+  };
+  send({ do: "bound", name: p.name, low: p.low, high: p.high, [which]: value });
 }
 
 function show(p) {
@@ -321,7 +330,7 @@ const handlers = {
     document.title = `${said.name} – exfit`;
     $("title").textContent = said.title;
     state.parameters.clear();
-    state.began = state.wanted = null;
+    state.began = state.wanted = state.back = null;
     state.waiting = false;
     refocused(() => {
       $("parameters").replaceChildren();
@@ -402,6 +411,8 @@ const handlers = {
   fault(said) {
     fitting(false);
     if (state.waiting) { state.waiting = false; ask(); }
+    state.back?.();
+    state.back = null;
     say(said.lines.join("\n"), true);
   },
 };
