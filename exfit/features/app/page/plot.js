@@ -1,6 +1,7 @@
 // A plot of curves over time on a canvas, with the values under the pointer or the arrow keys.
 
 const ROOM = { left: 58, right: 10, top: 8, bottom: 22 };
+const LABEL = 14; // px from one label of an axis to the next
 
 export class Plot {
   // `names` are the curves, drawn in this order; each has the colour of its name in the style
@@ -56,9 +57,12 @@ export class Plot {
     pen.lineWidth = 1;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
+    let written = Infinity; // height of the label below, which the next one leaves legible
     for (const tick of ticks(low, high, Math.max(2, height / 55))) {
       line(pen, ROOM.left, y(tick.at), width - ROOM.right, y(tick.at));
-      pen.fillText(tick.text, ROOM.left - 6, y(tick.at));
+      if (written - y(tick.at) < LABEL) continue;
+      written = y(tick.at);
+      pen.fillText(tick.text, ROOM.left - 6, written);
     }
     pen.textAlign = "center";
     pen.textBaseline = "top";
@@ -143,7 +147,7 @@ export function ticks(low, high, most) {
   for (let at = Math.ceil(low / step) * step; at <= high; at += step) {
     found.push({ at, text: at.toFixed(Math.min(decimals, 9)) });
   }
-  return found;
+  return found.length > 1 || !(high > low) ? found : ticks(low, high, 2 * most); // one shows no scale
 }
 
 export function number(value) {
