@@ -6,7 +6,7 @@ Everything is computed and written by the workflows and the writers of the comma
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from shlex import quote
@@ -58,60 +58,75 @@ DRAFT = "-draft"  # behind the name of a case: the file of its draft
 BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
 
 
-class Session:
-    """One page: its case as it is on disk or in its draft, and what was made of it.
+@dataclass
+class View:
+    """What a page shows: a case, the result of a fit, or a record, of which there is no case yet.
 
-    It is ``given`` a case, the result of a fit, or a record. Of a record, or of nothing, there is
-    no case yet.
-
-    ``seen`` are the texts of both files as this page knows them, None for one that is not there: a
-    file that another page or program has changed is not written over.
+    ``seen`` are the texts of the case and its draft as the page knows them, None for one that is
+    not there: a file that another page or program has changed is not written over. ``bounds`` are
+    those of the parameters that the page holds.
     """
 
-    def __init__(self, given: Given = None) -> None:
-        self.stack = ExitStack()
-        self.begun: Content | None = None
-        self.seen: dict[Path, str | None]
-        self.bounds: dict[str, tuple[float, float]]
-        self.stopped = self.fitting = self.corrected = False
-        self.explorer: Explorer
-        self.found: Inspection | None = None
-        self.planner: PlannersFile | None = None
-        self._take(given)
+    case_path: Path
+    result: FitResult | None = None
+    record: Path | None = None
+    seen: dict[Path, str | None] = field(default_factory=dict)
+    bounds: dict[str, tuple[float, float]] = field(default_factory=dict)
+    explorer: Explorer | None = None
+    found: Inspection | None = None
+    corrected: bool = False
+    stack: ExitStack = field(default_factory=ExitStack)
 
-    def _take(self, given: Given) -> None:
-        """Turn to a case, a result or a record; raises ExfitError for a result that is none."""
-        if isinstance(given, Path) and (given.is_dir() or given.suffix == ".json"):
-            given = load_result(given)
-        self.result = given if isinstance(given, FitResult) else None
-        path = given.case if isinstance(given, FitResult) else given
-        self.record = path if path is not None and path.suffix.lower() in RECORDS else None
-        self.case_path = Path() if path is None or self.record else path
-        self.seen, self.bounds = {}, {}
-        vars(self).pop("explorer", None)
+
+def view_of(given: Given) -> View:
+    """Begin with a case, a result or a record; raises ExfitError for a result that is none."""
+    if isinstance(given, Path) and (given.is_dir() or given.suffix == ".json"):
+        given = load_result(given)
+    if isinstance(given, FitResult):
+        return View(given.case, given)
+    if given is None or given.suffix.lower() in RECORDS:
+        return View(Path(), record=given)
+    return View(given)
+
+
+class Session:
+    """One page: its case as it is on disk or in its draft, and what was made of it."""
+
+    def __init__(self, given: Given = None) -> None:
+        self.view = view_of(given)
+        self.begun: Content | None = None
+        self.stopped = self.fitting = False
+        self.planner: PlannersFile | None = None
 
     def _turn_to(self, given: Given) -> Content:
         """Read another case, result or record; where that fails, what was there stays."""
         if self.fitting:
             raise ExfitError("fit: one runs; stop it first")
-        kept = vars(self).copy()
+        former, self.view = self.view, view_of(given)
         try:
-            self._take(given)
-            return self.read()
+            content = self.read()
         except BaseException:
-            vars(self).update(kept)
+            self.view = former
             raise
+        former.stack.close()
+        return content
 
     @property
     def draft(self) -> Path:
         """The file that changes go to until the case is saved."""
-        name = f"{self.case_path.stem}{DRAFT}{self.case_path.suffix}"
-        return within(self.case_path.parent, name)
+        name = f"{self.view.case_path.stem}{DRAFT}{self.view.case_path.suffix}"
+        return within(self.view.case_path.parent, name)
 
     @property
     def path(self) -> Path:
         """The file that describes what the page shows: the draft where there is one."""
-        return self.case_path if self.seen.get(self.draft) is None else self.draft
+        return self.view.case_path if self.view.seen.get(self.draft) is None else self.draft
+
+    @property
+    def explorer(self) -> Explorer:
+        """The case as it is simulated."""
+        assert self.view.explorer is not None  # what needs a case was refused without one
+        return self.view.explorer
 
     @property
     def case(self) -> Case:
@@ -127,21 +142,21 @@ class Session:
     def _open(self) -> Content:
         """Describe what the page begins with: as it was read, where it is still so on disk."""
         begun, self.begun = self.begun, None
-        same = all(_text(path) == text for path, text in self.seen.items())
+        same = all(_text(path) == text for path, text in self.view.seen.items())
         return begun if begun is not None and same else self.read()
 
     def read(self) -> Content:
         """Read the case, or its draft, and describe all that the page shows of it."""
-        if self.record is not None:
-            self.found, self.corrected = workflows.inspect(self.record), False
+        if self.view.record is not None:
+            self.view.found, self.view.corrected = workflows.inspect(self.view.record), False
             units = None if self.planner is None else planner_content(self.planner)
-            return {**record_content(self.found), "planner": units}
-        if not self.case_path.name:
+            return {**record_content(self.view.found), "planner": units}
+        if not self.view.case_path.name:
             return {"of": "start", "command": "exfit app"}
-        files = (self.case_path, self.draft)
-        self.seen = {path: _text(path) for path in files}
-        if self.seen[self.case_path] is None:
-            read_text(self.case_path)  # says why
+        files = (self.view.case_path, self.draft)
+        self.view.seen = {path: _text(path) for path in files}
+        if self.view.seen[self.view.case_path] is None:
+            read_text(self.view.case_path)  # says why
         self._look_at(load_case(self.path))
         return self.shown()
 
@@ -152,13 +167,13 @@ class Session:
         except BaseException:
             stack.close()
             raise
-        self.stack.close()
-        self.stack, self.explorer = stack, made
+        self.view.stack.close()
+        self.view.stack, self.view.explorer = stack, made
 
     def close(self) -> None:
         """End what simulates for this page, and its fit."""
         self.stopped = True
-        self.stack.close()
+        self.view.stack.close()
 
     def change(self, changes: Changes) -> Case:
         """Store changes in the draft, whole before the former one goes; return the new case.
@@ -171,11 +186,11 @@ class Session:
         if not case.free():
             raise ExfitError(f"{self.path.name}: the last free parameter: a fit needs one")
         write(self.draft, text)
-        self.seen[self.draft] = text
+        self.view.seen[self.draft] = text
         return case
 
     def _refuse_changed(self) -> None:
-        for path, text in self.seen.items():
+        for path, text in self.view.seen.items():
             if _text(path) != text:
                 raise ExfitError(
                     f"{path}: was changed by another page or program since this page read it; "
@@ -198,7 +213,7 @@ class Session:
         known = {each["name"] for each in parameters}
         return {
             "of": "open",
-            "name": self.case_path.stem,
+            "name": self.view.case_path.stem,
             "title": f"{case.subject}, {case.plant.type}",
             "draft": self.path == self.draft and self.draft.name,
             "parameters": parameters,
@@ -206,7 +221,7 @@ class Session:
             "records": [_record(each, whole=True) for each in start],
             "cost": sum(each.cost for each in start),
             "command": self.command,
-            "result": None if self.result is None else self._result(self.result),
+            "result": None if self.view.result is None else self._result(self.view.result),
         }
 
     def _parameters(self) -> Iterator[Content]:
@@ -214,7 +229,7 @@ class Session:
         values, rows = self.case.values(), self.case.rows()
         free = {each.name: each for each in self.explorer.free}
         limits = {name: (each.low, each.high) for name, each in free.items()}
-        for name, (low, high) in {**self.bounds, **limits}.items():
+        for name, (low, high) in {**self.view.bounds, **limits}.items():
             yield {
                 "name": name,
                 "unit": rows[name].unit if name in rows else "",
@@ -286,7 +301,7 @@ class Session:
         unknown = [name for name in values if name not in self.case.free()]
         if unknown:
             raise ExfitError(f"{unknown[0]}: {near(unknown[0], self.case.free())}")
-        of_record = {} if self.result is None else self.result.of_records
+        of_record = {} if self.view.result is None else self.view.result.of_records
         of_record = {
             each.name: of_record[each.name]
             for each in self.explorer.residuals.free
@@ -313,7 +328,7 @@ class Session:
         symbol = name if part is None else name.removeprefix(part.prefix)
         own = next(each for each in self.explorer.free if each.name == name)
         case = self.change({place: "", dotted((*section, symbol)): number_text(value)})
-        self.bounds[name] = (own.low, own.high)
+        self.view.bounds[name] = (own.low, own.high)
         return self._rebuilt(case)
 
     def _free(self, name: str) -> Content:
@@ -321,25 +336,25 @@ class Session:
         if part is None or part.free is None or name not in self._given():
             raise ExfitError(f"{name}: not a given value that a fit can find")
         changes = dict(freed(self.case, {name: values[name]}))
-        low, high = self.bounds.get(name, (0.0, 0.0))
+        low, high = self.view.bounds.get(name, (0.0, 0.0))
         if low < values[name] < high and isfinite(high - low):
             found = between(values[name], low, high)
             place = dotted((*part.free, name.removeprefix(part.prefix)))
             changes[place] = found if low > 0.0 else f"{found[:-1]}, scale: linear}}"
         case = self.change(changes)
-        self.bounds.pop(name, None)
+        self.view.bounds.pop(name, None)
         return self._rebuilt(case)
 
     def _discard(self) -> Content:
         self._refuse_changed()
         self.draft.unlink(missing_ok=True)
-        self.result, self.bounds = None, {}
+        self.view.result, self.view.bounds = None, {}
         return self.read()
 
     # ---- from a record
 
     def _refuse_without_case(self, do: str) -> None:
-        if not hasattr(self, "explorer") and do not in WITHOUT_CASE:
+        if self.view.explorer is None and do not in WITHOUT_CASE:
             raise ExfitError(f"{do}: there is no case yet: make one of a record")
 
     def _look(self, file: str) -> Content:
@@ -352,19 +367,19 @@ class Session:
         return self._turn_to(place)
 
     def _shown_record(self) -> Inspection:
-        if self.record is None or self.found is None:
+        if self.view.record is None or self.view.found is None:
             raise ExfitError("record: there is none: drop one on the page")
-        return self.found
+        return self.view.found
 
     def _correct(self, asked: "messages.Correct") -> Content:
-        self.found, self.corrected = corrected(self._shown_record(), asked), True
-        return channels_content(self.found)
+        self.view.found, self.view.corrected = corrected(self._shown_record(), asked), True
+        return channels_content(self.view.found)
 
     def _make(self, asked: "messages.Make") -> Content:
         path, command = made(self._shown_record(), self.planner, asked)
-        said = {**self._turn_to(path), "words": f"written: {path}"}
         # no option gives machine data or a channel: the case that is there has them
-        return said if asked.machine or self.corrected else {**said, "command": command}
+        known = {} if asked.machine or self.view.corrected else {"command": command}
+        return {**self._turn_to(path), "words": f"written: {path}", **known}
 
     # ---- fit, profile, validation
 
@@ -395,10 +410,10 @@ class Session:
 
         try:
             case = load_case(self.path)
-            self.result = workflows.fit(case, None, iterated, advanced, live)
+            self.view.result = workflows.fit(case, None, iterated, advanced, live)
         finally:
             self.fitting = False
-        return {**self._result(self.result), "of": "fit", "command": self.command}
+        return {**self._result(self.view.result), "of": "fit", "command": self.command}
 
     def _end_if_stopped(self) -> None:
         if self.stopped:
@@ -461,7 +476,7 @@ class Session:
         }
 
     def _validate(self, values: Mapping[str, float]) -> Content:
-        given = self.result if self.result is not None and not values else values
+        given = self.view.result if self.view.result is not None and not values else values
         matches = workflows.validate(load_case(self.path), given)
         places = "".join(f" --set {name}={value:g}" for name, value in values.items())
         return {
@@ -473,9 +488,9 @@ class Session:
     # ---- files
 
     def _fitted(self) -> FitResult:
-        if self.result is None:
+        if self.view.result is None:
             raise ExfitError("result: there is none yet: fit first")
-        return self.result
+        return self.view.result
 
     def _folder(self) -> Path:
         output = Output(None, figures=True, quiet=True, as_json=False)
@@ -483,17 +498,19 @@ class Session:
 
     def _save_case(self) -> Content:
         self._refuse_changed()
-        text = self.seen[self.draft]
+        text = self.view.seen[self.draft]
         if text is None:
-            return {"of": "saved", "words": f"{self.case_path} is as the page shows it"}
-        parse_case(text, self.case_path)
-        write(self.case_path, text)
+            return {"of": "saved", "words": f"{self.view.case_path} is as the page shows it"}
+        parse_case(text, self.view.case_path)
+        write(self.view.case_path, text)
         former, draft = self.path, self.draft
         draft.unlink(missing_ok=True)
-        self.seen = {self.case_path: text, draft: None}
-        if self.result is not None and self.result.case == former:  # the same text, byte by byte
-            self.result = replace(self.result, case=self.case_path)
-        return {**self._changed(), "of": "saved", "draft": False, "words": str(self.case_path)}
+        self.view.seen = {self.view.case_path: text, draft: None}
+        if (
+            self.view.result is not None and self.view.result.case == former
+        ):  # the same text, byte by byte
+            self.view.result = replace(self.view.result, case=self.view.case_path)
+        return {**self._changed(), "of": "saved", "draft": False, "words": str(self.view.case_path)}
 
     def _save_result(self) -> Content:
         result, folder = self._fitted(), self._folder()

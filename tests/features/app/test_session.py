@@ -133,7 +133,7 @@ def test_a_fit_shows_its_iterations_and_gives_what_the_command_gives(session, ca
     seen = []
     said = session.answer(read_message('{"do": "fit"}'), seen.append)
     result = exfit.fit(case)
-    assert session.result.parameters == result.parameters
+    assert session.view.result.parameters == result.parameters
     assert said["verdict"] == result.verdict.verdict
     numbers = [each["number"] for each in seen if each["of"] == "iteration"]
     assert numbers == [line.number for line in result.history]
@@ -147,7 +147,7 @@ def test_a_fit_that_is_stopped_keeps_its_best_point(session):
             session.answer(read_message('{"do": "stop"}'), stop)
 
     session.answer(read_message('{"do": "fit"}'), stop)
-    assert session.result.interrupted
+    assert session.view.result.interrupted
     assert not interrupted()
 
 
