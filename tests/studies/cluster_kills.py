@@ -1,17 +1,24 @@
 """Fit generated cases on a Dask cluster whose workers are killed, and compare with a local batch.
 
-Run it as ``python tests/studies/cluster_kills.py [CASES] [SECONDS] [SEARCH]``. A scheduler without
-exfit and two workers, each with one thread and a folder that nobody else has, run on the loopback.
-Every so many seconds one of the workers, in turn, is killed with all of its processes by SIGKILL,
-and another one is started in its place. Then the same cases are fitted by a local batch: all must
-be done, each must have been counted once, and all files must be the same but for the times.
+Run it as ``python tests/studies/cluster_kills.py [CASES] [SECONDS] [SEARCH] [--rates]``. A
+scheduler without exfit and two workers, each with one thread and a folder that nobody else has, run
+on the loopback. Every so many seconds one of the workers, in turn, is killed with all of its
+processes by SIGKILL, and another one is started in its place. Then the same cases are fitted by a
+local batch: all must be done, each must have been counted once, and all files must be the same but
+for the times.
+
+``--rates`` first times the same cases without kills on an idle machine: by a local batch of one
+worker, by one Dask worker, by two batches of half the cases each that know nothing of one another,
+and by two Dask workers. The efficiency is the rate of two to twice that of one.
 """
 
+import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
@@ -50,14 +57,62 @@ class Killer:
         self.thread.join()
 
 
+def rate(place, search, *batches):
+    """Run batches of the cases at once, each with options of its own; return their cases per s."""
+
+    def own(batch):
+        folder, *options = batch
+        arguments = ["-m", "exfit", "batch", "cases", "-q", "--search", search, "-o", folder]
+        began = time.monotonic()
+        subprocess.run([sys.executable, *arguments, *options], cwd=place, check=False)
+        done = [*(place / folder).glob("*/result.json")]
+        return len(done) / (time.monotonic() - began)
+
+    with ThreadPoolExecutor() as pool:
+        return sum(pool.map(own, batches))
+
+
+def of_cases(*folders):
+    """Return the files of the fits in folders of batches, without times."""
+    files = {name: text for folder in folders for name, text in without_times(folder).items()}
+    return {name: text for name, text in files.items() if "/" in name}
+
+
+def print_rates(place, search):
+    """Print how fast one and two work, alone and on a cluster, and whether the files are equal."""
+    here = ("--workers", "1")
+    with running_cluster(place / "cluster-1", workers=1) as cluster:
+        there = ("--scheduler", cluster.address)
+        rate(place, search, ("warm", *here, "--part", "1/20"))  # machine code and bytecode
+        alone, one = rate(place, search, ("p1", *here)), rate(place, search, ("d1", *there))
+        halves = [(f"p2-{k}", *here, "--part", f"{k}/2") for k in (1, 2)]
+        apart = rate(place, search, *halves)
+        cluster.add_worker()
+        two = rate(place, search, ("d2", *there))
+    for name, single, both in (("processes", alone, apart), ("Dask", one, two)):
+        print(f"  {name}: {single:.3f} cases/s by one, {both:.3f} by two: efficiency "
+              f"{both / single / 2:.3f}")  # fmt: skip
+    whole = of_cases(place / "p1")
+    others = (
+        of_cases(place / "d1"),
+        of_cases(place / "p2-1", place / "p2-2"),
+        of_cases(place / "d2"),
+    )
+    equal = "equal" if all(each == whole for each in others) else "NOT EQUAL"
+    print(f"  Dask to processes: {two / apart:.3f}; {len(whole)} files, {equal}", flush=True)
+
+
 def main():
     """Print what becomes of the cases."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else CASES
-    every = float(sys.argv[2]) if len(sys.argv) > 2 else EVERY
-    search = sys.argv[3] if len(sys.argv) > 3 else SEARCH
+    given = [word for word in sys.argv[1:] if word != "--rates"]
+    count = int(given[0]) if given else CASES
+    every = float(given[1]) if len(given) > 1 else EVERY
+    search = given[2] if len(given) > 2 else SEARCH
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
         generated_cases(place, count)
+        if "--rates" in sys.argv:
+            print_rates(place, search)
         events, began = Events(), time.monotonic()
         with running_cluster(place / "cluster") as cluster, Killer(cluster, every) as killer:
             exfit.batch(
