@@ -117,14 +117,18 @@ def read_limited(path: Path, most: int) -> bytes:
 
 def utf8(data: bytes, path: Path) -> str:
     """Return the text that the bytes of a file are; raises ExfitError where they are not UTF-8."""
+    zeros = [not byte for byte in data[:4]]
+    wide = zeros in ([False, True] * 2, [True, False] * 2)  # UTF-16 without its mark
     try:
-        return data.decode("utf-8-sig")
+        if not wide:
+            return data.decode("utf-8-sig")
+        start = zeros.index(True)
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        byte = f"byte 0x{data[error.start]:02x}"
-        utf_16 = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
-        remedy = "; it is UTF-16: save it as UTF-8" if utf_16 else ""
-        raise ExfitError(f"{path}:{line}: not UTF-8 text: {byte}{remedy}") from None
+        start = error.start
+        wide = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
+    line = data.count(b"\n", 0, start) + 1
+    what = f"byte 0x{data[start]:02x}{'; it is UTF-16' if wide else ''}"
+    raise ExfitError(f"{path}:{line}: not UTF-8 text: {what}: save it as UTF-8")
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -282,11 +282,19 @@ def test_texts_of_any_language_are_read_with_a_mark_at_the_beginning_or_without(
         assert read_json(path) == {"unit": "Höllental 😀"}
 
 
-@pytest.mark.parametrize("order", ["le", "be"])
-def test_a_text_in_utf_16_is_refused_with_the_remedy(tmp_path, order):
+@pytest.mark.parametrize(
+    ("encoding", "what"),
+    [
+        ("utf-16-le", "byte 0x00; it is UTF-16"),  # without its mark
+        ("utf-16-be", "byte 0x00; it is UTF-16"),
+        ("utf-16", "byte 0xff; it is UTF-16"),
+        ("latin-1", "byte 0xe4"),
+    ],
+)
+def test_a_text_that_is_not_utf_8_is_refused_with_the_remedy(tmp_path, encoding, what):
     path = tmp_path / "file.json"
-    path.write_bytes("\ufeff{}".encode(f"utf-16-{order}"))
-    with pytest.raises(ExfitError, match=r":1: .* byte 0xf[ef]; it is UTF-16: save it as UTF-8"):
+    path.write_bytes('{"ä": 1}'.encode(encoding))
+    with pytest.raises(ExfitError, match=f":1: not UTF-8 text: {what}: save it as UTF-8$"):
         read_json(path)
 
 

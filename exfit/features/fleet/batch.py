@@ -127,7 +127,7 @@ def batch(
     given = [cases] if isinstance(cases, str | PathLike) else [*cases]
     place = Path(folder)
     _refuse(part, workers, time_limit, strategy, search)
-    existing = case_files(map(Path, given), place) if given or not made else ()
+    existing = case_files([*map(Path, given)], place) if given or not made else ()
     each_once = {case_name(place, file): file for file in (*existing, *made)}
     files = share_of([*each_once.values()], part, place)
     settings = BatchSettings(FitSettings(strategy, search), retry_failed, tuple(further))

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from os.path import normpath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -201,6 +202,11 @@ def _without_fit(rows: "Sequence[CaseSummary]") -> "Sequence[CaseSummary]":
     return rows if none_to_fit else [row for row in rows if row.status in WITHOUT_FIT]
 
 
+def _said(reason: str, case: Path) -> str:
+    place = normpath(case)
+    return reason if reason.startswith(place) else f"{place}: {reason}"
+
+
 def _exit(fleet: "Fleet", quiet: bool) -> None:
     rows = fleet.of_run
     done = [row for row in rows if row.status == "done"]
@@ -209,7 +215,7 @@ def _exit(fleet: "Fleet", quiet: bool) -> None:
     without = _without_fit(rows)
     if without and not fleet.interrupted:
         if quiet:
-            raise FileError(f"{row.case}: {row.reason}" for row in without)
+            raise FileError(_said(row.reason, fleet.folder / row.case) for row in without)
         raise SystemExit(FAILED)
     if fleet.interrupted or not all(row.holds for row in done):
         raise SystemExit(NOT_CONVERGED)

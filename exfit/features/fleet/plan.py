@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -46,7 +46,7 @@ class PlannedCase(NamedTuple):
     task: CaseTask
 
 
-def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
+def case_files(given: Sequence[Path], folder: Path) -> tuple[Path, ...]:
     """Return the case files that are given, and those below the folders that are given.
 
     Of a folder they are the files *.yaml and *.yml that are cases, faulty or not. Folders whose

@@ -1,5 +1,6 @@
 """The cases of a batch before they are fitted."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from batches import case_file, record_file
 from tiers import few_of
 
 from exfit.errors import ExfitError
+from exfit.features.fleet.batch import batch
 from exfit.features.fleet.folder import IndexEntry
 from exfit.features.fleet.plan import BatchSettings, case_files, planned_case, share_of
 from exfit.runs.runner import FitSettings
@@ -40,8 +42,8 @@ def test_what_does_not_exist_is_refused_with_all_of_it(tmp_path):
     with pytest.raises(ExfitError) as refusal:
         case_files([tmp_path / "a.yaml", tmp_path / "b"], tmp_path / "fleet")
     assert str(refusal.value).count("No such file or folder") == 2
-    with pytest.raises(ExfitError, match="no case"):
-        case_files([tmp_path], tmp_path / "fleet")
+    with pytest.raises(ExfitError, match=f"^{re.escape(str(tmp_path))}: no case"):
+        batch([tmp_path], tmp_path / "fleet")
 
 
 @pytest.mark.parametrize("parts", few_of([3, 1, 40], 1))
