@@ -653,7 +653,8 @@ def test_a_drawing_is_narrow_and_shows_every_parameter(limiter):
 def test_a_record_lists_every_parameter_once(limiter):
     for record in limiter.records:
         symbols = [row.symbol for row in limiter.sheet]
-        listed = [*record.cons, *dict(record.held)]
+        integers = [symbol for symbol, _ in record.icons if symbol in symbols]
+        listed = [*integers, *record.cons, *dict(record.held)]
         assert sorted(listed) == sorted([*symbols, *dict(record.absent), *record.ignored])
 
 

@@ -118,6 +118,8 @@ def by_the_last_saturation():
 class TwoBuses:
     """The unit of a case, with the values that its records are imported as, or some changed."""
 
+    STEP = STEP
+
     def __init__(self, told, **changes):
         records = told["records"]
         if "GEN" not in records[0]:
@@ -208,14 +210,19 @@ class TwoBuses:
             signals = simulator.response(self.values).signals
         return [{name: x[k] for name, x in signals.items()} for k in range(len(times))]
 
+    def moved_at(self, t):
+        """Return the inputs that the disturbance moves, at a time."""
+        on = FAULT[0] <= t < FAULT[1]
+        size = {"vref": self.pulse} if self.pulse else {"fault_B": -1.0 / SHUNT}
+        return {**dict.fromkeys(self.moved, 0.0), **(size if on else {})}
+
     def stepped(self, times):
         """Return the same by Heun's rule, in steps that a switching divides."""
         system, shown = self.system, {}
         states, setpoints = system.rest(self.values)
         ends = np.union1d(np.arange(0.0, max(times) + 2 * self.step, self.step).round(9), FAULT)
         for start, end in pairwise(ends):
-            fault = -1.0 / SHUNT if FAULT[0] <= start < FAULT[1] else 0.0
-            inputs = {**dict.fromkeys(self.moved, 0.0), "fault_B": fault}
+            inputs = self.moved_at(start)
             now = system.motion(self.values, setpoints, states, inputs)
             shown[round(start, 6)] = now.outputs
             ahead = {x: states[x] + (end - start) * now.slopes[x] for x in states}
@@ -223,6 +230,29 @@ class TwoBuses:
             slopes = {x: 0.5 * (now.slopes[x] + then.slopes[x]) for x in states}
             states = {x: states[x] + (end - start) * slopes[x] for x in states}
         return [shown[t] for t in times]
+
+    def repeated(self, times):
+        """Return the same in the steps of PSS/E: x + h (3 f - f of the step before) / 2.
+
+        At a switching f is the mean of before and behind it.
+        """
+        system, h, shown, last = self.system, self.STEP, {}, None
+        instants = [round(t / h) for t in times]
+        states, setpoints = system.rest(self.values)
+        for k in range(max(instants) + 1):
+            before, behind = self.moved_at((k - 0.5) * h), self.moved_at((k + 0.5) * h)
+            motions = [
+                system.motion(self.values, setpoints, states, inputs)
+                for inputs in ([before] if before == behind else [before, behind])
+            ]
+            slopes = {x: sum(m.slopes[x] for m in motions) / len(motions) for x in states}
+            shown[k] = motions[0].outputs
+            last = last or slopes
+            states = {x: states[x] + h * (1.5 * slopes[x] - 0.5 * last[x]) for x in states}
+            for x, (low, high) in motions[0].limits.items():
+                states[x] = min(max(states[x], low), high)
+            last = slopes
+        return [shown[k] for k in instants]
 
 
 class BehindALine(TwoBuses):
@@ -271,6 +301,10 @@ class BehindALine(TwoBuses):
             e, z = seen[0] * stiff, seen[1]
             yield {"E": abs(e), "angle": np.angle(e), "R": z.real, "X": z.imag}
 
+    def moved_at(self, t):
+        """Return the inputs that move the unit, at a time."""
+        return {**dict.fromkeys(self.moved, 0.0), **(self.moves if t > self.AT else {})}
+
     def inputs(self, end):
         """Return what moves the unit."""
         moves = self.moves.items()
@@ -285,29 +319,9 @@ class BehindALine(TwoBuses):
         return [self.with_degrees(*row) for row in zip(times, super().shown(times), strict=True)]
 
     def repeated(self, times):
-        """Return the same in the program's own steps: x + h (3 f - f of the step before) / 2.
-
-        At the switching f is the mean of before and behind it.
-        """
-        system, h, shown = self.system, self.STEP, []
-        at, instants = round(self.AT / h), [round(t / h) for t in times]
-        states, setpoints = system.rest(self.values)
-        still, moved = dict.fromkeys(self.moved, 0.0), {"vref": 0.0, **self.moves}
-        last = None
-        for k in range(max(instants) + 1):
-            motions = [
-                system.motion(self.values, setpoints, states, inputs)
-                for inputs in ([still] if k < at else [still, moved] if k == at else [moved])
-            ]
-            slopes = {x: sum(m.slopes[x] for m in motions) / len(motions) for x in states}
-            if k in instants:
-                shown.append(self.with_degrees(k * h, motions[0].outputs))
-            last = last or slopes
-            states = {x: states[x] + h * (1.5 * slopes[x] - 0.5 * last[x]) for x in states}
-            for x, (low, high) in motions[0].limits.items():
-                states[x] = min(max(states[x], low), high)
-            last = slopes
-        return shown
+        """Return the same in the program's own steps."""
+        shown = super().repeated(times)
+        return [self.with_degrees(*row) for row in zip(times, shown, strict=True)]
 
 
 def case_of(told, **changes):

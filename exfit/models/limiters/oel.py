@@ -106,6 +106,11 @@ def oel2c_rest(voel: Signal, u: Signal, p: Signal, x: Signal) -> None:
     regulator_rest(p.IINST - p.KACT * x.I + bias, p, x, "OEL")
 
 
+OF_OEL2C = (
+    "TC1OEL TB1OEL TC2OEL TB2OEL KPOEL KIOEL KDOEL TDOEL VOELMAX3 VOELMIN3 VOELMAX2 VOELMIN2 "
+    "VOELMAX1 VOELMIN1 IRESET TEN TOFF ITHOFF KSCALE TROEL KACT ITFPU IINST ILIM TAOEL C1 K1 "
+    "C2 K2 VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU"
+)
 OEL2C = documented(
     oel2c,
     oel2c_rest,
@@ -143,15 +148,22 @@ OEL2C = documented(
     inputs="ifd",
     records=record(
         "OEL2C",
-        "TC1OEL TB1OEL TC2OEL TB2OEL KPOEL KIOEL KDOEL TDOEL VOELMAX3 VOELMIN3 VOELMAX2 VOELMIN2 "
-        "VOELMAX1 VOELMIN1 IRESET TEN TOFF ITHOFF KSCALE TROEL KACT ITFPU IINST ILIM TAOEL C1 K1 "
-        "C2 K2 VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU",
+        OF_OEL2C,
         icons={"OELINPUT": 0},
         held={"SW1": 0.0},
         exchanged="FIXEDRU FIXEDRD",
-        doubt="its order is that of PowerWorld's list, not confirmed by a file; another program "
-        "reads SW1 as a second integer and a rated field current at the end",
+        doubt="its order is that of PowerWorld's list, not confirmed by a file",
+    )
+    + record(
+        "OEL2CU1",
+        f"{OF_OEL2C} IFDRATED",
+        icons={"OELINPUT": 2, "RAMPS": 1},
+        absent={"IFDRATED": 1.0},
+        held={"SW1": 0.0},
+        exchanged="FIXEDRU FIXEDRD",
+        user="10 0 2 41 8 8",
     ),
+    aliases="OEL2CU1",
 )
 
 

@@ -156,7 +156,10 @@ def uel2c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     lag TADJ, between 0.1 and 1. Not modelled: the stabilising signal VF (KUF) and,
     for ST7C, the reference fed back (KFB, TUL). The limits of the two last blocks
     are non-windup. Dynawo and InterPSS agree but for kadj, by which InterPSS
-    divides and which it does not limit; here it reduces the gain, as its name says.
+    divides and which it does not limit; here it reduces the gain, as its name says
+    and PSS/E 36.7 does (UEL2CU1: its states within 7e-5 pu, V within 4e-5: while
+    the PI is clipped to y, PSS/E lets V follow it by KUI/KUL (y - V)). UEL2CU1 has
+    limits of the output beside those of the last block, which are not modelled.
     Typical data are the standard's sample data (PSCAD, GridKit).
     """
     v, d.VT = lag(u.vt, s.VT, 1.0, p.TUV)
@@ -224,5 +227,16 @@ UEL2C = documented(
         absent={"KUF": 0.0, "KFB": 0.0},
         ignored="TUL",
         doubt="its order is that of PowerWorld's list; PSS/E 36 has another in its UEL2CU1",
+    )
+    + record(
+        "UEL2CU1",
+        "TUV TUP TUQ KUI KUL VUIMAX VUIMIN KUF KFB TUL TU1 TU2 TU3 TU4 P0 Q0 P1 Q1 P2 Q2 P3 Q3 P4 "
+        "Q4 P5 Q5 P6 Q6 P7 Q7 P8 Q8 P9 Q9 P10 Q10 VULMAX VULMIN VBIAS KFIX TADJ TQREF VUELMAX2 "
+        "VUELMIN2 VUELMAX1 VUELMIN1 XQ",
+        icons={"K1": 2, "K2": 2, "QUADRANT": 1, "SW1": 1},
+        absent={"KUF": 0.0, "KFB": 0.0, "VULMAX": 99.0, "VULMIN": -99.0},
+        ignored="TUL",
+        user="9 0 4 47 9 2",
     ),
+    aliases="UEL2CU1",
 )

@@ -92,8 +92,11 @@ STAB2A K2 T2 K3 T3 K4 K5 T5 HLIM
 """
 # InterPSS's reader of .dyr files and its files (InterPSS-Project/ipss-plugin at f1d1f27d); PSS/E
 # 36.7 ran BBSEX1, EXELI, IEEET4, IEEEX2, ST1C, ST10C, PSS2C, PSS3C, PSS6C, PSS7C, GENTRA so, and
-# AC8CU1, DC4CU1, ST4CU1
+# AC8CU1, DC4CU1, ST4CU1, UEL2CU1
 INTERPSS = """
+UEL2CU1 K1 K2 QUADRANT SW1 TUV TUP TUQ KUI KUL VUIMAX VUIMIN KUF KFB TUL TU1 TU2 TU3 TU4 P0 Q0 P1
+        Q1 P2 Q2 P3 Q3 P4 Q4 P5 Q5 P6 Q6 P7 Q7 P8 Q8 P9 Q9 P10 Q10 VULMAX VULMIN VBIAS KFIX TADJ
+        TQREF VUELMAX2 VUELMIN2 VUELMAX1 VUELMIN1 XQ
 GENQECU SATFLG Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xppq Xl S10 S12 Kw
 GENQEJU SATFLG Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xppq Xl S10 S12 Kis
 H6EU1 Fd Re Rg Tpe Tsp Kp Ki Kd Td Velm GMAX GMIN Buf Buv Kg Tg BLG DBBD Tbd BLB DBBS Tbs Bgvmin Blv
@@ -264,6 +267,7 @@ ORDERS = {
 # typed from the one source that there is: PowerWorld's list, InterPSS's files (ST2C, ST3C), and for
 # ESURRY a record of a plant, with which InterPSS's order gives TD = 400 s and K10 = 1
 OF_ONE_SOURCE = {"ESURRY", "PSS5C", "OEL2C", "OEL3C", "UEL2C", "ST2C", "ST3C"}
+OF_ONE_SOURCE |= {"OEL2CU1"}  # which is OEL2C's, with two values exchanged as there
 # those without a dead band: the order of the form with one, and of PSS/E's IEEEG2 by its diagram
 OF_ONE_SOURCE |= {"HYGOV2", "PIDGOV", "WPIDHY", "IEEEG2"}
 # of PSLF: files that are not at hand, a list of parameters, or taken to be as in PSS/E
