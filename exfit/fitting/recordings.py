@@ -232,9 +232,11 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
         return {initial(signal): mean_at_rest(test, record, signal) for signal in kind.levels}
     vt0, (low, high) = initial_level(test, record, "vt"), POSSIBLE_VOLTAGES
     if kind.per_unit and (kind.has_machine or not kind.levels) and not low <= vt0 <= high:
+        outside = f"{vt0:.4g} pu, outside {low:g} ... {high:g}"
+        if start_value(test.vt0) is not None:
+            raise RecordError(f"{record.source}: vt0, which its test states, is {outside}")
         raise RecordError(
-            f"{record.source}: vt rests at {vt0:.4g} pu, outside {low:g} ... {high:g}: its unit, "
-            "base or scale is another"
+            f"{record.source}: vt rests at {outside}: its unit, base or scale is another"
         )
     levels = {initial("speed"): 1.0} if "speed" in kind.levels else {}
     for signal in kind.levels:

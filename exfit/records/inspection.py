@@ -28,7 +28,7 @@ from exfit.records.channel_names import (
     read_names,
     three_phases,
 )
-from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
+from exfit.records.clock import Clock, check_finite, check_increasing, check_steps, why_unusable
 from exfit.records.contradictions import base_findings, contradictions, is_on_load
 from exfit.records.formats import PLAY_IN
 from exfit.records.formats.table import (
@@ -242,8 +242,8 @@ def inspect(
         unit: of the time's numbers: s, ms, us or min; None: as the file says, else s.
 
     Raises:
-        RecordError: no column seems to be the time or it cannot be read, fewer than two samples,
-            or no column of numbers beside it.
+        RecordError: no column seems to be the time, it cannot be read or never increases, fewer
+            than two samples, or no column of numbers beside it.
     """
     place, stamps = _clock_of(table, clock, unit)
     sampling, time = sampling_of(stamps), stamps[increasing(stamps)]
@@ -300,6 +300,8 @@ def _clock_of(
         )
     check_finite(stamps, clock.label, table.place)
     check_steps(stamps, clock.label, table.place)
+    if np.count_nonzero(increasing(stamps)) < FEWEST_SAMPLES:
+        check_increasing(stamps, clock.label, table.place)
     return clock, stamps
 
 
@@ -325,7 +327,8 @@ def _columns_of_numbers(
 
     samples = Samples(usable())
     if not samples:
-        raise RecordError(f"{table.path}: no column of numbers beside the time")
+        first = "; ".join(["", *refused.values()][:2])
+        raise RecordError(f"{table.path}: no column of numbers beside the time{first}")
     return samples, refused
 
 

@@ -446,7 +446,11 @@ def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency
     [
         (Columns({"a": np.ones(3)}, clock=()), "--time names one: 'a'"),
         (Columns({"t": np.arange(1.0), "vt": np.ones(1)}), "1 samples; at least 2"),
-        (Columns({"t": np.arange(3.0), "vt": "words"}), "no column of numbers"),
+        (Columns({"t": np.arange(3.0), "vt": "words"}), "no column of numbers.*; .*'vt'"),
+        (
+            Columns({"t": np.arange(3.0)[::-1], "vt": np.ones(3)}, clock=("t",)),
+            r"record.csv:3: column 't': time goes back from 2.0 s to 1.0 s",
+        ),
         (
             Columns({"t": np.array([0.0, np.nan, 1.0]), "vt": np.ones(3)}),
             "record.csv:3: column 't': nan",

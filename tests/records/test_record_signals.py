@@ -194,6 +194,13 @@ def test_a_voltage_that_no_machine_has_is_refused_with_its_value_and_limits(tmp_
         build_experiments(case_of(content, tmp_path))
 
 
+def test_a_voltage_in_kv_that_the_test_states_is_refused_as_such(tmp_path):
+    synthetic(tmp_path, TEST, TIME)
+    content = one({**TEST, "vt0": 15.75}, {"vt": "vt"}, ["KA"])
+    with pytest.raises(RecordError, match=r"vt0, which its test states, is 15\.75 pu, outside 0"):
+        build_experiments(case_of(content, tmp_path))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("connection", ["phase-to-ground", "phase-to-phase"])
 def test_a_voltage_off_by_the_connection_is_noted(tmp_path, connection):

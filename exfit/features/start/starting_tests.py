@@ -73,7 +73,7 @@ def starting_tests(
         return _events(every, len(inspections), sizes, given)
     _refuse_rejections(every)
     if len(every) == 1 and (every[0].opening or not tests_of(inspections[0])):
-        _refuse_unused(sizes, [])
+        _refuse_sizes(sizes, inspections[0])
         return (StartingTest("fit", inspections[0], (), bases=given),)
     without = [inspection.path for inspection in every if not tests_of(inspection)]
     if without:
@@ -131,8 +131,8 @@ def _events(
 
     Raises ExfitError for sizes of steps, and for a record of another kind beside them.
     """
-    _refuse_unused(sizes, [])
     first = next(inspection for inspection in inspections if _drives(inspection))
+    _refuse_sizes(sizes, first)
     for inspection in inspections:
         if inspection.is_event != first.is_event or not _drives(inspection):
             raise ExfitError(
@@ -336,6 +336,18 @@ def _named(word: str, names: Sequence[str]) -> list[str]:
 def _refuse_unused(sizes: Mapping[str, float], names: Sequence[str]) -> None:
     """Raise ExfitError for sizes that belong to no test."""
     for word, amount in sizes.items():
-        tests = ", ".join(names) or "none: it shows no step"
-        text = f"{amount!r}" if word == ALL_TESTS else f"{word}={amount!r}"
-        raise ExfitError(f"--step {text}: no test of that name; the record's tests: {tests}")
+        text = f"--step {word}={amount!r}: no test of that name; the record's tests: "
+        raise ExfitError(text + ", ".join(names))
+
+
+def _refuse_sizes(sizes: Mapping[str, float], inspection: Inspection) -> None:
+    """Raise ExfitError for sizes of steps that are given to a record without any."""
+    if not sizes:
+        return
+    if _drives(inspection) or inspection.opening:
+        why = f"it is taken for a {inspection.kind.name}, which has no step"
+    else:
+        why = "it shows no step; --tests gives a table that says where it is"
+    if inspection.channel_of("vt") is None:
+        why += "; no column is recognised as vt: vt in --answers names it"
+    raise ExfitError(f"{inspection.path}: --step: {why}")

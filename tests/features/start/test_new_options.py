@@ -78,6 +78,14 @@ def test_a_size_that_cannot_be_is_refused(record, run, size, says):
     assert says in ran.err
 
 
+def test_a_size_of_a_step_that_a_record_does_not_show_is_refused_with_the_remedy(empty_folder, run):
+    (empty_folder / "flat.csv").write_text("t,vt\n" + "".join(f"{k},1.0\n" for k in range(20)))
+    ran = run("new", "--model", "AC1A", "--record", "flat.csv", "--step", "0.05")
+    assert ran.code == 1
+    assert ran.err.startswith("Error: flat.csv: --step: it shows no step; --tests gives a table")
+    assert "vt in --answers names it" in ran.err
+
+
 @pytest.mark.parametrize(
     ("base", "value"), [("vt=15.75kV", 15.75), ("vt=15750 V", 15.75), ("vt=15.75", 15.75)]
 )
