@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import cleandoc
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 from exfit.models.blocks import Limited, Signal, clip, inf, limited, rate, where
 from exfit.models.sheet import OF_TWO_PROGRAMS, Model, Parameter, Records, documented, record, sheet
@@ -30,18 +30,40 @@ OF_RATING = """
 All is per unit of the turbine, whose rating is Trate_Mbase times the machine's
 base: 1 where Trate (MW) is 0. A .dyr file does not have that base: an import
 names a Trate."""
-# symbols of curves over the gate; "" is the first height, 0, and the last gate, 1
-GATE_CURVES = (
-    (("G0", "G1", "G2", ""), ("", "P1", "P2", "P3")),
-    *(
-        tuple(tuple(f"{name}{k}" for k in range(1, count + 1)) for name in ("GV", height))
-        for height, count in (("PGV", 6), ("PGV", 10), ("BGV", 10))
-    ),
-)
-TENTH = "GV10"  # of H6E, whose curves go on beyond a gate of 1
 # what records hold that have the rating, or not, and no band
 ON_RATING = {"Trate_Mbase": 1.0}
 PLAIN = {"DBH": 0.0, "DBL": 0.0, **ON_RATING}
+
+
+class GateCurve(NamedTuple):
+    """Symbols of the points of a curve over the gate; "" is the first height, 0, or a last gate, 1.
+
+    ``beyond``, it may go on beyond a gate of 1, and points end before the first gate of 0;
+    ``level``, its height may stay.
+    """
+
+    gates: tuple[str, ...]
+    heights: tuple[str, ...]
+    beyond: bool = False
+    level: bool = False
+
+    @property
+    def symbols(self) -> set[str]:
+        """All symbols of its points."""
+        return {*self.gates, *self.heights} - {""}
+
+
+def _numbered(height: str, count: int, beyond: bool = False, level: bool = False) -> GateCurve:
+    gates, heights = (tuple(f"{name}{k}" for k in range(1, count + 1)) for name in ("GV", height))
+    return GateCurve(gates, heights, beyond, level)
+
+
+GATE_CURVES = (
+    GateCurve(("G0", "G1", "G2", ""), ("", "P1", "P2", "P3")),
+    _numbered("PGV", 6),
+    _numbered("PGV", 10, beyond=True),
+    _numbered("BGV", 10, beyond=True, level=True),
+)
 
 
 def in_use(start: Signal, limit: Signal) -> Signal:
@@ -140,32 +162,32 @@ def delayed(u: Signal, x: Signal, v: Signal, T: Signal) -> tuple[Signal, Signal,
 def gate_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) where a curve over the gate does not rise, or ends behind a gate of 1.
 
-    Points may coincide, and those at (0, 0) are none; of ten points none is one whose gate is 0
-    behind the first, and blades may stay.
+    Points may coincide, and those at (0, 0) are none.
     """
-    for gates, heights in GATE_CURVES:
-        known = {*gates, *heights} - {""} <= values.keys()
-        if known and (TENTH in gates) == (TENTH in values):
-            points = [
-                (values.get(gate, 1.0), values.get(height, 0.0))
-                for gate, height in zip(gates, heights, strict=True)
-            ]
-            names = zip(gates[1:], heights[1:], strict=True)
-            for (gate, height), (before, after) in zip(names, pairwise(points), strict=True):
-                text = _does_not_rise(before, after, TENTH in gates, height.startswith("B"))
-                if text:
-                    yield height if height.startswith("B") else gate or height, text
-            if points[-1][0] > 1.0 and TENTH not in gates:
-                yield gates[-1], f"{points[-1][0]:g} is above 1, where the curve ends"
+    known = [curve for curve in GATE_CURVES if curve.symbols <= values.keys()]
+    for curve in known:
+        if any(curve.symbols < other.symbols for other in known):
+            continue  # the first points of that one
+        points = [
+            (values.get(gate, 1.0), values.get(height, 0.0))
+            for gate, height in zip(curve.gates, curve.heights, strict=True)
+        ]
+        names = zip(curve.gates[1:], curve.heights[1:], strict=True)
+        for (gate, height), (before, after) in zip(names, pairwise(points), strict=True):
+            text = _does_not_rise(before, after, curve)
+            if text:
+                yield height if curve.level else gate or height, text
+        if points[-1][0] > 1.0 and not curve.beyond:
+            yield curve.gates[-1], f"{points[-1][0]:g} is above 1, where the curve ends"
 
 
 def _does_not_rise(
-    before: tuple[float, float], after: tuple[float, float], ten: bool, blades: bool
+    before: tuple[float, float], after: tuple[float, float], curve: GateCurve
 ) -> str:
     """Say how a point is not above and behind the one before; nothing where it is, or is none."""
-    none = after[0] == 0.0 if ten else after == (0.0, 0.0)
+    none = after[0] == 0.0 if curve.beyond else after == (0.0, 0.0)
     along, up = after[0] - before[0], after[1] - before[1]
-    if none or after == before or (up >= 0.0 if blades else along > 0.0 and up > 0.0):
+    if none or after == before or (up >= 0.0 if curve.level else along > 0.0 and up > 0.0):
         return ""
     text = f"({after[0]:g}, {after[1]:g}) is not above and behind the point before"
     return f"the point {text}, ({before[0]:g}, {before[1]:g})"
