@@ -20,6 +20,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import contradictions, crossed_limits, typical
 from exfit.models.stabiliser_parts import COMPENSATED
+from exfit.models.stabilisers.pss4 import band
 from exfit.plants import STABILISER, Stabilised
 from exfit.plants.infinite_bus import infinite_bus
 from exfit.plants.parts import Names, motion, values_named
@@ -758,6 +759,49 @@ def test_from_the_states_of_psse_its_output_and_its_integrators_are_those_of_pss
         first, second, third = (getattr(d, name) for d in slopes[:3])
         moved = (rows[2]["t"] - rows[0]["t"]) * (first + 4.0 * second + third) / 6.0
         assert abs(rows[2][state] - rows[0][state] - moved) < 0.02 * abs(moved)
+
+
+OF_POWERWORLD = {  # InterPSS's record of PSS4C: the bands' gains, leads and lags
+    "VL": (0.4, 0.8, 0.1, (0.05, 0.2, 0.1, 0.3, 0.2, 0.5)),
+    "L": (0.3, 0.1, 0.1, (0.02, 0.05, 0.03, 0.06, 0.04, 0.08)),
+    "I": (0.2, 0.05, 0.1, (0.01, 0.03, 0.02, 0.04, 0.03, 0.06)),
+    "H": (0.2, 0.05, 0.01, (0.005, 0.02, 0.01, 0.03, 0.02, 0.04)),
+}
+
+
+def seen_through_its_lags(row, letter, p, source):
+    """Return the states of a band whose outputs of lead-lags a row has, in the units of exfit."""
+    states = {}
+    for first, gain in ((1, "1"), (4, "2")):
+        u = getattr(p, f"K{letter}{gain}") * source
+        for k in range(first, first + 3):
+            share = getattr(p, f"T{letter}{2 * k - 1}") / getattr(p, f"T{letter}{2 * k}")
+            states[f"{letter}{k}"] = (row[f"{letter}{k}"] - share * u) / (1.0 - share)
+            u = row[f"{letter}{k}"]
+    return states
+
+
+def test_the_bands_of_pss4c_move_as_in_powerworld():
+    """Its output at each row, and each lead-lag from a row to the next, half a millisecond on."""
+    with (REFERENCE / "powerworld_pss4c_bands.csv").open() as file:
+        rows = [{k: float(x) for k, x in row.items()} for row in csv.DictReader(file)]
+    own = {}
+    for letter, (upper, lower, gain, times) in OF_POWERWORLD.items():
+        own |= {f"K{letter}1": upper, f"K{letter}2": lower, f"K{letter}": gain}
+        own |= {f"T{letter}{n}": T for n, T in enumerate(2 * times, start=1)}
+    p, moved = Names(**typical(STABILISERS["PSS4C"].sheet) | own), []
+    for row in rows:
+        heard = {letter: row["high" if letter == "H" else "low"] for letter in OF_POWERWORLD}
+        states = {}
+        for letter, source in heard.items():
+            states |= seen_through_its_lags(row, letter, p, source)
+        s, d = Names(**states), Names()
+        vs = sum(band(letter, source, s, p, d) for letter, source in heard.items())
+        assert abs(vs - row["vs"]) < 1e-10
+        moved.append((row["t"], states, vars(d)))
+    for (t1, before, d1), (t2, behind, d2) in zip(moved[::2], moved[1::2], strict=True):
+        for name, x in before.items():
+            assert abs(behind[name] - x - (t2 - t1) * 0.5 * (d1[name] + d2[name])) < 2e-8
 
 
 def test_a_fall_of_the_voltage_beyond_its_setting_cuts_PSSSB_off():

@@ -87,8 +87,7 @@ def table():
             yield f"| {model} | {program} | {len(rows)} | {worst:.1e}{unit} | {acts} |"
         without += [] if programs else [model]
     yield ""
-    yield f"No curve on load: {', '.join(without)}. Those rest on diagrams and second typings;"
-    yield "of UEL2C states of PSS/E are compared, where it does not act."
+    yield f"No curve on load: {', '.join(without)}. Those rest on diagrams and second typings."
 
 
 def main():

@@ -269,7 +269,8 @@ def pss4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
     The first input is the speed, the second the electrical power, with the sign of
     the swing equation as in PSS4B. The drawing is InterPSS's, with PowerWorld's
-    parameters; GridKit has the bands alone. M is 2 H; programs that read M = 0 as
+    parameters; GridKit has the bands alone, which PowerWorld 24 has too (its states
+    within 2e-8 pu), behind another transducer of the power. M is 2 H; programs that read M = 0 as
     the 2 H of the machine need its value here. Typical data of the bands are the
     standard's, as GridKit has them, of the transducers PSS4B's.
     """
@@ -298,7 +299,7 @@ PSS4C = documented(
         *VERY_LOW,
     ),
     f"{STATES} VL1 VL2 VL3 VL4 VL5 VL6",
-    doubt="rests on one public diagram, that of InterPSS",
+    doubt="rests on one public diagram, that of InterPSS, but for its bands",
     inputs="speed p",
     records=record(
         "PSS4C",
