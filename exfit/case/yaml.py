@@ -88,7 +88,8 @@ def read_yaml(text: str, path: Path) -> tuple[YamlNode, list[Fault]]:
         raise CaseError(f"{path}:{error.line}: {error}") from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        what = ", ".join(part for part in (error.problem, error.context) if part)
+        tab = "indent with blanks, not with tabs" if mark and text[mark.index :][:1] == "\t" else ""
+        what = ", ".join(part for part in (error.problem, error.context, tab) if part)
         raise CaseError(f"{path}:{mark.line + 1 if mark else 1}: not YAML: {what}") from None
     except yaml.YAMLError as error:
         line = text.count("\n", 0, getattr(error, "position", 0)) + 1
@@ -170,7 +171,8 @@ class _Reader:
             here = (*place, key)
             node = self.node(next(self.events), here)
             if node.value is None:
-                self.faults.append(Fault(here, "has no value", line))
+                comma = "; a decimal comma? write a point" if key.isdigit() else ""
+                self.faults.append(Fault(here, f"has no value{comma}", line))
             if key in entries:
                 first = entries[key].line
                 self.faults.append(Fault(here, f"duplicate key, first on line {first}", line))

@@ -397,6 +397,7 @@ FORM = {
     "number for a column": ("{vt: vt,", "{vt: 3,", "record.channels.vt", ["3 is not a mapping"]),
     "empty text": ("time: t", "time: ''", "record.time", ["is empty"]),
     "no value": ("saturation: quadratic", "saturation:", "saturation", ["has no value"]),
+    "decimal comma": ("Tpd0: 6.0,", "Tpd0: 6,0,", "plant.parameters.0", ["write a point"]),
     "null in a list": ("window: [0.0,", "window: [~,", "record.window[0]", ["has no value"]),
     "text for a section": (
         "  vt0: 1.0\n  vref: [{at: 1.0, step: 0.05}]\n",
@@ -846,6 +847,7 @@ def test_a_time_may_be_free_below_the_bypass_altogether(case_file):
         ("\nAC1A\n", ["bump.yaml:2", "'AC1A'", "not a mapping"]),
         ("a: [1\nb: 2\n", ["bump.yaml:2", "not YAML", "flow sequence"]),
         ("a: 1\n\tb: 2\n", ["bump.yaml:2", "not YAML", "tab"]),
+        ("\ta: 1\n", ["bump.yaml:1", "not YAML", "indent with blanks, not with tabs"]),
         ("a: b: c\n", ["bump.yaml:1", "not YAML"]),
         ("a: 'x\n\n", ["bump.yaml:3", "not YAML"]),
         ("a: 1\nb: \x01\n", ["bump.yaml:2", "not YAML", "control"]),
