@@ -323,7 +323,7 @@ def _with_tables(path: Path, tables: str) -> str:
 
 def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
     """Write a page and a figure for each model; return the pages."""
-    from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+    from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
 
     pages = []
@@ -342,12 +342,22 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
             GOVERNOR_CASE,
             "when the grid's frequency rises by 0.1 Hz of 60 Hz at 1 s.",
         ),
+        (
+            LOAD_CONTROLLERS,
+            "load controller",
+            GOVERNOR_CASE.replace("{governor}", "governor: {{model: TGOV1{load controller}}}"),
+            "with TGOV1 when the grid's frequency rises by 0.1 Hz of 60 Hz at 1 s.",
+        ),
     )
+    in_case = {"load controller": ", load_controller: {{model: {}}}"}
     for models, kind, case_text, event in added:
         for model in models.values():
             with_it, without = (
                 case_text.format(**{kind: line})
-                for line in (f"{kind}: {{model: {model.name}}}", "")
+                for line in (
+                    in_case.get(kind, f"{kind}: {{{{model: {{}}}}}}").format(model.name),
+                    "",
+                )
             )
             responses = {f"with {kind}": _response(with_it), "without": _response(without)}
             _draw(responses, ("p",), folder / f"{model.name}.svg")

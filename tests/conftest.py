@@ -18,14 +18,14 @@ from settings import LINEAR_ALGEBRA
 from writers import prepare, prepare_every
 
 from exfit import cli
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import figures
 from exfit.util import trust
 from exfit.util.interrupts import ENDING
 
 TESTS = Path(__file__).parent
-CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
+CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LOAD_CONTROLLERS, *LIMITERS}
 # one of each family: without a plant; commutators; rotating rectifiers; static; compound; a round
 # rotor and salient poles; a stabiliser of one input, one of two; two governors; limiters of each
 # side

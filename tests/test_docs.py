@@ -27,7 +27,7 @@ from exfit.cli import OF_CORE, main
 from exfit.cli.options import NOT_CONVERGED
 from exfit.errors import CaseError
 from exfit.fitting.recordings import phasors_of, record_of
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import figures, run_folder
 from exfit.registry import commands as of_features
@@ -431,7 +431,7 @@ def test_the_model_of_the_page_starts_at_rest_and_follows_a_step(cases):
 
 
 def test_every_model_is_named():
-    catalogue = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
+    catalogue = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LOAD_CONTROLLERS, *LIMITERS}
     assert catalogue <= set(re.findall(r"\w+", PAGES["docs/models/index.md"]))
 
 

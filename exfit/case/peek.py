@@ -17,6 +17,10 @@ SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "network.": (("plant", "network"),),
     "stabiliser.": (("stabiliser", "free"), ("stabiliser", "parameters")),
     "governor.": (("governor", "free"), ("governor", "parameters")),
+    "governor.load_controller.": (
+        ("governor", "load_controller", "free"),
+        ("governor", "load_controller", "parameters"),
+    ),
 }
 
 

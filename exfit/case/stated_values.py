@@ -69,7 +69,7 @@ def sections_of(content: Content) -> Iterator[Place]:
     """Yield the places of the sections in which values may have sources."""
     top = ContentNode((), content)
     nodes = [top.at(key) for key in ("parameters", "plant", "stabiliser", "governor")]
-    nodes += top.at("limiters").entries
+    nodes += [top.at("governor", "load_controller"), *top.at("limiters").entries]
     for unit in top.at("further_units").entries:
         nodes += [unit, *map(unit.at, PARTS)]
     for key in ("records", "validate", "tests"):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 )
 def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the block diagram, data sheet and states of one."""
-    from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+    from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
     from exfit.output import models as shown
     from exfit.output import terminal
@@ -36,6 +36,7 @@ def models(name: str | None, folder: Path | None) -> None:
     added = {
         "stabiliser": STABILISERS.values(),
         "governor": GOVERNORS.values(),
+        "load controller": LOAD_CONTROLLERS.values(),
         "limiter": LIMITERS.values(),
     }
     every: Iterable[Model | Machine] = chain(exciters, machines, *added.values())
@@ -57,10 +58,10 @@ def models(name: str | None, folder: Path | None) -> None:
 
 def _model(name: str) -> "Model | Machine":
     """Return a model of the catalogue by its name, else the exciter in a file."""
-    from exfit.models import GOVERNORS, LIMITERS, STABILISERS, find
+    from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, STABILISERS, find
     from exfit.models.machines import MACHINES
 
-    added = (STABILISERS, GOVERNORS, LIMITERS)
+    added = (STABILISERS, GOVERNORS, LOAD_CONTROLLERS, LIMITERS)
     shelves: tuple[Mapping[str, Model | Machine], ...] = (*added, MACHINES)
     listed = (shelf[name.upper()] for shelf in shelves if name.upper() in shelf)
     return next(listed, None) or find(name, Path())

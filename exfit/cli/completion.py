@@ -24,7 +24,9 @@ def names_of(*shelves: str) -> Completion:
     return completed
 
 
-models = names_of("MODELS", "MACHINE_NAMES", "STABILISERS", "GOVERNORS", "LIMITERS")
+models = names_of(
+    *("MODELS", "MACHINE_NAMES", "STABILISERS", "GOVERNORS", "LOAD_CONTROLLERS", "LIMITERS")
+)
 exciters, machines = names_of("MODELS"), names_of("MACHINE_NAMES")
 governors = names_of("GOVERNORS")
 

@@ -1,15 +1,13 @@
 """The catalogue of exciters and what acts on them, by the names of IEEE 421.5 and PSS/E."""
 
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
 from pkgutil import iter_modules
-from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import exciters, governors, limiters, stabilisers
 from exfit.models.sheet import Model, model
 
 
@@ -19,15 +17,20 @@ class Catalogue(Mapping[str, Model]):
     A file of the package is named after its model, or after a family whose models it holds.
     """
 
-    def __init__(self, package: ModuleType) -> None:
-        self.package = package.__name__
+    def __init__(self, package: str) -> None:
+        self.package = f"{__name__}.{package}"
+
+    @cached_property
+    def files(self) -> dict[str, str]:
+        """The file of each model; the package is loaded on first use, too."""
+        package = import_module(self.package)
         families = vars(package).get("FAMILIES", {})
         names = {
             name: file.name
             for file in iter_modules(package.__path__)
             for name in families.get(file.name, file.name.upper()).split()
         }
-        self.files = dict(sorted(names.items()))
+        return dict(sorted(names.items()))
 
     def __getitem__(self, name: str) -> Model:
         return _loaded(name, f"{self.package}.{self.files[name]}")
@@ -48,10 +51,11 @@ def _loaded(name: str, file: str) -> Model:
     return names[name] if name in names else model(name, names)
 
 
-MODELS = Catalogue(exciters)
-STABILISERS = Catalogue(stabilisers)
-GOVERNORS = Catalogue(governors)
-LIMITERS = Catalogue(limiters)
+MODELS = Catalogue("exciters")
+STABILISERS = Catalogue("stabilisers")
+GOVERNORS = Catalogue("governors")
+LOAD_CONTROLLERS = Catalogue("load_controllers")
+LIMITERS = Catalogue("limiters")
 
 
 # known without their files

@@ -24,6 +24,7 @@ SATURATION: Mapping[str, SaturationForm] = {
 
 # how the names of parameters begin, and the states of a stabiliser and a governor
 MACHINE, NETWORK, STABILISER, GOVERNOR = "machine.", "network.", "stabiliser.", "governor."
+LOAD_CONTROLLER, MOVING_PREF = "load controller", f"{GOVERNOR}load_controller."  # kind, names
 FURTHER = "unit"  # and of those of further units, before their number
 VT0 = "vt0"
 DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by

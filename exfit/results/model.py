@@ -13,6 +13,7 @@ import numpy as np
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Interval, IntervalMethod, closed
+from exfit.plants import LOAD_CONTROLLER
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import (
     Behaviour,
@@ -333,6 +334,11 @@ class FitResult:
         """The given values without data of this unit that widen the interval of each parameter."""
         given = {} if self.knowledge is None else self.knowledge.given_errors
         return resting_on(self.parameters, given, self.sources)
+
+    @property
+    def load_controller_model(self) -> str | None:
+        """The model of what moves the governor's reference; its data are among the governor's."""
+        return next((part.name for part in self.parts if part.kind == LOAD_CONTROLLER), None)
 
     @property
     def comparison(self) -> Comparison:

@@ -17,6 +17,7 @@ from exfit.fitting.nuisances import OPENING, prefix_from
 from exfit.fitting.program import Program
 from exfit.fitting.system import driving_after_opening
 from exfit.inference.confidence import closed
+from exfit.models import LOAD_CONTROLLERS
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
 from exfit.plants import GOVERNOR, MACHINE, NETWORK, REFERENCES, STABILISER, SWITCHED
@@ -146,7 +147,7 @@ def parts_of(case: Case) -> Iterator[PartDescription]:
         names = ("", MACHINE, STABILISER, GOVERNOR)
         models |= {(each.prefix + n)[:-1]: one for n, one in zip(names, found, strict=True)}
     for part in parts.all:
-        model = models.get(part.kind)
+        model = models.get(part.kind) or LOAD_CONTROLLERS.get(part.name)
         yield PartDescription(
             kind=part.kind,
             name=part.name,

@@ -19,10 +19,10 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.confidence import Uncertainty
-from exfit.plants import FURTHER
+from exfit.plants import FURTHER, GOVERNOR
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
-from exfit.results.description import Behaviour, versions
+from exfit.results.description import Behaviour, values_of_part, versions
 from exfit.results.influences import RecorderAverages, WindowSpread
 from exfit.results.intervals.averages import (
     allowing_for_averages,
@@ -148,7 +148,7 @@ def fit_result(
         network_model=models.get("network"),
         stabiliser=own_values.get("stabiliser", {}),
         stabiliser_model=models.get("stabiliser"),
-        governor=own_values.get("governor", {}),
+        governor=values_of_part(values, GOVERNOR),
         governor_model=models.get("governor"),
         limiters={kind: own_values[kind] for kind in limiters},
         limiter_models={kind: models[kind] for kind in limiters},

@@ -11,7 +11,14 @@ import yaml
 from commands import COMMANDS
 
 import exfit
-from exfit.models import GOVERNORS, LIMITERS, MACHINE_NAMES, MODELS, STABILISERS
+from exfit.models import (
+    GOVERNORS,
+    LIMITERS,
+    LOAD_CONTROLLERS,
+    MACHINE_NAMES,
+    MODELS,
+    STABILISERS,
+)
 from exfit.models.machines import MACHINES
 from exfit.util.vocabulary import STRATEGIES
 
@@ -185,4 +192,4 @@ def test_every_model_of_the_catalogue_is_offered(place):
         "exfit", _EXFIT_COMPLETE="bash_complete", COMP_WORDS="exfit models ", COMP_CWORD="2"
     )
     names = {line.partition(",")[2] for line in found.splitlines()}
-    assert names == {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
+    assert names == {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LOAD_CONTROLLERS, *LIMITERS}

@@ -29,7 +29,15 @@ from exfit.engine.kernel import Kernel, LinearKernel, Span
 from exfit.engine.system import parameters_used, trace
 from exfit.engine.trace import in_order
 from exfit.errors import ModelError, SimulationError
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, find, from_file
+from exfit.models import (
+    GOVERNORS,
+    LIMITERS,
+    LOAD_CONTROLLERS,
+    MODELS,
+    STABILISERS,
+    find,
+    from_file,
+)
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
@@ -449,7 +457,8 @@ def test_the_catalogue_lists_every_model_of_every_file():
         text = path.read_text(encoding="utf-8")
         found += re.findall(r"^(\w+) = (?:documented|governor)\(", text, re.MULTILINE)
         found += [path.stem.upper()] if "\ndef equations(" in text else []
-    assert sorted(found) == sorted([*MODELS, *STABILISERS, *GOVERNORS, *LIMITERS])
+    shelves = (MODELS, STABILISERS, GOVERNORS, LOAD_CONTROLLERS, LIMITERS)
+    assert sorted(found) == sorted(name for shelf in shelves for name in shelf)
 
 
 def test_no_two_models_share_a_name():

@@ -6,7 +6,7 @@ import pytest
 from places import ROOT
 from two_buses import TwoBuses, cases, differences, reference
 
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 
@@ -18,6 +18,7 @@ IN_ITS_STEPS = ("psse_smib_", "psse_trip_", "psse_genqej", "psse_ieeest", "psse_
 DRIFTS = {
     **dict.fromkeys(("psse_ieeest", "psse_pss3c"), 1.2),
     "powerworld_dc4b": 1.5,
+    "powerworld_lcfb1": 1.3,  # p of TGOV1's curve is off by 9e-6, and Kp over R is 20
     "powerworld_exst1": 1.2,
     "powerworld_st6b": 1.8,
     "psse_gentpj1": 4.0,
@@ -91,7 +92,7 @@ def test_the_documentation_lists_each_model_and_all_curves():
     rows = re.findall(r"^\| (\w+) \| ([^|]+?) [\d.]+[^|]* \| (\d+) \|", table, re.MULTILINE)
     without = set(re.findall(r"\w+", table.split("No curve on load: ")[1].split(". ")[0]))
     listed = {model for model, _, _ in rows}
-    catalogue = {*MODELS, *STABILISERS, *GOVERNORS, *LIMITERS, *MACHINES}
+    catalogue = {*MODELS, *STABILISERS, *GOVERNORS, *LOAD_CONTROLLERS, *LIMITERS, *MACHINES}
     assert listed | without == catalogue
     assert not listed & without
     for program, prefix in (("PowerWorld", "powerworld_"), ("PSS/E", "psse_")):

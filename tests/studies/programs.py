@@ -15,12 +15,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "plants"))
 from test_andes import UNITS, in_a_dip, read, unit_of
 from two_buses import case_of, cases, reference
 
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 
 PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
 MARKS = "<!-- programs -->", "<!-- /programs -->"
-CATALOGUES = (MODELS, STABILISERS, GOVERNORS, LIMITERS, MACHINES)
+CATALOGUES = (MODELS, STABILISERS, GOVERNORS, LOAD_CONTROLLERS, LIMITERS, MACHINES)
 RHEOSTATS = ("DC3A", "IEEET4")  # whose VRMAX and VRMIN are part of a rate, too
 NO_LIMIT, WIDE, ACTS = 900.0, 1e3, 1e-8
 
@@ -29,7 +29,9 @@ def models_of(unit):
     """Return the names of the models of a unit."""
     stabiliser = None if unit.stabiliser is None else unit.stabiliser.model
     parts = (unit.exciter, unit.machine, stabiliser, unit.governor)
-    return [part.name for part in parts if part is not None]
+    names = [part.name for part in parts if part is not None]
+    moved = unit.governor is not None and any("load_controller" in x for x in unit.governor.states)
+    return [*names, *(LOAD_CONTROLLERS if moved else ())]
 
 
 def widened(values, exciter):

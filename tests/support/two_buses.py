@@ -19,6 +19,7 @@ from places import REFERENCE
 from exfit.features.planner.units import read_unit, with_rating
 from exfit.models import GOVERNORS
 from exfit.models.blocks import lag
+from exfit.models.load_control import controlled
 from exfit.models.machines import genqec
 from exfit.models.machines.round_rotor import transient_time, unsaturated_q_current
 from exfit.models.sheet import typical
@@ -136,6 +137,9 @@ class TwoBuses:
         if (part := parts.governor) is not None:
             governor = part.definition.model
             values |= prefixed(GOVERNOR, {**part.values, **told.get("beside_the_record", {})})
+        if (part := parts.load_controller) is not None:
+            governor = controlled(governor, part.definition.model)
+            values |= prefixed(part.definition.prefix, part.values)
         if added := told.get("governor"):
             governor = GOVERNORS[added["model"]]
             values |= prefixed(GOVERNOR, typical(governor.sheet) | added["parameters"])

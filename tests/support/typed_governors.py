@@ -99,6 +99,19 @@ class HYGOV:
         return [de, dc, (c - g) / p["Tg"], (1.0 - self.head(x)) / p["TW"]]
 
 
+def lcfb1(x, dw, power, start, p):
+    """Return what a load controller adds to the reference, and the slopes of its two states."""
+    sensed, integral = x
+    error = p["Pbf"] * (start - sensed) - p["Fbf"] * p["Fb"] * dw
+    error = np.sign(error) * max(abs(error) - p["db"], 0.0)
+    error = min(max(error, -p["emax"]), p["emax"])
+    total = p["Kp"] * error + integral
+    rate = p["Ki"] * error
+    if abs(integral) >= p["Irmax"] and rate * integral > 0.0:
+        rate = 0.0
+    return min(max(total, -p["Irmax"]), p["Irmax"]), [(power - sensed) / p["Tpelec"], rate]
+
+
 GOVERNORS = {kind.__name__: kind for kind in (TGOV1, IEEEG1, GAST, HYGOV)}
 TYPICAL = {
     "TGOV1": {"R": 0.05, "T1": 0.4, "T2": 2.5, "T3": 8.0, "Dt": 0.3},

@@ -16,6 +16,7 @@ from exfit.util.text import show, show_value
 
 HALF_LOAD = 0.5  # pu of power: within the limits of any governor
 SMALL = 1e-4  # pu of speed
+GOVERNOR_ALONE = "governor-playback"  # the plant in which it measures its own power
 
 
 def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
@@ -81,12 +82,14 @@ def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -
     """Yield a governor that does not hold the power at the start."""
     records = (*content.at("records").entries, *content.at("validate").entries)
     values = _start_values(section, model)
+    alone = content.at("plant", "type").text == GOVERNOR_ALONE
     for recording in (content, *records):
         channel, added = recording.at("record", "channels", GATE), recording.at("test", "fs")
         if channel.value is not None and gate_of(model) is None:
             yield channel.fault(f"{model.name} has no state that is the gate")
-        if added.value is not None and values and _passes_speed_at_once(model, values):
-            yield added.fault(f"the power of {model.name} must wait for its gate: give it a lag")
+        waiting = section.at("load_controller") if alone else added
+        if waiting.value is not None and values and _passes_speed_at_once(model, values):
+            yield waiting.fault(f"the power of {model.name} must wait for its gate: give it a lag")
     nodes = (content.at("plant"), *(record.at("plant") for record in records))
     for power in dict.fromkeys(plant.at("network", "P").number for plant in nodes):
         if power is None or values is None:

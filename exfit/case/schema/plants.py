@@ -355,6 +355,10 @@ class Stabiliser(AddedModel):
 class Governor(AddedModel):
     """A turbine with its governor; it acts where the speed follows from the power."""
 
+    load_controller: Later[AddedModel] | None = Field(
+        default=None, description="A load controller, LCFB1, which moves its reference."
+    )
+
 
 class FurtherUnitSection(Section):
     """A further unit, the powers of which are recorded together with those of the case's."""
@@ -362,7 +366,7 @@ class FurtherUnitSection(Section):
     exciter: Later[AddedModel] = Field(description="Its exciter.")
     machine: Later[AddedModel] = Field(description="Its machine.")
     stabiliser: Later[Stabiliser] | None = Field(default=None, description="Its stabiliser.")
-    governor: Later[Governor] | None = Field(default=None, description="Its governor.")
+    governor: Later[AddedModel] | None = Field(default=None, description="Its governor.")
     network: Frozen[Known] = Field(
         description="base: its MVA over those of the case's unit; share_P and share_Q: what it has "
         "of p and q at the start; R, X, Ra, Rc and Xc as of the case's unit. pu on its base."

@@ -36,6 +36,7 @@ from exfit.features.translate.result import Translation
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.sheet import DynamicsRecord
+from exfit.plants import LOAD_CONTROLLER
 from exfit.results.influences import first_of
 from exfit.results.io import load_result
 from exfit.results.model import FitResult
@@ -171,7 +172,7 @@ def _parts(
     yield from _added(*given, "machine", warnings)
     if exciter is not None:
         yield exciter
-    for kind in ("stabiliser", "governor"):
+    for kind in ("stabiliser", "governor", LOAD_CONTROLLER):
         yield from _added(*given, kind, warnings)
     yield from _limiters(*given, () if exciter is None else exciter.values, warnings)
 
@@ -277,8 +278,8 @@ def _places(result: FitResult, content: Content, definition: Definition) -> dict
 def _added(
     result: FitResult, content: Content, program: str, kind: str, warnings: list[str]
 ) -> Iterator[Written]:
-    """Yield the record of the machine, the stabiliser or the governor; add what is lost."""
-    name = getattr(result, f"{kind}_model")
+    """Yield the record of the machine or what controls the unit; add what is lost."""
+    name = getattr(result, f"{kind.replace(' ', '_')}_model")
     of_kind = (own for own in definitions(program) if own.kind == kind)
     definition = next((own for own in of_kind if own.model.name == name), None)
     if definition is None:
@@ -289,7 +290,7 @@ def _added(
         elif name is not None:
             warnings.append(f"{kind} {name} has no {program} record: it is left out")
         return
-    record = _written(result, content, definition, f"{kind}.")
+    record = _written(result, content, definition, definition.prefix)
     if kind == "machine":
         yield record
         return

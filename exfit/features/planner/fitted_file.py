@@ -25,6 +25,7 @@ from exfit.features.planner.records import (
 )
 from exfit.features.planner.units import DynamicsUnits, Unit, read_units
 from exfit.inference.confidence import holds
+from exfit.plants import MOVING_PREF
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.tables import csv_text
@@ -203,6 +204,7 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[Reading, 
         (result.machine_model, unit.machine, "machine."),
         (result.stabiliser_model, unit.stabiliser, "stabiliser."),
         (result.governor_model, unit.governor, "governor."),
+        (result.load_controller_model, unit.load_controller, MOVING_PREF),
     )
     if "model" in result.inputs:
         raise ExfitError(not_of_catalogue(result, unit.exciter.definition.program))

@@ -25,6 +25,7 @@ from exfit.features.start.starting_case import (
 )
 from exfit.features.start.starting_tests import sizes_of
 from exfit.features.start.tables import CaseOfTable, case_name_of, read_case_table
+from exfit.plants import LOAD_CONTROLLER
 from exfit.results.tables import csv_text
 from exfit.signals import RECORDED as SIGNALS
 from exfit.util.files import write, write_each
@@ -32,6 +33,7 @@ from exfit.util.text import dotted, first_texts, near
 
 WRITTEN, RECORDED, REFUSED, NO_MODEL = "written", "written with records", "refused", "no model"
 UNITS = "units.csv"
+OF_TURBINE = ("governor", LOAD_CONTROLLER)  # in one column
 CASES = "cases"  # the folder of the cases in that of a batch
 
 
@@ -272,7 +274,7 @@ def _row(
         machine=unit.machine.definition.record.name,
         exciter=unit.exciter.definition.record.name,
         stabiliser=added.get("stabiliser", ""),
-        governor=added.get("governor", ""),
+        governor=" ".join(added[kind] for kind in OF_TURBINE if kind in added),
         limiters=" ".join(part.definition.record.name for part in unit.limiters),
         status=status,
         case=case,

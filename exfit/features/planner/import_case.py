@@ -21,6 +21,7 @@ from exfit.features.start.starting_case import (
     UnitData,
     differs_in_psse,
     inputs_section,
+    put_added,
 )
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.util.files import read_limited
@@ -76,7 +77,7 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
         if differs_in_psse(part.definition.model):
             model = replace(model, behind=f"{model.behind}; on load with plant.dialect: psse")
         section = {"model": model, **inputs, **_parameters(part)}
-        sections[part.definition.kind] = section
+        put_added(sections, part.definition.kind, section)
     if unit.limiters:
         sections["limiters"] = [
             {"model": _named(part), "place": part.place, **_parameters(part)}

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 from exfit.features.planner.buses import Buses
 from exfit.features.planner.fields import DynamicsFault, Field, number, whole
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, sheet
+from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.machines.machine import unusual_reactances
@@ -21,6 +21,7 @@ from exfit.models.sheet import (
     saturation_points,
     typical,
 )
+from exfit.plants import LOAD_CONTROLLER, MOVING_PREF
 from exfit.util.text import rounded, show, show_value
 
 PSSE, PSLF = "PSS/E", "PSLF"
@@ -47,7 +48,7 @@ Texts = Iterable[tuple[str, str]]  # (symbol, what is wrong or must be known)
 class Definition:
     """A record of a program and the model that it gives the data of.
 
-    ``kind``: machine, exciter, stabiliser, governor, limiter.
+    ``kind``: machine, exciter, stabiliser, governor, load controller, limiter.
     """
 
     kind: str
@@ -60,6 +61,8 @@ class Definition:
         """Beginning of the names of its parameters in a case; of a limiter that of its kind."""
         if self.kind == "exciter":
             return ""
+        if self.kind == LOAD_CONTROLLER:
+            return MOVING_PREF
         return f"{self.model.name[:3].lower() if self.kind == LIMITER else self.kind}."
 
     @property
@@ -165,6 +168,7 @@ def definitions(program: str = PSSE) -> tuple[Definition, ...]:
         ("exciter", MODELS),
         ("stabiliser", STABILISERS),
         ("governor", GOVERNORS),
+        (LOAD_CONTROLLER, LOAD_CONTROLLERS),
         (LIMITER, LIMITERS),
     )
     return tuple(

@@ -26,7 +26,15 @@ from exfit.features.planner.records import (
     read_values,
 )
 from exfit.models.sheet import Model
-from exfit.plants import GOVERNOR, MACHINE, STABILISER, Attached, inputs_at
+from exfit.plants import (
+    GOVERNOR,
+    LOAD_CONTROLLER,
+    MACHINE,
+    MOVING_PREF,
+    STABILISER,
+    Attached,
+    inputs_at,
+)
 from exfit.plants.limiting import inputs_for_limiters
 from exfit.util.text import closest, near, show
 
@@ -39,7 +47,7 @@ OTHERS: Mapping[str, str] = {
     for kind, names in {
         "governor": """BBGOV1 CCBT1 CRCMGV DEGOV DEGOV1 G2WSCC GAST GAST2A GASTWD GGOV1 GGOV1DU
             GGOV2 GGOV3 GPWSCC H6B HYG3 HYGOV HYGOV2 HYGOV4 HYGOVDU HYGOVM HYGOVR HYGOVR1
-            HYGOVRU HYGOVT IEEEG1 IEEEG1SDU IEEEG2 IEEEG3 IEEEG3_GE IEEEG3_PTI IEESGO IVOGO LCFB1
+            HYGOVRU HYGOVT IEEEG1 IEEEG1SDU IEEEG2 IEEEG3 IEEEG3_GE IEEEG3_PTI IEESGO IVOGO
             PIDGOV SHAF25 TGOV1 TGOV1DU TGOV2 TGOV3 TGOV4 TGOV5 TURCZT TWDM1T TWDM2T URCSCT URGS3T
             WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
         "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PTIST1 PTIST3
@@ -83,11 +91,13 @@ class Unit:
     ra: float | None = None
     bus_name: str = ""
     compensation: tuple[float, float] | None = None
+    load_controller: Reading | None = None
 
     @property
     def added(self) -> tuple[Reading, ...]:
-        """Its stabiliser and its governor, those that it has."""
-        return tuple(part for part in (self.stabiliser, self.governor) if part is not None)
+        """Its stabiliser, its governor and the load controller of that, those that it has."""
+        parts = (self.stabiliser, self.governor, self.load_controller)
+        return tuple(part for part in parts if part is not None)
 
 
 @dataclass(frozen=True)
@@ -254,6 +264,7 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     known = None if compensation is None else of_load
     unknown = [head for head in heads if head.definition is None and head is not known]
     warnings += [DynamicsFault(head.line, _left_out(head.name)) for head in unknown]
+    controller = _moving(parts, warnings)
     unit = Unit(
         heads[0].bus,
         heads[0].id,
@@ -267,8 +278,20 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
         *_ratings(heads),
         heads[0].bus_name,
         compensation,
+        controller,
     )
     return unit, []
+
+
+def _moving(parts: Mapping[str, Reading], warnings: list[DynamicsFault]) -> Reading | None:
+    """Return the load controller of a governor; add one without, which is left out."""
+    controller = parts.get(MOVING_PREF)
+    if controller is None or GOVERNOR in parts:
+        return controller
+    name = controller.definition.record.name
+    what = f"{LOAD_CONTROLLER} {name} is left out: the unit has no governor"
+    warnings.append(DynamicsFault(controller.line, what))
+    return None
 
 
 def _compensation(head: Head) -> tuple[float, float] | None:

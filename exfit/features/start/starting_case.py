@@ -42,7 +42,7 @@ from exfit.features.start.tables import CaseOfTable, TableRow, tests_of_table
 from exfit.models import find
 from exfit.models.machines import Machine, find_machine
 from exfit.models.sheet import Model, Parameter, typical
-from exfit.plants import MACHINE
+from exfit.plants import LOAD_CONTROLLER, MACHINE
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.records.contradictions import shows_power
@@ -168,9 +168,12 @@ def starting_case(
     recordings, validations = (
         _events(tests, names) if event else _bump_tests(tests, names, unit.exciter.model.name)
     )
-    added = {key: added_section(part) for key, part in unit.added.items()}
     of_governor = first.inspection.of_governor
-    if of_governor:
+    added: Section = {}
+    for key, part in unit.added.items():
+        tested = of_governor and key == "governor"
+        put_added(added, key, _governor(unit, event) if tested else added_section(part))
+    if of_governor and "governor" not in added:
         added["governor"] = _governor(unit, event)
     sections: Section = {
         **({"about": about} if about else {FACTS_TO_COME: None}),
@@ -188,8 +191,16 @@ def starting_case(
     return CaseDraft(sections, _heading(unit, tests))
 
 
+def put_added(sections: Section, kind: str, section: Section) -> None:
+    """Put the section of a stabiliser, a governor or, into the latter's, its load controller."""
+    if kind == LOAD_CONTROLLER:
+        sections["governor"] = {**sections["governor"], "load_controller": section}
+    else:
+        sections[kind] = section
+
+
 def added_section(part: PartData) -> Section:
-    """Make the section of a stabiliser, a governor or a limiter."""
+    """Make the section of a stabiliser, a governor, a load controller or a limiter."""
     values = {row.symbol: parameter(row, part.values[row.symbol]) for row in part.model.sheet}
     model = Noted(part.model.name, part.origin)
     section = {"model": model, **inputs_section(part.model, part.inputs), "parameters": values}

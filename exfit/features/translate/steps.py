@@ -15,7 +15,8 @@ from exfit.engine.system import System
 from exfit.engine.trace import evaluate
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.models import GOVERNORS, MODELS, STABILISERS, find
+from exfit.models import GOVERNORS, LOAD_CONTROLLERS, MODELS, STABILISERS, find
+from exfit.models.load_control import controlled
 from exfit.models.machines import find_machine
 from exfit.models.sheet import Model, typical
 from exfit.plants import (
@@ -233,7 +234,7 @@ def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
             form,
             given=frozenset(network),
             stabiliser=None if model is None else Stabilised(model, heard or model.inputs),
-            governor=GOVERNORS.get(result.governor_model or ""),
+            governor=_governor(result),
         )
         parts = {NETWORK: network, STABILISER: result.stabiliser, GOVERNOR: result.governor}
         own = {
@@ -243,6 +244,14 @@ def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
         }
         plants.append(StepPlant(INFINITE_BUS, equipment, {**values, **own}))
     return tuple(plants)
+
+
+def _governor(result: FitResult) -> Model | None:
+    governor = GOVERNORS.get(result.governor_model or "")
+    controller = LOAD_CONTROLLERS.get(result.load_controller_model or "")
+    if governor is None or controller is None:
+        return governor
+    return controlled(governor, controller)
 
 
 def network_of(result: FitResult) -> dict[str, float]:

@@ -13,10 +13,10 @@ from exfit.features.drawings.diagram import block_diagram, document
 from exfit.features.drawings.formulas import SIZE
 from exfit.features.drawings.layout import CLIP, picture
 from exfit.features.drawings.letters import SIDES, diagram_and_remarks, read
-from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 
-CATALOGUE = {**MODELS, **STABILISERS, **GOVERNORS, **LIMITERS, **MACHINES}
+CATALOGUE = {**MODELS, **STABILISERS, **GOVERNORS, **LOAD_CONTROLLERS, **LIMITERS, **MACHINES}
 SVG = "{http://www.w3.org/2000/svg}"
 ARROWS = "►◄▲▼"
 CAPITAL = 0.36 * SIZE  # half of the height of letters without what hangs below their line

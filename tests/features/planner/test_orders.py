@@ -78,6 +78,7 @@ IEESGO T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN
 TGOV1 R T1 VMAX VMIN T2 T3 Dt
 TGOV3 K T1 T2 T3 UO UC PMAX PMIN T4 K1 T5 K2 T6 K3 TA TB TC PRMAX
 WESGOV DTC DTP DROOP KP TI T1 T2 ALIM TPE
+LCFB1 Fbf Pbf Fb Tpelec db emax Kp Ki Irmax
 UEL1 KUR KUC KUF VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN
 """
 # its ESAC8B is Basler's, and may be read as another model's
@@ -269,7 +270,7 @@ ORDERS = {
 OF_ONE_SOURCE = {"ESURRY", "PSS5C", "OEL2C", "OEL3C", "UEL2C", "ST2C", "ST3C"}
 OF_ONE_SOURCE |= {"OEL2CU1"}  # which is OEL2C's, with two values exchanged as there
 # those without a dead band: the order of the form with one, and of PSS/E's IEEEG2 by its diagram
-OF_ONE_SOURCE |= {"HYGOV2", "PIDGOV", "WPIDHY", "IEEEG2"}
+OF_ONE_SOURCE |= {"lcfb1", "HYGOV2", "PIDGOV", "WPIDHY", "IEEEG2"}
 # of PSLF: files that are not at hand, a list of parameters, or taken to be as in PSS/E
 OF_ONE_SOURCE |= {
     *("gensal", "genqec", "genqej", "exac4", "exst4b", "ieeest", "tgov1", "ieeeg1"),

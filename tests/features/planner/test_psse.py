@@ -48,7 +48,7 @@ DEFINITIONS["AC1A", "MADEUP"] = Definition(
     ),
 )
 GENROU = definition_of("GENROU")
-ESAC1A = definition_of("ESAC1A")
+ESAC1A, TGOV1 = definition_of("ESAC1A"), definition_of("TGOV1")
 
 
 @pytest.fixture(params=DEFINITIONS, ids=" as ".join)
@@ -113,6 +113,8 @@ def partners(definition, random):
     records = [(definition, sound(definition, random))]
     if definition.kind != "machine":
         records.append((GENROU, sound(GENROU, random)))
+    if definition.kind == "load controller":
+        records.append((TGOV1, sound(TGOV1, random)))
     if definition.kind != "exciter":
         exciter = definition_of("AC1C") if definition.kind == "limiter" else ESAC1A
         records.append((exciter, sound(exciter, random)))
@@ -132,6 +134,7 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
     mine, theirs = (taken_apart(content).content for content in read)
     places = {"machine": ("plant", "parameters"), "exciter": ("parameters", "fixed")}
     places["limiter"] = ("limiters", 0, "parameters")
+    places["load controller"] = ("governor", "load_controller", "parameters")
     for one, values in records:
         for data in (mine, theirs):
             for key in places.get(one.kind, (one.kind, "parameters")):

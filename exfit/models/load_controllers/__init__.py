@@ -1,0 +1,1 @@
+"""The load controllers, which move the reference of a governor."""
