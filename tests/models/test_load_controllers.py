@@ -7,6 +7,10 @@ from typed_governors import TYPICAL, TypedUnit, integrated, lcfb1
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError
+from exfit.features.planner.export import export
+from exfit.features.planner.psse import record_text
+from exfit.features.planner.records import definition_of
+from exfit.features.planner.units import read_unit
 from exfit.models import GOVERNORS, LOAD_CONTROLLERS
 from exfit.models.load_control import CONTROLLER, controlled
 from exfit.models.machines import MACHINES
@@ -134,6 +138,22 @@ def test_an_integral_gain_is_found_through_noise(tmp_path):
     assert high - low < 0.03
     assert found.load_controller_model == "LCFB1"
     assert found.governor["load_controller.Kp"] == LIVELY["Kp"]
+    unit = read_unit(export(found, 7, "1").text, "unit.dyr")
+    controller = {f"load_controller.{name}": x for name, x in unit.load_controller.values.items()}
+    assert controller == pytest.approx(
+        {name: found.governor[name] for name in controller}, rel=1e-3
+    )
+
+
+def test_a_load_controller_without_a_governor_is_left_out():
+    records = [
+        record_text(one, typical(one.model.sheet), 7, "1")
+        for one in map(definition_of, ("GENROU", "SEXS", "LCFB1"))
+    ]
+    unit = read_unit("\n".join(records), "unit.dyr")
+    assert (unit.governor, unit.load_controller) == (None, None)
+    (warning,) = (each.text for each in unit.warnings if "LCFB1" in each.text)
+    assert warning == "load controller LCFB1 is left out: the unit has no governor"
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from exfit.util.text import show, show_value
 
 HALF_LOAD = 0.5  # pu of power: within the limits of any governor
 SMALL = 1e-4  # pu of speed
-GOVERNOR_ALONE = "governor-playback"  # the plant in which it measures its own power
 
 
 def equipment_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
@@ -82,7 +81,7 @@ def _governor_faults(section: ContentNode, model: Model, content: ContentNode) -
     """Yield a governor that does not hold the power at the start."""
     records = (*content.at("records").entries, *content.at("validate").entries)
     values = _start_values(section, model)
-    alone = content.at("plant", "type").text == GOVERNOR_ALONE
+    alone = "governor" in kind_of(content.at("plant").content).needs  # it measures its own power
     for recording in (content, *records):
         channel, added = recording.at("record", "channels", GATE), recording.at("test", "fs")
         if channel.value is not None and gate_of(model) is None:

@@ -280,9 +280,9 @@ def _added(
 ) -> Iterator[Written]:
     """Yield the record of the machine or what controls the unit; add what is lost."""
     name = getattr(result, f"{kind.replace(' ', '_')}_model")
-    of_kind = (own for own in definitions(program) if own.kind == kind)
-    definition = next((own for own in of_kind if own.model.name == name), None)
-    if definition is None:
+    of_kind = [own for own in definitions(program) if own.kind == kind]
+    of_model = [own for own in of_kind if own.model.name == name]
+    if not of_model:
         if kind == "machine":
             lacking = f"machine {name} has no {program} record"
             what = "no machine is named" if name is None else lacking
@@ -290,7 +290,10 @@ def _added(
         elif name is not None:
             warnings.append(f"{kind} {name} has no {program} record: it is left out")
         return
-    record = _written(result, content, definition, definition.prefix)
+    # such as TGOV1D, where the dead band of TGOV1 is not 0
+    candidates = [_written(result, content, own, own.prefix) for own in of_model]
+    record = min(candidates, key=lambda each: len([*lost_in(each)]))
+    definition = record.definition
     if kind == "machine":
         yield record
         return
@@ -383,8 +386,8 @@ def values_in_digits(result: FitResult, prefix: str) -> dict[str, float]:
     return values
 
 
-def warnings_of(entry: Written) -> Iterator[str]:
-    """Warn of values that a record cannot hold, leaves undefined, or takes from typical data."""
+def lost_in(entry: Written) -> Iterator[str]:
+    """Name the values that a record cannot hold."""
     record, held = entry.definition.record, dict(entry.definition.record.held)
     for row in entry.definition.model.sheet:
         symbol, value = row.symbol, entry.values[row.symbol]
@@ -397,6 +400,12 @@ def warnings_of(entry: Written) -> Iterator[str]:
             acts = (value if symbol.endswith("MAX") else -value) < OUT_OF_REACH
         if acts:
             yield f"{record.name} cannot hold {symbol} = {show(value)}: it is lost"
+
+
+def warnings_of(entry: Written) -> Iterator[str]:
+    """Warn of values that a record cannot hold, leaves undefined, or takes from typical data."""
+    record = entry.definition.record
+    yield from lost_in(entry)
     for symbol, value in unused_of(record, entry.values).items():
         yield f"{record.name}: {entry.definition.program} ignores {symbol} = {show(value)}"
     if record.doubt:

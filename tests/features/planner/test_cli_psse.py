@@ -24,7 +24,7 @@ from exfit.case.load import load_case
 from exfit.case.stated_values import taken_apart
 from exfit.features.planner.records import definition_of, definitions
 from exfit.features.planner.units import read_unit
-from exfit.models import LIMITERS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.sheet import record, typical
 from exfit.output.run_folder import write_fit
 from exfit.plants import MACHINE
@@ -238,6 +238,15 @@ def test_an_integer_of_a_record_is_not_cut_off(run, fitted):
     assert "PSS2B: stabiliser.M: 4.5 is not a whole number" in err
     named(fitted, stabiliser={**values, "M": 4.0})
     assert "1  'PSS2B'  1  1  0  3  0  4  1 " in run("export", fitted)[1]
+
+
+@pytest.mark.parametrize(("band", "record"), [(0.0, "TGOV1"), (2e-4, "TGOV1D")])
+def test_a_governor_with_a_dead_band_is_written_as_the_form_that_has_one(run, fitted, band, record):
+    values = typical(GOVERNORS["TGOV1"].sheet) | {"DBH": band, "DBL": -band}
+    named(fitted, governor_model="TGOV1", governor=values)
+    _, out, err = run("export", fitted)
+    assert f"1  '{record}'  1  0.05  0.5 " in out
+    assert "cannot hold DBH" not in err
 
 
 def test_a_stabiliser_without_a_record_is_left_out_with_a_warning(run, fitted):
