@@ -21,7 +21,7 @@ from exfit.cli.options import (
 )
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
-from exfit.errors import ExfitError, FileError
+from exfit.errors import DynamicsError, ExfitError, FileError
 from exfit.util.text import first_texts
 
 if TYPE_CHECKING:
@@ -157,18 +157,33 @@ def _import_one(
     from exfit.features.planner.buses import NO_BUSES
     from exfit.features.planner.fields import located
     from exfit.features.planner.import_all import key_of
-    from exfit.features.planner.import_case import import_unit, imported_case
+    from exfit.features.planner.import_case import (
+        case_of_machine,
+        import_unit,
+        imported_case,
+        machine_without_exciter,
+    )
     from exfit.features.planner.power_flow import read_buses, read_power_flow
     from exfit.features.planner.units import with_rating
     from exfit.features.start.ratings import NO_RATINGS
 
     if output is not None:
         refuse_existing(output, force)
-    imported = import_unit(dyr, bus, machine_id, NO_BUSES if raw is None else read_buses(raw))
-    if raw is not None:
-        imported = with_rating(imported, read_power_flow(raw).get(key_of(imported), NO_RATINGS).mva)
+    buses = NO_BUSES if raw is None else read_buses(raw)
     file = relative(dyr, Path() if output is None else output.parent)
-    write_text(imported_case(imported, file).text, output, located(imported.warnings, str(dyr)))
+    try:
+        imported = import_unit(dyr, bus, machine_id, buses)
+    except DynamicsError:
+        unit = machine_without_exciter(dyr, bus, machine_id, buses)
+        if unit is None or unit.alone is None:
+            raise
+        draft, warnings = case_of_machine(unit, unit.alone, file), unit.alone.warnings
+    else:
+        if raw is not None:
+            mva = read_power_flow(raw).get(key_of(imported), NO_RATINGS).mva
+            imported = with_rating(imported, mva)
+        draft, warnings = imported_case(imported, file), imported.warnings
+    write_text(draft.text, output, located(warnings, str(dyr)))
     if output is not None:
         echo(f"written to {output}; next: exfit simulate {output}")
 

@@ -11,7 +11,12 @@ from exfit.case.suggestion import Base, RecordSettings, bases_of, relative
 from exfit.errors import DynamicsError, ExfitError, FileError
 from exfit.features.planner.buses import NO_BUSES
 from exfit.features.planner.fields import located
-from exfit.features.planner.import_case import imported_case, unit_data, units_of_file
+from exfit.features.planner.import_case import (
+    case_of_machine,
+    imported_case,
+    unit_data,
+    units_of_file,
+)
 from exfit.features.planner.power_flow import read_buses, read_power_flow
 from exfit.features.planner.units import DynamicsUnits, RefusedUnit, Unit, with_rating
 from exfit.features.start.ratings import NO_RATINGS, Ratings
@@ -72,7 +77,9 @@ class ImportPlan:
     @property
     def names(self) -> list[str]:
         """The names of all files of cases."""
-        return [self.name_of(unit) for unit in self.units.units]
+        alone = (unit for unit in self.units.refused if unit.alone is not None)
+        machines = [f"{case_name_of(unit.bus, unit.id)}.yaml" for unit in alone]
+        return [*(self.name_of(unit) for unit in self.units.units), *machines]
 
 
 @dataclass(frozen=True)
@@ -228,7 +235,11 @@ def import_units(
             doubts += made.doubts
             used.update(made.sizes)
         rows.append(_row(unit, status, name, files, notes))
-    rows += map(_refused, plan.units.refused)
+    for left in plan.units.refused:
+        name = f"{case_name_of(left.bus, left.id)}.yaml"
+        rows.append(_refused(left, name))
+        if left.alone is not None:
+            texts[name] = case_of_machine(left, left.alone, file).text
     _refuse_unused(steps, used)
     rows.sort(key=lambda row: row.line)
     write_each(folder, {**texts, UNITS: csv_text([ImportedUnit._fields, *rows])})
@@ -283,11 +294,15 @@ def _row(
     )
 
 
-def _refused(unit: RefusedUnit) -> ImportedUnit:
-    """Make the row of a unit that has no case."""
+def _refused(unit: RefusedUnit, case: str) -> ImportedUnit:
+    """Make the row of a unit that has no case, or of a machine alone."""
+    alone, place = unit.alone, (unit.bus, unit.bus_name, unit.id, unit.line)
+    faults = unit.faults if alone is None else alone.warnings
+    text = "; ".join(f"line {fault.line}: {fault.text}" for fault in faults)
+    if alone is not None:
+        name = alone.machine.definition.record.name
+        return ImportedUnit(*place, name, "", "", "", "", WRITTEN, case, "", text)
     status = REFUSED if unit.modelled else NO_MODEL
-    text = "; ".join(f"line {fault.line}: {fault.text}" for fault in unit.faults)
-    place = (unit.bus, unit.bus_name, unit.id, unit.line)
     return ImportedUnit(*place, "", "", "", "", "", status, "", "", text)
 
 

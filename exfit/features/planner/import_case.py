@@ -1,5 +1,6 @@
 """The case file of a unit of a planner's dynamics file."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +14,16 @@ from exfit.case.case_draft import (
 )
 from exfit.errors import DynamicsError, ExfitError
 from exfit.features.planner.buses import NO_BUSES, Buses
-from exfit.features.planner.fields import text_of
+from exfit.features.planner.fields import DynamicsFault, text_of
 from exfit.features.planner.records import PSSE, SPEED_FLAG, Reading
-from exfit.features.planner.units import DynamicsUnits, Unit, read_unit, read_units
+from exfit.features.planner.units import (
+    DynamicsUnits,
+    MachineAlone,
+    RefusedUnit,
+    Unit,
+    read_unit,
+    read_units,
+)
 from exfit.features.start.starting_case import (
     PartData,
     UnitData,
@@ -23,12 +31,15 @@ from exfit.features.start.starting_case import (
     inputs_section,
     put_added,
 )
+from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.util.files import read_limited
 from exfit.util.vocabulary import PLANNER, TYPICAL
 
 LARGEST_FILE = 32_000_000  # bytes; that of a whole interconnection has fewer
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}
+REJECTION = {"vt0": 1.0, "breaker": {"opens": 1.0}, "duration": 10.0}
+BEFORE = {"P": 0.0, "Q": -0.3}  # pu: current on the d axis alone
 
 
 def import_unit(
@@ -39,6 +50,20 @@ def import_unit(
 ) -> Unit:
     """Read a unit of a file as ``read_unit`` does; raises DynamicsError."""
     return read_unit(text_of(read_file(path), str(path)), str(path), bus, machine_id, buses)
+
+
+def machine_without_exciter(
+    path: Path, bus: int | str | None, machine_id: str | None, buses: Buses
+) -> RefusedUnit | None:
+    """Return the unit that is meant if it is a machine without an exciter; raises DynamicsError."""
+    units = units_of_file(path, buses)
+    meant = [
+        unit
+        for unit in (*units.units, *units.refused)
+        if bus in (None, unit.bus, unit.bus_name) and machine_id in (None, unit.id)
+    ]
+    only = meant[0] if len(meant) == 1 else None
+    return only if isinstance(only, RefusedUnit) and only.alone is not None else None
 
 
 def units_of_file(path: Path, buses: Buses = NO_BUSES) -> DynamicsUnits:
@@ -91,9 +116,31 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
         "as_found": as_found(unit, file),
     }
     heading = f"Unit {unit.id} at bus {_bus_of(unit)} of {Path(file).name}, on open circuit."
-    return CaseDraft(
-        sections, (heading, *(f"Line {line}: {text}." for line, text in unit.warnings))
+    return CaseDraft(sections, (heading, *_notes(unit.warnings)))
+
+
+def case_of_machine(unit: RefusedUnit, alone: MachineAlone, file: str) -> CaseDraft:
+    """Make the case of a machine without an exciter: at constant field voltage its breaker opens.
+
+    ``file`` is the path of the dynamics file as the case names it.
+    """
+    machine = alone.machine
+    plant = {"type": MACHINE_ON_LOAD.name, "machine": _named(machine), **_parameters(machine)}
+    sections: Section = {
+        "plant": {**plant, "network": Noted(BEFORE, "until the breaker opens")},
+        "test": Noted(REJECTION, "a load rejection; a record replaces the duration"),
+        "as_found": _as_found(unit, file, None, (machine,)),
+    }
+    heading = (
+        f"Machine {unit.id} at bus {_bus_of(unit)} of {Path(file).name}, without an exciter: at "
+        "constant field voltage, on load until its breaker opens."
     )
+    return CaseDraft(sections, (heading, *_notes(alone.warnings)))
+
+
+def _notes(warnings: Iterable[DynamicsFault]) -> Iterator[str]:
+    """Yield the comments that say what is left out."""
+    yield from (f"Line {line}: {text}." for line, text in warnings)
 
 
 def _named(part: Reading) -> Noted:
@@ -140,18 +187,26 @@ def unit_data(unit: Unit, file: str) -> UnitData:
     return UnitData(exciter.model.name, exciter, machine, added, limiters, found)
 
 
-def _bus_of(unit: Unit) -> str:
+def _bus_of(unit: Unit | RefusedUnit) -> str:
     """Return the number of the bus of a unit and, if it is known, its name."""
     return in_comment(f"{unit.bus} {unit.bus_name}".strip())
 
 
 def as_found(unit: Unit, file: str) -> Section:
-    """Make the section of what the file holds of the unit, for the report to compare with.
+    """Make the section of what the file holds of the unit, for the report to compare with."""
+    parts = (unit.exciter, unit.machine, *unit.added, *unit.limiters)
+    return _as_found(unit, file, unit.exciter, parts)
+
+
+def _as_found(
+    unit: Unit | RefusedUnit, file: str, exciter: Reading | None, parts: Iterable[Reading]
+) -> Section:
+    """Make that section of some parts of a unit, and of the model of its exciter.
 
     ``unused`` are values there that the planner's program ignores.
     """
     values, unused = dict[str, float](), dict[str, float]()
-    for part in (unit.exciter, unit.machine, *unit.added, *unit.limiters):
+    for part in parts:
         definition, prefix = part.definition, part.definition.prefix
         for row in definition.model.sheet:
             if row.symbol in definition.names:
@@ -164,7 +219,7 @@ def as_found(unit: Unit, file: str) -> Section:
         "bus": unit.bus,
         "id": name,
         "file": file,
-        "model": unit.exciter.definition.model.name,
+        **({} if exciter is None else {"model": exciter.definition.model.name}),
         "parameters": values,
         **({"unused": unused} if unused else {}),
     }

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from exfit.errors import DynamicsError
 from exfit.features.planner.buses import NO_BUSES, Bus, Buses, numbers_of
@@ -100,12 +101,19 @@ class Unit:
         return tuple(part for part in parts if part is not None)
 
 
+class MachineAlone(NamedTuple):
+    """A machine without an exciter, at constant field voltage, and what is left out beside it."""
+
+    machine: Reading
+    warnings: tuple[DynamicsFault, ...]
+
+
 @dataclass(frozen=True)
 class RefusedUnit:
     """A unit that cannot be imported: its records by name, and why.
 
     ``modelled``: it is a unit of which exfit lacks a model or its values are at fault, not a load
-    or a machine without an exciter.
+    or a machine without an exciter; of that ``alone`` is the machine.
     """
 
     bus: int
@@ -115,6 +123,7 @@ class RefusedUnit:
     modelled: bool
     faults: tuple[DynamicsFault, ...]
     bus_name: str = ""
+    alone: MachineAlone | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +174,7 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
                 or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
                 tuple(sorted(wrong, key=lambda fault: fault.line)),
                 first.bus_name,
+                _machine_alone(own),
             )
         )
     return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical, devices)
@@ -292,6 +302,19 @@ def _moving(parts: Mapping[str, Reading], warnings: list[DynamicsFault]) -> Read
     what = f"{LOAD_CONTROLLER} {name} is left out: the unit has no governor"
     warnings.append(DynamicsFault(controller.line, what))
     return None
+
+
+def _machine_alone(heads: Sequence[Head]) -> MachineAlone | None:
+    """Return the machine of a unit without a record that is, or may be, of an exciter."""
+    faults, warnings = list[DynamicsFault](), list[DynamicsFault]()
+    parts = _parts(heads, faults, warnings)
+    if faults or "" in parts or MACHINE not in parts or _unknown(heads):
+        return None
+    for head in heads:
+        if head.definition is None or head.definition.kind not in NEEDED:
+            text = f"{head.name} is left out: without an exciter the machine is alone on load"
+            warnings.append(DynamicsFault(head.line, text))
+    return MachineAlone(parts[MACHINE], tuple(warnings))
 
 
 def _compensation(head: Head) -> tuple[float, float] | None:

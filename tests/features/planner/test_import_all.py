@@ -57,6 +57,24 @@ def test_every_unit_becomes_the_case_that_it_becomes_alone(run):
     assert (rows["1 2"]["machine"], rows["1 2"]["case"]) == ("GENROU", "bus-1-2.yaml")
 
 
+def test_a_machine_without_an_exciter_is_a_case_at_constant_field_voltage(run):
+    Path("alone.dyr").write_text(
+        THREE + "88 GENROU 1 6 .03 .5 .08 6.4 0 .9 .86 .12 .2 .09 .05 0 0 /\n88 'IEEEG9' 1 0 /\n"
+        "99 GENROU 1 6 .03 .5 .08 6.4 0 .9 .86 .12 .2 .09 .05 0 0 /\n"
+        "99 'TGOV1' 1 .05 .4 1.2 0 2 8 0 /\n99 'IEEEVC' 1 0 .05 /\n"
+    )
+    ran = run("import", "--all", "alone.dyr", "-o", "cases")
+    rows = units_of()
+    assert (ran.code, rows["88 1"]["status"]) == (1, "refused")  # IEEEG9 may be its exciter
+    of_machine = [rows["99 1"][column] for column in ("machine", "exciter", "status", "case")]
+    assert of_machine == ["GENROU", "", "written", "bus-99-1.yaml"]
+    ran = run("import", "alone.dyr", "--bus", "99", "-o", "cases/alone.yaml")
+    left_out = "is left out: without an exciter the machine is alone on load"
+    assert all(f"{name} {left_out}" in ran.err for name in ("TGOV1", "IEEEVC"))
+    assert Path("cases", "bus-99-1.yaml").read_text() == Path("cases", "alone.yaml").read_text()
+    assert run("simulate", "cases/alone.yaml", "-o", "simulated").code == 0
+
+
 def test_a_unit_with_a_fault_is_named_and_the_others_are_written(run):
     faulty = replaced("9 GENROU 1 6.0", "9 GENROU 1 x", THREE)
     Path("units.dyr").write_text(faulty + "/ a comment\n9 'IEEEG1' 1 0 0 / \n")

@@ -508,12 +508,13 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         of_icons |= dict.fromkeys(definition.codes, unheard)
         given = [value for name, value in of_icons.items() if name not in record.cons]
         absent = dict(record.absent)
-        given += [values[name] + (1 if name in absent else 0) for name in record.cons]
+        absent = {name: value - 1 if value > 1 else value + 1 for name, value in absent.items()}
+        given += [absent.get(name, values[name]) for name in record.cons]
         text = f"1 {record.name} 1 " + " ".join(map(repr, given)) + " /"
         read = read_back(definition, text)
         told = "\n".join(warning.text for warning in read.warnings)
         for name, value in (*icons, *record.absent):
-            other = of_icons.get(name, value + 1)
+            other = of_icons[name] if name in of_icons else absent[name]
             assert f"{record.name}: {name}: {other:g} is not modelled; {value:g} is" in told
         assert record.doubt in told
         listed = (*definition.names, *dict(record.held))
