@@ -18,9 +18,9 @@ from exfit.features.planner.fields import DynamicsFault, text_of
 from exfit.features.planner.records import PSSE, SPEED_FLAG, Reading
 from exfit.features.planner.units import (
     DynamicsUnits,
-    MachineAlone,
     RefusedUnit,
     Unit,
+    WithoutExciter,
     read_unit,
     read_units,
 )
@@ -57,9 +57,10 @@ def machine_without_exciter(
 ) -> RefusedUnit | None:
     """Return the unit that is meant if it is a machine without an exciter; raises DynamicsError."""
     units = units_of_file(path, buses)
+    all_units: list[Unit | RefusedUnit] = [*units.units, *units.refused]
     meant = [
         unit
-        for unit in (*units.units, *units.refused)
+        for unit in all_units
         if bus in (None, unit.bus, unit.bus_name) and machine_id in (None, unit.id)
     ]
     only = meant[0] if len(meant) == 1 else None
@@ -119,7 +120,7 @@ def imported_case(unit: Unit, file: str) -> CaseDraft:
     return CaseDraft(sections, (heading, *_notes(unit.warnings)))
 
 
-def case_of_machine(unit: RefusedUnit, alone: MachineAlone, file: str) -> CaseDraft:
+def case_of_machine(unit: RefusedUnit, alone: WithoutExciter, file: str) -> CaseDraft:
     """Make the case of a machine without an exciter: at constant field voltage its breaker opens.
 
     ``file`` is the path of the dynamics file as the case names it.

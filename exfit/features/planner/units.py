@@ -101,7 +101,7 @@ class Unit:
         return tuple(part for part in parts if part is not None)
 
 
-class MachineAlone(NamedTuple):
+class WithoutExciter(NamedTuple):
     """A machine without an exciter, at constant field voltage, and what is left out beside it."""
 
     machine: Reading
@@ -123,7 +123,7 @@ class RefusedUnit:
     modelled: bool
     faults: tuple[DynamicsFault, ...]
     bus_name: str = ""
-    alone: MachineAlone | None = None
+    alone: WithoutExciter | None = None
 
 
 @dataclass(frozen=True)
@@ -304,7 +304,7 @@ def _moving(parts: Mapping[str, Reading], warnings: list[DynamicsFault]) -> Read
     return None
 
 
-def _machine_alone(heads: Sequence[Head]) -> MachineAlone | None:
+def _machine_alone(heads: Sequence[Head]) -> WithoutExciter | None:
     """Return the machine of a unit without a record that is, or may be, of an exciter."""
     faults, warnings = list[DynamicsFault](), list[DynamicsFault]()
     parts = _parts(heads, faults, warnings)
@@ -314,7 +314,7 @@ def _machine_alone(heads: Sequence[Head]) -> MachineAlone | None:
         if head.definition is None or head.definition.kind not in NEEDED:
             text = f"{head.name} is left out: without an exciter the machine is alone on load"
             warnings.append(DynamicsFault(head.line, text))
-    return MachineAlone(parts[MACHINE], tuple(warnings))
+    return WithoutExciter(parts[MACHINE], tuple(warnings))
 
 
 def _compensation(head: Head) -> tuple[float, float] | None:
