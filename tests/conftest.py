@@ -3,9 +3,11 @@
 import contextlib
 import gc
 import os
+import shutil
 import signal
 import sys
 import tempfile
+import zlib
 from pathlib import Path
 
 import hypothesis
@@ -36,6 +38,7 @@ FEW = (
 
 # folders whose tests are of the models themselves; elsewhere a law takes a model as an example
 OF_MODELS = {"models", "planner"}
+PART = 3  # of the laws over the other models one in so many runs as on another processor
 
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)
 hypothesis.settings.register_profile("all", max_examples=100, deadline=None, derandomize=True)
@@ -47,8 +50,8 @@ def pytest_addoption(parser):
         choices=("few", "others", "numerical", "long", "all"),
         default="few",
         help="few: one model of each family; others: the laws of models over all the others; "
-        "numerical: these with fewer examples, and the linear algebra; long: what takes long; "
-        "all: every law over every model",
+        "numerical: a third of these with fewer examples, and the linear algebra; long: what takes "
+        "long; all: every law over every model",
     )
 
 
@@ -88,14 +91,20 @@ def pytest_ignore_collect(collection_path, config):
     """Pass over the files without a numerical test: to collect is a tenth of a session."""
     if config.getoption("models") != "numerical" or collection_path.suffix != ".py":
         return None
-    of_models = OF_MODELS & {*collection_path.parts} or _is_of_algebra(collection_path)
+    of_models = "models" in collection_path.parts or _is_of_algebra(collection_path)
     return None if of_models or "each_model" in collection_path.read_text("utf-8") else True
 
 
 def _is_of_algebra(path):
-    """Return whether the tests of a file compute by more than the models themselves."""
+    """Return whether the tests of a file compute by more than the models themselves.
+
+    Those of a command are of its files and words.
+    """
     folders = (TESTS / folder for folder in LINEAR_ALGEBRA)
-    return path.name == "test_settings.py" or any(map(path.is_relative_to, folders))
+    of_command = path.name.startswith("test_cli_")
+    return path.name == "test_settings.py" or (
+        not of_command and any(map(path.is_relative_to, folders))
+    )
 
 
 def pytest_collection():
@@ -130,7 +139,8 @@ def _is_selected(item, models):
         return False
     if _is_given_another_model(item):
         is_law_of_models = item.get_closest_marker("each_model") or OF_MODELS & {*item.path.parts}
-        return models != "few" and is_law_of_models
+        is_in_part = models != "numerical" or zlib.crc32(item.name.encode()) % PART == 0
+        return models != "few" and is_law_of_models and is_in_part
     is_drawn = hypothesis.is_hypothesis_test(getattr(item, "obj", None))
     if models == "numerical":
         return is_drawn or _is_of_algebra(item.path)
@@ -222,13 +232,19 @@ def prepared_folder(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def folder_of_all(tmp_path_factory):
-    """Return a folder with all that any command reads."""
-    folder = tmp_path_factory.mktemp("all")
+@pytest.fixture(scope="session")
+def all_made_once(tmp_path_factory):
+    """Return a folder with all that any command reads, which no test changes."""
+    folder = tmp_path_factory.mktemp("once")
     with contextlib.chdir(folder):
         prepare_every(folder, lambda *arguments: injected.run(arguments, injected.Injection()))
     return folder
+
+
+@pytest.fixture(scope="module")
+def folder_of_all(all_made_once, tmp_path_factory):
+    """Return a folder with all that any command reads."""
+    return shutil.copytree(all_made_once, tmp_path_factory.mktemp("all") / "place")
 
 
 @pytest.fixture

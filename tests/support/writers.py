@@ -12,6 +12,7 @@ from grid_events import event_case, recorded
 from places import CONFIGS, SAMPLES
 
 CASE = CONFIGS / "first_order.yaml"
+WITHOUT_CAUSES = {"causes": 0}  # of a misfit they would be most of the time
 FEW = ("KA", "TE")  # parameters of the AC1A case that are fitted here
 # commands, and what they write: a file, or a folder in which no figure is drawn
 WRITERS = {
@@ -56,10 +57,12 @@ def prepare(place: Path) -> None:
             parameters["free"] = {key: parameters["free"][key] for key in free}
         content["estimate"] = {"search": "local"}
         (place / f"{name}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    content["estimate"] |= WITHOUT_CAUSES
+    (place / "before.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     shutil.copy(place / "case.yaml", place / "other.yaml")
 
 
-FIT_BEFORE = ("fit", "unit.yaml", "--no-plots", "-o", "fit")  # which others read
+FIT_BEFORE = ("fit", "before.yaml", "--no-plots", "-o", "fit")  # which others read
 
 # every command and what else a command writes; one that is new is given a case
 OTHERS = {
@@ -95,7 +98,7 @@ def prepare_every(place: Path, run: Callable[..., object]) -> None:
     (place / "late.yaml").write_text(yaml.safe_dump(late), encoding="utf-8")
     (place / "grid").mkdir()
     recorded(place / "grid" / "event.csv")
-    event_case(place / "grid", "event")
+    event_case(place / "grid", "event", estimate=WITHOUT_CAUSES)
     for case, *options in (("late.yaml",), ("grid/case.yaml", "-o", "event")):
         run("fit", case, "--no-plots", "--search", "local", "-q", *options)
     run(*FIT_BEFORE)
