@@ -11,7 +11,7 @@ import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -388,6 +388,7 @@ def _limiter_page(model: Any, folder: Path) -> Path:
     return _model_page(model, caption, folder)
 
 
+@cache
 def _response(case: str) -> Any:
     """Return the response of a case that is given as text."""
     with tempfile.TemporaryDirectory() as folder:
