@@ -233,7 +233,7 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     vt0, (low, high) = initial_level(test, record, "vt"), POSSIBLE_VOLTAGES
     if kind.per_unit and (kind.has_machine or not kind.levels) and not low <= vt0 <= high:
         outside = f"{vt0:.4g} pu, outside {low:g} ... {high:g}"
-        if start_value(test.vt0) is not None:
+        if isinstance(test.vt0, float):
             raise RecordError(f"{record.source}: vt0, which its test states, is {outside}")
         raise RecordError(
             f"{record.source}: vt rests at {outside}: its unit, base or scale is another"
