@@ -12,6 +12,7 @@ OWN = 0.25e9  # bytes, of Python and the libraries
 NUMBER = 8  # bytes of a float64
 OF_STEP, OF_SAMPLE = 20, 50  # numbers that each of them takes, beside those of outputs
 HALVED = 6  # outputs of a step: those of a run, and of one with half the step
+READ = 16  # outputs of a step with located crossings, of which five points are read for limits
 SHOWN = 4  # outputs of a sample: computed, kept, written
 
 
@@ -22,11 +23,17 @@ class RunSize(NamedTuple):
     samples: int
     outputs: int
     compared: int = 0
+    located: bool = False
+
+    @property
+    def whole(self) -> float:
+        """Numbers of the outputs of a run that is in memory with all of its steps."""
+        return self.steps * self.outputs * (READ if self.located else HALVED)
 
 
 def check_run(size: RunSize, step: float, memory: float) -> None:
     """Raise SimulationError where a run, and one with half its step, needs more than memory, GB."""
-    steps = size.steps * (OF_STEP + HALVED * size.outputs)
+    steps = OF_STEP * size.steps + size.whole
     samples = size.samples * (OF_SAMPLE + SHOWN * size.outputs)
     needed = OWN + NUMBER * (steps + samples)
     what = f"{size.steps:.3g} steps of {step:g} s (simulation.step) and {size.samples} samples"

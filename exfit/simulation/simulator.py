@@ -98,7 +98,8 @@ class Simulator:
         memory: float = inf,
     ) -> None:
         steps = (inputs.end - inputs.start) / step
-        check_run(RunSize(steps, len(times), len(system.outputs)), step, memory)
+        size = RunSize(steps, len(times), len(system.outputs), located=located)
+        check_run(size, step, memory)
         self.system, self.inputs, self.times, self.memory = system, inputs, times, memory
         self.step, self.least, self.delay, self.responder = step, least, delay, responder
         self.accuracy = accuracy

@@ -2,7 +2,8 @@
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain, repeat
 from math import floor, inf, isfinite, log10
 from types import NoneType
 from typing import Any
@@ -17,7 +18,7 @@ def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
     A list of numbers is written in one line.
     """
     encoder = json.JSONEncoder(ensure_ascii=ascii_only, allow_nan=False)
-    return _json(content, encoder.encode, "\n") + "\n"
+    return "".join(chain(_json(content, encoder.encode, "\n"), "\n"))
 
 
 NUMBERS = {int, float, NoneType, bool}
@@ -25,23 +26,26 @@ NUMBERS = {int, float, NoneType, bool}
 CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
-def _json(content: Any, encode: Callable[[Any], str], line: str) -> str:
-    """Return a text of JSON; ``line`` begins one at this depth."""
+def _json(content: Any, encode: Callable[[Any], str], line: str) -> Iterator[str]:
+    """Yield the parts of a text of JSON; ``line`` begins one at this depth."""
     inner = line + "  "
     if isinstance(content, Mapping) and content:
-        entries = [
-            f"{inner}{encode(str(key))}: {_json(value, encode, inner)}"
-            for key, value in content.items()
-        ]
-        return f"{{{','.join(entries)}{line}}}"
-    if isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
-        return f"[{','.join(inner + _json(value, encode, inner) for value in content)}{line}]"
-    if isinstance(content, float):
-        return repr(float(content)) if isfinite(content) else "null"
-    try:
-        return encode(content)
-    except ValueError:  # a list with numbers that are not finite
-        return encode([None if isinstance(x, float) and not isfinite(x) else x for x in content])
+        for mark, (key, value) in zip(chain("{", repeat(",")), content.items(), strict=False):
+            yield f"{mark}{inner}{encode(str(key))}: "
+            yield from _json(value, encode, inner)
+        yield f"{line}}}"
+    elif isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
+        for mark, value in zip(chain("[", repeat(",")), content, strict=False):
+            yield f"{mark}{inner}"
+            yield from _json(value, encode, inner)
+        yield f"{line}]"
+    elif isinstance(content, float):
+        yield repr(float(content)) if isfinite(content) else "null"
+    else:
+        try:
+            yield encode(content)
+        except ValueError:  # a list with numbers that are not finite
+            yield encode([None if isinstance(x, float) and not isfinite(x) else x for x in content])
 
 
 def yaml_number(value: float) -> str:

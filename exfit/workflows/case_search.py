@@ -23,6 +23,7 @@ from exfit.fitting.channel_weights import (
 from exfit.fitting.compression import compressed, is_as_all
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import Judge, SearchResult
+from exfit.fitting.memory import check_memory
 from exfit.fitting.noise import LEAST_NOISE, noise_of
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
@@ -107,6 +108,7 @@ def on_finer_grid(state: SearchState) -> SearchState:
     x, fitted = state.found.best.x, state.fitted
     values = state.problem.residuals.values(x)
     fine = tuple(setup.with_enough_substeps(values) for setup in fitted)
+    check_memory(state.case, [setup.experiment for setup in fine])
     steps = [[setup.experiment.simulator.step for setup in setups] for setups in (fitted, fine)]
     if steps[0] == steps[1]:
         return state
