@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.experiment import Experiment
-from exfit.simulation.memory import NUMBER, OF_SAMPLE, OF_STEP, OWN, RunSize, check
+from exfit.simulation.memory import HALVED, NUMBER, OF_SAMPLE, OF_STEP, OWN, RunSize, check
 from exfit.util.processes import processors
 
 SIDE_BY_SIDE = 32  # numbers of a compared output: of sets in lanes, or with its derivatives
@@ -42,7 +42,7 @@ def check_fit(sizes: Iterable[RunSize], free: int, memory: float) -> None:
         OF_STEP * each.steps + (OF_SAMPLE + OF_JACOBIAN * free * bool(each.compared)) * each.samples
         for each in sizes
     )
-    whole = max(each.whole for each in sizes)
+    whole = max(HALVED[each.located] * each.outputs * each.steps for each in sizes)
     written = sum(WRITTEN * each.compared * min(each.samples, MOST_WRITTEN) for each in sizes)
     blocks = -(-free // SIDE_BY_SIDE)
     side_by_side = max((each.steps + each.samples) * each.compared for each in sizes)

@@ -11,8 +11,8 @@ GIGABYTE = 1e9
 OWN = 0.25e9  # bytes, of Python and the libraries
 NUMBER = 8  # bytes of a float64
 OF_STEP, OF_SAMPLE = 20, 50  # numbers that each of them takes, beside those of outputs
-HALVED = 6  # outputs of a step: those of a run, and of one with half the step
-READ = 16  # outputs of a step with located crossings, of which five points are read for limits
+# outputs of a step and of half of it, and with located crossings of where limits are looked for
+HALVED = (6, 16)
 SHOWN = 4  # outputs of a sample: computed, kept, written
 
 
@@ -25,15 +25,10 @@ class RunSize(NamedTuple):
     compared: int = 0
     located: bool = False
 
-    @property
-    def whole(self) -> float:
-        """Numbers of the outputs of a run that is in memory with all of its steps."""
-        return self.steps * self.outputs * (READ if self.located else HALVED)
-
 
 def check_run(size: RunSize, step: float, memory: float) -> None:
     """Raise SimulationError where a run, and one with half its step, needs more than memory, GB."""
-    steps = OF_STEP * size.steps + size.whole
+    steps = size.steps * (OF_STEP + HALVED[size.located] * size.outputs)
     samples = size.samples * (OF_SAMPLE + SHOWN * size.outputs)
     needed = OWN + NUMBER * (steps + samples)
     what = f"{size.steps:.3g} steps of {step:g} s (simulation.step) and {size.samples} samples"

@@ -98,8 +98,7 @@ class Simulator:
         memory: float = inf,
     ) -> None:
         steps = (inputs.end - inputs.start) / step
-        size = RunSize(steps, len(times), len(system.outputs), located=located)
-        check_run(size, step, memory)
+        check_run(RunSize(steps, len(times), len(system.outputs), 0, located), step, memory)
         self.system, self.inputs, self.times, self.memory = system, inputs, times, memory
         self.step, self.least, self.delay, self.responder = step, least, delay, responder
         self.accuracy = accuracy

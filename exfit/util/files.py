@@ -117,12 +117,11 @@ def read_limited(path: Path, most: int) -> bytes:
 
 def utf8(data: bytes, path: Path) -> str:
     """Return the text that the bytes of a file are; raises ExfitError where they are not UTF-8."""
-    zeros = [not byte for byte in data[:4]]
-    wide = zeros in ([False, True] * 2, [True, False] * 2)  # UTF-16 without its mark
+    wide = b"\0\0" in (data[:4:2], data[1:4:2])  # UTF-16 without its mark
     try:
         if not wide:
             return data.decode("utf-8-sig")
-        start = zeros.index(True)
+        start = data.index(0)
     except UnicodeDecodeError as error:
         start = error.start
         wide = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
