@@ -1,9 +1,12 @@
-"""Power flow files of PSS/E (.raw) of versions 33 to 35, as its manual lists their fields."""
+"""Power flow files of PSS/E (.raw), versions 32 to 36, as manual and files list their fields."""
 
 KV, HIGH_KV, MVA, X = 18.0, 230.0, 120.0, 0.1  # of each unit; X on its base
 SBASE, F0 = 100.0, 60
-ENDS = ("BUS", "LOAD", "FIXED SHUNT", "GENERATOR", "BRANCH", "SYSTEM SWITCHING DEVICE",
-        "TRANSFORMER", "AREA")  # fmt: skip
+ENDS = ("BUS", "LOAD", "FIXED SHUNT", "VOLTAGE DROOP CONTROL", "GENERATOR",
+        "SWITCHING DEVICE RATING SET", "BRANCH", "SYSTEM SWITCHING DEVICE", "TRANSFORMER",
+        "AREA")  # fmt: skip
+SINCE = {"SYSTEM SWITCHING DEVICE": 34, "VOLTAGE DROOP CONTROL": 36}
+SINCE |= {"SWITCHING DEVICE RATING SET": 36}
 OF_THREE_WINDINGS = (
     "900,901,902,'1 ',1,1,1,0,0,2,'THREE       ',1,1,1.0\n0,0.1,100,0,0.1,100\n1.0\n1.0\n1.0"
 )
@@ -30,7 +33,7 @@ def power_flow(
     """
     base = SBASE if cz == 1 else 50.0
     units = units or dict.fromkeys(buses, (kv, mva, 0.002 * mva / base, X))
-    ends = [end for end in ENDS if version >= 34 or end != "SYSTEM SWITCHING DEVICE"]
+    ends = [end for end in ENDS if version >= SINCE.get(end, 0)]
     nreg = " 0," if version >= 35 else ""
     rows = {
         "BUS": [

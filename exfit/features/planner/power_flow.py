@@ -1,4 +1,4 @@
-"""The power flow files of PSS/E (.raw, versions 33 to 35): ratings of the machines of a grid."""
+"""The power flow files of PSS/E (.raw, versions 32 to 36): ratings of the machines of a grid."""
 
 import re
 from collections import Counter
@@ -15,8 +15,10 @@ from exfit.features.start.ratings import Ratings, StepUp
 from exfit.features.start.record_files import UnitKey
 from exfit.util.text import show
 
-VERSIONS = (33, 35)
+VERSIONS = (32, 36)
 SECTIONS = ("BUS", "LOAD", "FIXED SHUNT", "GENERATOR", "BRANCH")
+WITH_DROOP = 36  # from this version on there are sections before and behind the generators
+WITH_DROOP_SECTIONS = (*SECTIONS[:3], "VOLTAGE DROOP CONTROL", "GENERATOR", "RATING SET", "BRANCH")
 SYSTEM_WIDE = 34  # from this version on there are sections before the buses, behind the branches
 BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
 TITLE_LINES = 3
@@ -147,7 +149,14 @@ def _sections(lines: Sequence[tuple[int, str]], version: int) -> dict[str, list[
     """Return the rows of each section: named where the one before ends, else in their order."""
     more = version >= SYSTEM_WIDE
     before, behind = (["SYSTEM-WIDE"], ["SYSTEM SWITCHING DEVICE"]) if more else ([], [])
-    order = iter([*before, *SECTIONS, *behind, "TRANSFORMER"])
+    order = iter(
+        [
+            *before,
+            *(SECTIONS if version < WITH_DROOP else WITH_DROOP_SECTIONS),
+            *behind,
+            "TRANSFORMER",
+        ]
+    )
     name = next(order)
     sections: dict[str, list[_Row]] = {}
     for place, line in lines:
