@@ -59,7 +59,7 @@ BETWEEN_SKETCHES = 0.05  # s, of the responses that a fit shows
 
 
 @dataclass
-class View:
+class Shown:
     """What a page shows: a case, the result of a fit, or a record, of which there is no case yet.
 
     ``seen`` are the texts of the case and its draft as the page knows them, None for one that is
@@ -78,15 +78,15 @@ class View:
     stack: ExitStack = field(default_factory=ExitStack)
 
 
-def view_of(given: Given) -> View:
+def view_of(given: Given) -> Shown:
     """Begin with a case, a result or a record; raises ExfitError for a result that is none."""
     if isinstance(given, Path) and (given.is_dir() or given.suffix == ".json"):
         given = load_result(given)
     if isinstance(given, FitResult):
-        return View(given.case, given)
+        return Shown(given.case, given)
     if given is None or given.suffix.lower() in RECORDS:
-        return View(Path(), record=given)
-    return View(given)
+        return Shown(Path(), record=given)
+    return Shown(given)
 
 
 class Session:
