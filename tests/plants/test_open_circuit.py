@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from oracle import drawn_values, system_of, typical_values
+from oracle import SURROUNDED, drawn_values, system_of, typical_values
 from references import reference
 from typed_units import AC1A, AC8B, integrated
 
@@ -13,6 +13,8 @@ from exfit.plants import MACHINE, SATURATION, SPEED, VT0
 from exfit.plants.open_circuit import open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
+
+PAIRS = [*dict.fromkeys((exciter, machine) for exciter, machine, _ in SURROUNDED)]
 
 
 @pytest.mark.parametrize("name", ["ac1a", "ac8b_unit1", "ac8b_unit2"])
@@ -174,21 +176,23 @@ def test_a_round_rotor_without_damper_is_the_one_axis_machine(exciter):
     assert got == pytest.approx(response(exciter, "ONE_AXIS", shared), abs=1e-12)
 
 
-def test_a_machine_without_saturation_needs_as_much_field_as_voltage(exciter):
-    for machine in MACHINES:
-        values = typical_values(exciter, machine, machine_S10=0.0, machine_S12=0.0)
-        got = response(exciter, machine, values)
-        assert got[0] == pytest.approx([1.0, 1.0, 1.0], abs=1e-12)
-        slow = values | {VT0: 1.1}
-        assert response(exciter, machine, slow)[0] == pytest.approx([1.1] * 3, abs=1e-12)
+@pytest.mark.each_model
+@pytest.mark.parametrize(("exciter", "machine"), PAIRS)
+def test_a_machine_without_saturation_needs_as_much_field_as_voltage(exciter, machine):
+    values = typical_values(exciter, machine, machine_S10=0.0, machine_S12=0.0)
+    got = response(exciter, machine, values)
+    assert got[0] == pytest.approx([1.0, 1.0, 1.0], abs=1e-12)
+    slow = values | {VT0: 1.1}
+    assert response(exciter, machine, slow)[0] == pytest.approx([1.1] * 3, abs=1e-12)
 
 
-def test_saturation_of_the_machine_has_its_two_points(exciter):
-    for machine in MACHINES:
-        values = typical_values(exciter, machine)
-        for voltage, added in ((1.0, 0.12), (1.2, 1.2 * 0.4)):
-            got = response(exciter, machine, values | {VT0: voltage}, size=0.0)
-            assert got[0] == pytest.approx([voltage, *[voltage + added] * 2], abs=1e-9)
+@pytest.mark.each_model
+@pytest.mark.parametrize(("exciter", "machine"), PAIRS)
+def test_saturation_of_the_machine_has_its_two_points(exciter, machine):
+    values = typical_values(exciter, machine)
+    for voltage, added in ((1.0, 0.12), (1.2, 1.2 * 0.4)):
+        got = response(exciter, machine, values | {VT0: voltage}, size=0.0)
+        assert got[0] == pytest.approx([voltage, *[voltage + added] * 2], abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from exfit.features.programme.folder import load_summary
 
 STEPS = ["saturation", "v-curve", OF_MACHINE, "fit"]
 OUT = ("--no-plots", "-o", "out")
+BLANK = 5000  # bytes: an empty picture of this size has fewer
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,6 @@ def place(folder, monkeypatch):
     return written(programme_content(), folder)
 
 
-@pytest.mark.pixels
 def test_a_programme_leaves_a_folder_for_each_test_and_one_report(run, place):
     ran = run("run", place, *OUT)
     assert (ran.code, ran.err) == (0, "")
@@ -42,6 +42,15 @@ def test_a_programme_leaves_a_folder_for_each_test_and_one_report(run, place):
     for heading in ("Test programme", "Saturation test saturation", "Points on load v-curve",
                     f"Test {OF_MACHINE}: parameters", "Fitted records"):  # fmt: skip
         assert heading in report
+
+
+@pytest.mark.long
+@pytest.mark.pixels
+def test_each_figure_of_a_programme_is_drawn(run, place):
+    assert run("run", place, "-o", "drawn").code == 0
+    figures = [*Path("drawn").rglob("*.png")]
+    assert {path.parent.name for path in figures} == {*STEPS}
+    assert all(path.stat().st_size > BLANK for path in figures)
 
 
 @pytest.mark.long
