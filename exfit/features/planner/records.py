@@ -31,6 +31,7 @@ RESISTANCE = "RA"  # of the stator: it acts on load, where it is Ra of the netwo
 RATING, SHARE = "Trate", "Trate_Mbase"  # of a turbine: MW, and over the machine's base
 SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
 FLAGS = ("OEL", "UEL")  # of the places where limiters act
+ID_OF_ANOTHER = "M"  # machine, the second one of IEEEG1, which may be quoted
 LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the usual code of an input
 OF_SATURATION = ("E1", "SE1", "E2", "SE2")
@@ -298,7 +299,9 @@ def _numbers(
     faults = []
     for name, field in zip(definition.names, fields, strict=True):
         try:
-            if name not in integers:
+            if name == ID_OF_ANOTHER and field.quoted:
+                values[name] = integers[name]
+            elif name not in integers:
                 values[name] = number(field)
             elif definition.program == PSSE:
                 values[name] = whole(field)

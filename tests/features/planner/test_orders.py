@@ -103,6 +103,7 @@ GENQEJU SATFLG Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xppq Xl S10 S12 Kis
 H6EU1 Fd Re Rg Tpe Tsp Kp Ki Kd Td Velm GMAX GMIN Buf Buv Kg Tg BLG DBBD Tbd BLB DBBS Tbs Bgvmin Blv
       Dturb Pgc Deff Hdam Tw GV1 GV2 GV3 GV4 GV5 GV6 GV7 GV8 GV9 GV10 PGV1 PGV2 PGV3 PGV4 PGV5 PGV6
       PGV7 PGV8 PGV9 PGV10 BGV1 BGV2 BGV3 BGV4 BGV5 BGV6 BGV7 BGV8 BGV9 BGV10 Sprate DB1 EPS Trate
+PIDGOV Feedback Rperm Treg Kp Ki Kd Ta Tb Dturb G0 G1 P1 G2 P2 P3 GMAX GMIN Atw Tw VELMAX VELMIN
 GENTRA Tpd0 H D Xd Xq Xpd S10 S12 AF
 AC8CU1 OEL UEL SCL VOS SW1 TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX
        VEMIN E1 SE1 E2 SE2 KP KI XL THETAP KC1 VBMAX
@@ -152,10 +153,10 @@ PSS6C ICS1 REMBUS1 ICS2 REMBUS2 T1 KS2 T2 KS1 T3 MACC T4 TD K0 K1 K2 K3 K4 TI1 T
 PSS7C ICS1 REMBUS1 ICS2 REMBUS2 M N TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 K0 K1 K2 K3 K4 TI1
       TI2 KI3 TI3 KI4 TI4 VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN PPSSON PPSSOFF XCOMP TCOMP
 """
-# governors as InterPSS reads them, which PowerWorld 24 ran so but for IEEEG1D
+# governors as InterPSS reads them, which PowerWorld 24 ran so, IEEEG1D PSS/E 36.7
 OF_POWERWORLD = """
 TGOV1D R T1 VMAX VMIN T2 T3 Dt DBH DBL Trate
-IEEEG1D K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8 DBH DBL Trate
+IEEEG1D JBUS M K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8 DBH DBL Trate
 IEESGOD T1 T2 T3 T4 T5 T6 K1 K2 K3 PMAX PMIN DBH DBL Trate
 GASTD R T1 T2 T3 AT KT VMAX VMIN Dturb DBH DBL Trate
 GGOV1D Rselect Flag R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc
@@ -270,7 +271,7 @@ ORDERS = {
 OF_ONE_SOURCE = {"ESURRY", "PSS5C", "OEL2C", "OEL3C", "UEL2C", "ST2C", "ST3C"}
 OF_ONE_SOURCE |= {"OEL2CU1"}  # which is OEL2C's, with two values exchanged as there
 # those without a dead band: the order of the form with one, and of PSS/E's IEEEG2 by its diagram
-OF_ONE_SOURCE |= {"lcfb1", "HYGOV2", "PIDGOV", "WPIDHY", "IEEEG2"}
+OF_ONE_SOURCE |= {"lcfb1", "HYGOV2", "WPIDHY", "IEEEG2"}
 # of PSLF: files that are not at hand, a list of parameters, or taken to be as in PSS/E
 OF_ONE_SOURCE |= {
     *("gensal", "genqec", "genqej", "exac4", "exst4b", "ieeest", "tgov1", "ieeeg1"),
