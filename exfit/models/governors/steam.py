@@ -33,8 +33,7 @@ from exfit.models.sheet import (
 NOT_MODELLED = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6"
 CONS = "K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8"
 LOW_PRESSURE = dict.fromkeys(["K2", "K4", "K6", "K8"], 0.0)  # shares of a second machine
-# JBUS = 0: there is none, and M, its id, says nothing
-OF_ONE_MACHINE = {"icons": {"JBUS": 0, "M": 0}, "absent": LOW_PRESSURE, "ignored": "M"}
+SECOND_MACHINE = {"JBUS": 0, "M": 0}  # there is none, and M, its id, says nothing
 
 
 def ieeeg1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -104,8 +103,8 @@ IEEEG1 = governor(
     "V1 VALVE V4 V5 V6 V7",
     aliases="IEEEG1D",
     records=(
-        *record("IEEEG1", CONS, **OF_ONE_MACHINE, held=PLAIN),
-        *with_band("IEEEG1", CONS, **OF_ONE_MACHINE),
+        *record("IEEEG1", CONS, icons=SECOND_MACHINE, absent=LOW_PRESSURE, ignored="M", held=PLAIN),
+        *with_band("IEEEG1", CONS, icons=SECOND_MACHINE, absent=LOW_PRESSURE, ignored="M"),
     ),
     pslf_records=record(
         "ieeeg1",
