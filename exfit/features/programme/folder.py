@@ -15,6 +15,7 @@ from exfit.features.programme.programme import Programme
 from exfit.features.programme.result import (
     EnteredValue,
     FinishedTest,
+    GovernorCurve,
     KeptSummary,
     ProgrammeResult,
     ProgrammeStep,
@@ -37,11 +38,16 @@ from exfit.util.typed import plain
 from exfit.util.typed_reading import FormError, read
 
 POINTS = "points.csv"
-FIGURES_AT_REST = ("saturation.png", "v_curve.png")  # a test at rest has one of them
+FIGURES_AT_REST = (
+    "saturation.png",
+    "v_curve.png",
+    "governor.png",
+)  # a test at rest has one of them
 VERSION = 1  # of the file of a test that is no fit
-RESULTS: Mapping[str, type[SaturationResult] | type[VCurve]] = {
+RESULTS: Mapping[str, type[SaturationResult] | type[VCurve] | type[GovernorCurve]] = {
     "saturation": SaturationResult,
     "steady": VCurve,
+    "governor": GovernorCurve,
 }
 
 Keep = Callable[[FinishedTest, Path], None]
@@ -113,10 +119,14 @@ def write_test(test: FinishedTest, folder: Path) -> None:
         write_together(own, numbers, FIGURES_AT_REST)
 
 
-def points_table(result: SaturationResult | VCurve) -> str:
+def points_table(result: SaturationResult | VCurve | GovernorCurve) -> str:
     """Return the points of a test at rest as CSV, beside what is simulated where it is."""
     if isinstance(result, SaturationResult):
         columns = {"vt": result.vt, f"ifd_{result.unit}": result.ifd, "direction": result.direction}
+    elif isinstance(result, GovernorCurve):
+        columns, reading = {result.over: result.x}, result.reading
+        columns[f"{reading.signal}_measured"] = reading.measured
+        columns[f"{reading.signal}_simulated"] = reading.simulated
     else:
         columns = dict(zip(TERMINALS, (result.p, result.q, result.vt), strict=True))
         for signal, reading in result.readings.items():
@@ -144,6 +154,10 @@ def _missing_figures(test: FinishedTest, folder: Path) -> PlannedFigures:
     elif isinstance(result, VCurve):
         shows = "V-curves: the points beside the machine's model"
         planned["v_curve.png"] = PlannedFigure(shows, partial(figures.v_curve, result, test.name))
+    elif isinstance(result, GovernorCurve):
+        shows = f"the {result.reading.signal} over {result.over}, beside the governor's model"
+        drawing = partial(figures.governor, result, test.name)
+        planned["governor.png"] = PlannedFigure(shows, drawing)
     else:
         drawing = partial(figures.saturation, result, test.name)
         planned["saturation.png"] = PlannedFigure("the saturation curve with its points", drawing)

@@ -19,13 +19,19 @@ from exfit.case.schema import Recording
 from exfit.case.stated_values import taken_apart
 from exfit.case.yaml import Fault, read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.features.programme.programme_checks import saturation_test_faults, steady_test_faults
+from exfit.features.programme.programme_checks import (
+    governor_test_faults,
+    saturation_test_faults,
+    steady_test_faults,
+)
 from exfit.features.programme.programme_schema import (
     BUMP,
+    GOVERNOR,
     ORDER,
     REJECTION,
     SATURATION,
     STEADY,
+    GovernorTest,
     ProgrammeDocument,
     RecordedBump,
     SteadyTest,
@@ -95,7 +101,9 @@ def bump_content(content: Content) -> CaseContent:
 def machine_content(content: Content, index: int) -> CaseContent:
     """Return the case of a test of the machine: nothing is free in it but what it gives itself."""
     test = content[TESTS][index]
-    places: Places = {("plant", "free"): (TESTS, index, "free")}
+    of_governor = test["kind"] == GOVERNOR
+    fitted = "governor" if of_governor else "plant"
+    places: Places = {(fitted, "free"): (TESTS, index, "free")}
     inner = common_content(content).content
     if test["kind"] == REJECTION:
         inner = {**inner, "records": [_without(test, OF_PROGRAMME)]}
@@ -109,14 +117,14 @@ def machine_content(content: Content, index: int) -> CaseContent:
             _with_fixed_starts(entry, "parameters")[0] if isinstance(entry, dict) else entry
             for entry in inner["limiters"]
         ]
-    plant, free = inner.get("plant"), test.get("free")
-    if isinstance(plant, dict) and isinstance(free, dict):
+    part, free = inner.get(fitted), test.get("free")
+    if isinstance(part, dict) and isinstance(free, dict):
         given = {
-            key: _without(plant[key], free)
+            key: _without(part[key], free)
             for key in ("parameters", "std_errors")
-            if isinstance(plant.get(key), dict)
+            if isinstance(part.get(key), dict)
         }
-        inner["plant"] = {**plant, **given, "free": free}
+        inner[fitted] = {**part, **given, "free": free}
     return CaseContent(inner, places)
 
 
@@ -236,7 +244,7 @@ class Programme:
     def columns(self) -> Iterator[Mapping[str, Any]]:
         """Yield the channels of each record, and the columns of each table of points on load."""
         for test in self.tests:
-            if isinstance(test, SteadyTest):
+            if isinstance(test, SteadyTest | GovernorTest):
                 yield test.columns
             elif isinstance(test, Recording):
                 yield test.record.channels
@@ -314,7 +322,7 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
     if any(test.at("kind").text == SATURATION for test in tests):
         content = with_bases(content, BASES_TO_COME)
     yield from _machine_faults(ContentNode((), content))
-    machine = (index for index, _ in tests_of_kind(content, STEADY, REJECTION))
+    machine = (index for index, _ in tests_of_kind(content, STEADY, GOVERNOR, REJECTION))
     for inner in (
         common_content(content),
         *(machine_content(content, index) for index in machine),
@@ -346,6 +354,10 @@ def _machine_faults(top: ContentNode) -> Iterator[Fault]:
             yield from saturation_test_faults(test)
         elif of_test == STEADY:
             yield from steady_test_faults(test)
+        elif of_test == GOVERNOR:
+            if not top.at("governor").content:
+                yield test.at("kind").fault("not allowed without a governor")
+            yield from governor_test_faults(test)
 
 
 def steps_of(programme: Programme) -> tuple[ProgrammeStep, ...]:

@@ -6,6 +6,7 @@ from math import inf, isfinite
 from exfit.features.programme.result import (
     EnteredValue,
     FinishedTest,
+    GovernorCurve,
     MeasuredValue,
     ProgrammeResult,
     SaturationResult,
@@ -75,6 +76,8 @@ def _at_rest(test: FinishedTest) -> Iterator[Block]:
         yield from saturation(test.result)
     elif isinstance(test.result, VCurve):
         yield from v_curve(test.result)
+    elif isinstance(test.result, GovernorCurve):
+        yield from governor(test.result)
 
 
 def values_table(values: Sequence[EnteredValue]) -> Table:
@@ -164,6 +167,17 @@ def v_curve(result: VCurve) -> Iterator[Block]:
     yield from notes((*(cause.sentence for cause in result.verdict.causes), *result.notes))
 
 
+def governor(result: GovernorCurve) -> Iterator[Block]:
+    """Yield the verdict on a test of a governor, and what was fitted."""
+    yield paragraph(f"verdict: {result.verdict.sentence}")
+    if result.parameters:
+        yield parameters_table(
+            result, f"{result.governor}, {result.reading.signal} over {result.over}"
+        )
+    yield from unresolved(result.undetermined)
+    yield from notes(result.notes)
+
+
 def points_table(result: VCurve) -> Table:
     """Make the table of points: power, voltage, and each field signal, measured and simulated."""
     compared = [f"{s} {word}" for s in result.readings for word in COMPARED]
@@ -181,7 +195,9 @@ def points_table(result: VCurve) -> Table:
     return Table(columns(*heads, "", numbers=heads), tuple(rows), title)
 
 
-def parameters_table(result: VCurve) -> Table:
+def parameters_table(
+    result: VCurve | GovernorCurve, title: str = "fitted to the points on load"
+) -> Table:
     """Make the table of what was fitted, with its interval."""
     marks = {name: ", ".join(fits.remarks_on(each)) for name, each in result.parameters.items()}
     remark = any(marks.values())
@@ -203,4 +219,4 @@ def parameters_table(result: VCurve) -> Table:
     meaning = TableColumn("meaning", folds=True, expendable=1)
     last = columns("") if remark else ()
     heading = (*columns("parameter", *heads, "unit", numbers=heads), meaning, *last)
-    return Table(heading, tuple(rows), "fitted to the points on load")
+    return Table(heading, tuple(rows), title)

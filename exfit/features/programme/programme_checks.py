@@ -105,6 +105,24 @@ def _inline_faults(test: ContentNode, signals: Sequence[str]) -> Iterator[Fault]
             yield row.fault(f"{count} numbers, but the first point has {first}")
 
 
+def governor_test_faults(test: ContentNode) -> Iterator[Fault]:
+    """Yield contradictions in a test of a governor."""
+    columns, slow = test.at("columns"), "speed" in test.at("columns")
+    yield from _points_faults(test, (), ("time",) if slow else ("p", "gate"))
+    if slow and ("p" in columns) == ("gate" in columns):
+        yield columns.at("gate").fault("give either gate or p beside speed")
+    for _, column in columns.sections:
+        base = column.at("base")
+        yield from _base_faults(column)
+        yield from _not_above_zero(base)
+        if base.is_section:
+            yield base.fault("must be a number")
+        for key in ("scale",) if column.at("scale").number == 0.0 else ():
+            yield column.at(key).fault("must not be 0")
+        if "noise" in column:
+            yield column.at("noise").fault(f"only allowed for {' or '.join(FIELDS)}")
+
+
 def saturation_test_faults(test: ContentNode) -> Iterator[Fault]:
     """Yield contradictions in a saturation test."""
     yield from _points_faults(test, CURVE_SIGNALS, CURVE_SIGNALS[:2])

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.features.programme.result import SaturationResult, VCurve
+from exfit.features.programme.result import GovernorCurve, SaturationResult, VCurve
 from exfit.output.figures.style import (
     COLORS,
     GREEN,
@@ -128,4 +128,27 @@ def v_curve(result: VCurve, title: str) -> Figure:
     below.set_title(", ".join(words), fontsize=9, loc="right")
     tidy(below, f"{', '.join(result.readings)}: simulated\nless measured (% of 1 pu)")
     below.margins(x=ROOM)
+    return figure
+
+
+def governor(result: GovernorCurve, title: str) -> Figure:
+    """Return gate or power over power or speed, and how far it is beside the governor's model."""
+    reading = result.reading
+    figure, (above, below) = stacked(
+        8.2,
+        2,
+        f"{title}: {result.governor}, {reading.signal} over {result.over}",
+        height_ratios=[3.0, 1.2],
+    )
+    order = np.argsort(result.x, kind="stable")
+    above.plot(result.x, reading.measured, ".", color=START, markersize=4, label="measured")
+    style = {"color": SIMULATED, "markersize": 2}
+    line = "-" if result.over == "p" else "."  # what follows a lag is no line over the speed
+    above.plot(result.x[order], reading.simulated[order], line, label="simulated", **style)
+    above.legend(frameon=False)
+    tidy(above, f"{reading.signal} (pu)")
+    below.plot(result.x, 100.0 * reading.residuals, ".", color=SIMULATED, markersize=3)
+    zero_line(below)
+    below.set_xlabel(f"{result.over} (pu)")
+    tidy(below, "simulated less\nmeasured (%)")
     return figure

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from exfit.features.programme.programme_blocks import saturation, v_curve, values_table
+from exfit.features.programme.programme_blocks import governor, saturation, v_curve, values_table
 from exfit.features.programme.result import (
     FieldReading,
     FinishedTest,
+    GovernorCurve,
     ProgrammeResult,
     SaturationResult,
     VCurve,
@@ -87,10 +88,29 @@ def _of_test(test: FinishedTest, key: str) -> Iterator[ReportSection]:
     elif isinstance(result, VCurve):
         charts = (_v_curve_chart(result, reading, key) for reading in result.readings.values())
         yield ReportSection(key, f"Points on load {name}", (*v_curve(result), *charts))
+    elif isinstance(result, GovernorCurve):
+        blocks = (*governor(result), _governor_chart(result, key))
+        yield ReportSection(key, f"Test of the governor {name}", blocks)
     else:  # of data of the machine
         yield ReportSection(key, f"Test {name}: record", tuple(fitted_matches(result, f"{key}-")))
         for what, of_fit in (("parameters", parameters(result)), ("findings", findings(result))):
             yield ReportSection(f"{key}-{what}", f"Test {name}: {what}", tuple(of_fit))
+
+
+def _governor_chart(result: GovernorCurve, key: str) -> Chart:
+    """Draw gate or power over power or speed: the readings, and the governor's model."""
+    reading, order = result.reading, np.argsort(result.x, kind="stable")
+    x, signal = result.x[order], reading.signal
+    readings = Series("measured", x, reading.measured[order], "p0", dots=True)
+    model = Series("simulated", x, reading.simulated[order], "simulated", dots=result.over != "p")
+    return Chart(
+        f"{key}-{signal}",
+        f"{result.governor}: {signal} over {result.over}",
+        f"{signal} over {result.over}, by the readings and the governor's model; simulated minus "
+        f"measured {reading.rms:.2e} pu rms.",
+        f"{result.over} (pu)",
+        (Panel(f"{signal} (pu)", (readings, model), TALL),),
+    )
 
 
 def _saturation_chart(result: SaturationResult, key: str) -> Chart:

@@ -32,20 +32,30 @@ from exfit.util.file_names import LONGEST_NAME
 
 SATURATION: Final = "saturation"
 STEADY: Final = "steady"
+GOVERNOR: Final = "governor"
 REJECTION: Final = "rejection"
 BUMP: Final = "bump"
-ORDER = (SATURATION, STEADY, REJECTION, BUMP)  # what measures the machine before what needs it
+ORDER = (
+    SATURATION,
+    STEADY,
+    GOVERNOR,
+    REJECTION,
+    BUMP,
+)  # what measures the machine before what needs it
 
 MOST_POINTS = 1000  # of a list; a longer one is a file
 POINT_SIGNALS = (*TERMINALS, *FIELDS)
 CURVE_SIGNALS = ("vt", *FIELDS)
+GOVERNOR_SIGNALS = ("time", "speed", "p", "gate")
 
 if TYPE_CHECKING:
     PointSignal = str
     CurveSignal = str
+    GovernorSignal = str
 else:
     PointSignal = Literal[POINT_SIGNALS]
     CurveSignal = Literal[CURVE_SIGNALS]
+    GovernorSignal = Literal[GOVERNOR_SIGNALS]
 
 Rows = tuple[tuple[Number, ...], ...]
 Key = TypeVar("Key")
@@ -152,6 +162,26 @@ class SteadyTest(TestAtRest):
     )
 
 
+class GovernorTest(TestAtRest):
+    """The gate over the power at rest; or what gate or power does while the speed wanders."""
+
+    kind: Literal["governor"] = Field(description="Kind of test.")
+    columns: Columns[GovernorSignal, GivenPointColumn] = Field(
+        default_factory=nothing,
+        description="Columns of p and gate; or of time (s), speed and gate or p: a name, or a "
+        "mapping. p is on the rated MVA of the machine.",
+    )
+    free: Frozen[FreeSection] = Field(
+        default_factory=nothing,
+        description="Data of the governor that are found, such as At and qNL, or R, DBH and DBL, "
+        "as under parameters.free.",
+    )
+    accept: Limit | None = Field(
+        default=None,
+        description="Limit of the rms difference of gate or p, pu. Default: 2 % of its rms.",
+    )
+
+
 class FieldWindingSection(Section):
     """The resistance of the field winding, from which the base of efd follows."""
 
@@ -232,6 +262,7 @@ def _kind_of_test(value: Any) -> str:
 TestOfProgramme = Annotated[
     Annotated[SaturationTest, Tag(f"[{SATURATION}]")]
     | Annotated[SteadyTest, Tag(f"[{STEADY}]")]
+    | Annotated[GovernorTest, Tag(f"[{GOVERNOR}]")]
     | Annotated[RecordedRejection, Tag(f"[{REJECTION}]")]
     | Annotated[RecordedBump, Tag(f"[{BUMP}]")],
     Discriminator(_kind_of_test),

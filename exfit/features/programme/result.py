@@ -327,7 +327,30 @@ class VCurve:
         )
 
 
-StepResult = SaturationResult | VCurve | FitResult
+@dataclass(frozen=True, eq=False)
+class GovernorCurve:
+    """The gate over p at rest, or gate or p over a speed that wanders, beside a governor's model.
+
+    ``over`` names x (M,); ``parameters`` are what was fitted: data of the governor by symbol, and
+    of a record ``level`` and ``lag``. ``undetermined`` and ``notes`` as of `VCurve`.
+    """
+
+    governor: str
+    over: str
+    x: Array
+    reading: FieldReading
+    parameters: Mapping[str, FittedParameter]
+    verdict: Verdict
+    undetermined: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def consistent(self) -> bool:
+        """Whether its parts fit together, as one that is read from a file may not."""
+        return _alike(self.x, self.reading.measured, self.reading.simulated)
+
+
+StepResult = SaturationResult | VCurve | GovernorCurve | FitResult
 
 
 @dataclass(frozen=True)

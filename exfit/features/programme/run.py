@@ -12,18 +12,25 @@ from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
 from exfit.features.programme.folder import RESULTS, Keep, keep, key_of, result_kept
 from exfit.features.programme.programme import Programme, load_programme, steps_of
-from exfit.features.programme.programme_schema import BUMP, SaturationTest, SteadyTest
+from exfit.features.programme.programme_schema import (
+    BUMP,
+    GovernorTest,
+    SaturationTest,
+    SteadyTest,
+    TestOfProgramme,
+)
 from exfit.features.programme.result import (
     EnteredValue,
     FinishedTest,
+    GovernorCurve,
     ProgrammeResult,
     ProgrammeStep,
     SaturationResult,
     VCurve,
 )
-from exfit.features.programme.tests_at_rest import points_of, saturation, steady
+from exfit.features.programme.tests_at_rest import governor, points_of, saturation, steady
 from exfit.fitting.recordings import record_of
-from exfit.plants import MACHINE
+from exfit.plants import GOVERNOR, MACHINE
 from exfit.records.reading import file_hash
 from exfit.records.units import alike
 from exfit.results.description import UnitDescription
@@ -114,7 +121,7 @@ def refuse_unreadable(programme: Programme) -> None:
     readings: list[Callable[[], object]] = []
     for step in steps_of(programme):
         section = programme.test(step.name)
-        if isinstance(section, SaturationTest | SteadyTest):
+        if isinstance(section, SaturationTest | SteadyTest | GovernorTest):
             readings.append(partial(points_of, section, programme.folder))
         else:
             case = programme.case_of(step.name)
@@ -145,23 +152,8 @@ def finished_test(
     kept = result is not None
     if result is None:
         progress(step, None)
-        section, shared = programme.test(step.name), programme.shared_case()
-        machine = shared.parts.machine
-        if isinstance(section, SaturationTest):
-            result = saturation(section, points_of(section, programme.folder), machine)
-        elif isinstance(section, SteadyTest) and machine is not None:
-            case = with_values(shared, values)
-            own, errors = case.values(), {**case.std_errors()}
-            errors |= {
-                value.name: value.std_error
-                for value in values
-                if value.name.endswith(BASE) and value.entered
-            }
-            data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
-            std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
-            points = points_of(section, programme.folder)
-            result = steady(section, points, machine, data, std_errors)
-        else:
+        result = _at_rest(programme, programme.test(step.name), values)
+        if result is None:
             case, watch = with_values(programme.case_of(step.name), values), partial(progress, step)
             strategy, search = settings
             result = workflows.fit(case, strategy, watch, watch, search=search)
@@ -175,6 +167,32 @@ def finished_test(
             inputs["case"] = file_hash(programme.path)
         result = replace(result, about=programme.about, case_text=programme.text, inputs=inputs)
     return FinishedTest(**vars(step), key=key, result=result, kept=kept)
+
+
+def _at_rest(
+    programme: Programme, section: TestOfProgramme | None, values: Values
+) -> SaturationResult | VCurve | GovernorCurve | None:
+    """Return the result of a test of points, None of another one."""
+    shared = programme.shared_case()
+    machine, model = shared.parts.machine, shared.parts.governor
+    if isinstance(section, SaturationTest):
+        return saturation(section, points_of(section, programme.folder), machine)
+    if isinstance(section, SteadyTest) and machine is not None:
+        case = with_values(shared, values)
+        own, errors = case.values(), {**case.std_errors()}
+        errors |= {
+            value.name: value.std_error
+            for value in values
+            if value.name.endswith(BASE) and value.entered
+        }
+        data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
+        std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
+        return steady(section, points_of(section, programme.folder), machine, data, std_errors)
+    if isinstance(section, GovernorTest) and model is not None:
+        own = with_values(shared, values).values()
+        data = {row.symbol: own[GOVERNOR + row.symbol] for row in model.sheet}
+        return governor(section, points_of(section, programme.folder), model, data)
+    return None
 
 
 def with_values(case: Case, values: Values) -> Case:
@@ -257,9 +275,10 @@ def _measured(test: FinishedTest) -> Iterator[EnteredValue]:
             low, high = value.interval
             if low is not None and high is not None:
                 yield EnteredValue(name, value.value, (low, high), MEASURED, test.name, unit)
-    elif isinstance(result, VCurve):
+    elif isinstance(result, VCurve | GovernorCurve):
+        prefix = MACHINE if isinstance(result, VCurve) else GOVERNOR
         for symbol, parameter in result.parameters.items():
-            name = symbol if parameter.of_record else MACHINE + symbol
+            name = symbol if parameter.of_record else prefix + symbol
             yield from _fitted(name, parameter, MEASURED, test.name)
     elif test.kind != BUMP:
         for name, parameter in result.parameters.items():

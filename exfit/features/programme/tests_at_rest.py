@@ -10,14 +10,16 @@ import numpy as np
 
 from exfit.case.schema import Unknown
 from exfit.errors import CaseError, RecordError
+from exfit.features.programme.governor_curve import Answer, droop_curve, gate_curve
 from exfit.features.programme.programme_schema import (
     CURVE_SIGNALS,
     POINT_SIGNALS,
+    GovernorTest,
     PointColumn,
     SaturationTest,
     SteadyTest,
 )
-from exfit.features.programme.result import SaturationResult, VCurve
+from exfit.features.programme.result import GovernorCurve, SaturationResult, VCurve
 from exfit.features.programme.saturation import FieldWinding, saturation_curve
 from exfit.features.programme.v_curve import (
     FieldMeasurement,
@@ -28,6 +30,7 @@ from exfit.features.programme.v_curve import (
 )
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
+from exfit.models.sheet import Model
 from exfit.records.formats import open_table
 from exfit.records.formats.table import column_error
 from exfit.records.units import alike, needs_base
@@ -51,18 +54,18 @@ class Points:
     source: Path
 
 
-def points_of(test: SaturationTest | SteadyTest, folder: Path) -> Points:
+def points_of(test: SaturationTest | SteadyTest | GovernorTest, folder: Path) -> Points:
     """Return the points of a test, by signal; its file, of any kind of a record, is in a folder.
 
     Raises RecordError for a file that cannot be read, a column that is missing or in another unit,
     or a cell that is no number.
     """
-    if test.file is None:
+    if test.file is None and not isinstance(test, GovernorTest):
         signals = CURVE_SIGNALS if isinstance(test, SaturationTest) else POINT_SIGNALS
         rows = np.array(test.points or ()).T
         return Points(dict(zip(signals, rows, strict=False)), {}, Path(test.name))
     names = {signal: column.column or signal for signal, column in test.columns.items()}
-    table = open_table(folder / test.file, test.sheet)
+    table = open_table(folder / (test.file or ""), test.sheet)
     numbers, units = table.numbers(dict.fromkeys(names.values())), dict[str, str]()
     for signal, column in test.columns.items():
         in_file = table.units.get(names[signal])
@@ -72,7 +75,7 @@ def points_of(test: SaturationTest | SteadyTest, folder: Path) -> Points:
                 text = f"in {in_file} as the file says, not in {column.unit}"
                 raise column_error(table.path, names[signal], text)
     columns = {signal: numbers[name] for signal, name in names.items()}
-    return Points(columns, units, folder / test.file)
+    return Points(columns, units, table.path)
 
 
 def steady(
@@ -104,7 +107,27 @@ def steady(
     return v_curve(machine, data, PointsOnLoad(p, q, vt, measurements), free, limit, std_errors)
 
 
-def _column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
+def governor(test: GovernorTest, points: Points, model: Model, data: Values) -> GovernorCurve:
+    """Return a test of a governor beside its model, fitted where the test asks for it.
+
+    ``data`` has a value for each symbol of its sheet. Raises ExfitError for input that cannot be
+    used.
+    """
+    numbers = dict(points.columns)
+    for signal in numbers.keys() - {"time"}:
+        column = _column_of(test, points, signal)
+        numbers[signal] = numbers[signal] * column.scale / _given_base(column)
+    rows = {row.symbol: row for row in model.sheet}
+    free = [free_parameter(symbol, each, rows[symbol]) for symbol, each in test.free.items()]
+    limit = None if test.accept is None else test.accept.rmse
+    if "speed" not in numbers:
+        return gate_curve(model, data, numbers["p"], numbers["gate"], free, limit)
+    answer: Answer = "gate" if "gate" in numbers else "p"
+    answered = answer, numbers[answer]
+    return droop_curve(model, data, numbers["time"], numbers["speed"], answered, free, limit)
+
+
+def _column_of(test: SteadyTest | GovernorTest, points: Points, signal: str) -> PointColumn:
     """Complete the conversion of a signal to per unit; raises RecordError for an unknown one."""
     column = test.columns.get(signal) or PointColumn()
     unit = column.unit or points.units.get(signal) or "pu"
