@@ -22,6 +22,7 @@ from exfit.output.blocks import (
     columns,
     row,
 )
+from exfit.plants import LOAD_CONTROLLER
 from exfit.results import facts
 from exfit.results.causes_in_words import options_of
 from exfit.results.criteria import judged_by_criteria
@@ -263,6 +264,8 @@ def _governor(about: facts.Facts, answers: FormAnswers) -> Iterator[FormRow]:
     """Yield the rows on a governor where a grid event was played in, or the unit has one."""
     if answers.excursions or answers.part("governor") is not None:
         model = answers.model("governor", CONSTANT_POWER)
+        if answers.part(LOAD_CONTROLLER) is not None:
+            model = f"{model}; {answers.model(LOAD_CONTROLLER, '')}"
         yield FormRow("MOD-027-1 R2", "Turbine governor and load control", model, "parameters")
     if answers.part("governor") is not None:
         for fact in (facts.GOVERNOR, facts.TURBINE, facts.LOAD_CONTROL):
