@@ -344,6 +344,43 @@ def test_OEL2C_counts_as_in_PSSE_with_two_values_exchanged():
     assert written == [float(text) for text in OF_PSSE.split()]
 
 
+# UEL1 in PSS/E 36.7, from the same file, where it does not act: t, the distance from the circle,
+# and its states, three rows at a time: at the ceiling of the PI, below it, and at its floor
+UEL1_OF_PSSE = """KUR KUC VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN
+    1.72 1.29 6.1 6.0 0.10 3.0 0.25 0.0 0.02 0.08 0.015 0.06 0.10 0.0"""
+STATES_OF_UEL1 = (
+    ((0.05350001902, 0.173318624496, 0.0, 0.00996080692858, 0.00349128688686),
+     (0.05400002003, 0.169433116913, 0.0, 0.0114563489333, 0.00404768576846),
+     (0.05450002104, 0.16562128067, 0.0, 0.0129425730556, 0.00460874615237)),
+    ((0.06950005144, 0.0786634683609, 1.0214818758e-05, 0.0533963292837, 0.0231436789036),
+     (0.07000005245, 0.0765333175659, 1.40937490869e-05, 0.0545136369765, 0.0237704142928),
+     (0.07050005347, 0.0744469165802, 1.78671616595e-05, 0.055584564805, 0.0243856273592)),
+    ((0.07450006157, 0.0591689348221, 4.45022815256e-05, 0.0626076459885, 0.0289017017931),
+     (0.07500006258, 0.0574281215668, 4.74162661703e-05, 0.0633070766926, 0.0294166076928),
+     (0.07550006360, 0.0557225942612, 5.02441507706e-05, 0.0639699846506, 0.0299207661301)),
+    ((0.62850135565, -0.373650670052, 1.14034104627e-4, 9.02444880921e-05, 2.47286312515e-4),
+     (0.62900137901, -0.373618483543, 1.14034104627e-4, 8.96822311915e-05, 2.4579410092e-4),
+     (0.62950140238, -0.373588681221, 1.14034104627e-4, 8.91234813025e-05, 2.44310795097e-4)),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("rows", STATES_OF_UEL1)
+def test_UEL1_moves_as_in_PSSE_from_one_step_to_the_next(rows):
+    """By its rule x + h (3 f - f of the step before) / 2."""
+    names, values = (line.split() for line in UEL1_OF_PSSE.split("\n"))
+    p, slopes = Names(**dict(zip(names, map(float, values), strict=True))), []
+    for _, distance, *states in rows:
+        u, d = Names(vt=1.0, p=0.0, q=p.KUC - p.KUR - distance), Names()
+        LIMITERS["UEL1"].equations(
+            Names(**dict(zip(["V", "V1", "V3"], states, strict=True))), u, p, d
+        )
+        slopes.append((d.V, d.V1, d.V3))
+    _, (t, _, *now), (end, _, *then) = rows
+    for x, f, before, found in zip(now, slopes[1], slopes[0], then, strict=True):
+        # single precision of the states; a step moves them by 1e-6 to 1e-3
+        assert abs(x + (end - t) * (1.5 * f - 0.5 * before) - found) < 1e-8
+
+
 def test_OEL5C_acts_by_its_count_or_soon_and_lets_go_when_the_count_is_empty():
     model = LIMITERS["OEL5C"]
     p = lively(model)
