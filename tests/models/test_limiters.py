@@ -344,6 +344,45 @@ def test_OEL2C_counts_as_in_PSSE_with_two_values_exchanged():
     assert written == [float(text) for text in OF_PSSE.split()]
 
 
+# of the same run: t, efd, which is its input there, and its states but for the timer, three rows at
+# a time, while its PID is at the ceiling of 0
+STATES_OF_OEL2C = (
+    ((0.3084978163, 1.18483412266, 0.862198233604, 1.45, -0.00392908649519, 0.0417256765068,
+      -0.010411622934, -0.0146577171981),
+     (0.3089978099, 1.18443226814, 0.861384570599, 1.45, -0.00392908649519, 0.0419103913009,
+      -0.0103596961126, -0.0146181574091),
+     (0.3094978035, 1.18404436111, 0.860584199429, 1.45, -0.00392908649519, 0.0420945957303,
+      -0.0103080272675, -0.0145785864443)),
+    ((0.3279975653, 1.17820549011, 0.839474380016, 1.45, -0.00392908649519, 0.0484939627349,
+      -0.00856706500053, -0.0131175043061),
+     (0.3284975588, 1.17824339867, 0.839111089706, 1.45, -0.00392908649519, 0.0486543774605,
+      -0.00852433685213, -0.0130783701316),
+     (0.3289975524, 1.17829028989, 0.838757455349, 1.45, -0.00392908649519, 0.0488140769303,
+      -0.0084818219766, -0.0130392676219)),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("rows", STATES_OF_OEL2C)
+def test_OEL2C_moves_as_in_PSSE_from_one_step_to_the_next(rows):
+    """By its rule x + h (3 f - f of the step before) / 2; its derivative there has the gain."""
+    model = LIMITERS["OEL2C"]
+    definition = Definition("limiter", model, model.records[0])
+    fields = tuple(Field(text, 1) for text in ("1", *OF_PSSE.split()))
+    p, slopes = Names(**read_values(definition, 1, fields).values), []
+    names, gain = ("I", "IF", "INTEG", "DERIV", "V2", "V1"), p.KDOEL / p.TDOEL
+    for _, efd, *states in rows:
+        waiting = {"T": 0.0, "IREF": p.IINST, "OVER": 0.0, "BELOW": 0.0, "ACTIVE": 0.0}
+        s, d = Names(**waiting, **dict(zip(names, states, strict=True))), Names()
+        s.DERIV /= gain
+        model.equations(s, Names(ifd=efd), p, d)
+        d.DERIV *= gain
+        written = [getattr(d, name) for name in names]
+        slopes.append([f.slope if isinstance(f, Limited) else f for f in written])
+    _, (t, _, *now), (end, _, *then) = rows
+    for x, f, before, found in zip(now, slopes[1], slopes[0], then, strict=True):
+        assert abs(x + (end - t) * (1.5 * f - 0.5 * before) - found) < 1e-7
+
+
 # UEL1 in PSS/E 36.7, from the same file, where it does not act: t, the distance from the circle,
 # and its states, three rows at a time: at the ceiling of the PI, below it, and at its floor
 UEL1_OF_PSSE = """KUR KUC VURMAX VUCMAX KUI KUL VUIMAX VUIMIN TU1 TU2 TU3 TU4 VULMAX VULMIN
