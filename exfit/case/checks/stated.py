@@ -89,6 +89,7 @@ def as_found_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
 
 def _unused(section: ContentNode, parts: Parts) -> list[tuple[str, ContentNode]]:
     """List the unused values but for those that only a governor's record has, as GGOV1's Trate."""
-    records = () if parts.governor is None else parts.governor.records
-    ignored = {GOVERNOR + name for record in records for name in record.ignored}
+    own = parts.governor
+    records = () if own is None else (*own.records, *own.pslf_records)
+    ignored = {GOVERNOR + name for each in records for name in (*each.ignored, *dict(each.absent))}
     return [(name, node) for name, node in section.at("unused").sections if name not in ignored]

@@ -140,7 +140,8 @@ class AsFoundSection(Section):
     unused: Frozen[Number] = Field(
         default_factory=nothing,
         description="Values in its records that the planner's program ignores, such as TA of ST3C "
-        "in PSS/E: 0 in the case; the export writes them back.",
+        "in PSS/E: 0 in the case; and those of a governor that its model lacks, such as Rup of "
+        "GGOV1. The export writes them back.",
     )
 
 

@@ -351,7 +351,7 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
     }
     # what the planner's file has and the case does without
     of_file = content.get("as_found", {}).get("unused", {})
-    symbols = [*dict(record.unused), "SE1", "SE2"]
+    symbols = [*dict(record.unused), *dict(record.absent), "SE1", "SE2"]
     if prefix + SHARE not in result.parameters:
         symbols.append(RATING)
     unused = {
@@ -406,6 +406,9 @@ def warnings_of(entry: Written) -> Iterator[str]:
     """Warn of values that a record cannot hold, leaves undefined, or takes from typical data."""
     record = entry.definition.record
     yield from lost_in(entry)
+    for symbol in (name for name, _ in record.absent if name in entry.unused):
+        as_found = f"{symbol} = {show(entry.unused[symbol])}"
+        yield f"{record.name}: {as_found} is not modelled: as in the planner's file"
     for symbol, value in unused_of(record, entry.values).items():
         yield f"{record.name}: {entry.definition.program} ignores {symbol} = {show(value)}"
     if record.doubt:

@@ -276,6 +276,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     inputs = tuple(signals.get(int(code), signals[usual]) for code, usual in codes)
     if given.get(RATING, 0.0) != 0.0:
         unused[RATING] = given[RATING]
+    unused |= unmodelled_of(definition, given)
     times_speed = record.times_speed or given.get(SPEED_FLAG, 0.0) != 0.0
     return Reading(
         definition,
@@ -406,6 +407,12 @@ def with_exchanged(record: DynamicsRecord, values: Mapping[str, Value]) -> dict[
     return {**values, **{name: values[other] for name, other in pairs if other in values}}
 
 
+def unmodelled_of(definition: Definition, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of a governor's record that its model does not have, but for usual ones."""
+    absent = definition.record.absent if definition.kind == "governor" else ()
+    return {name: given[name] for name, usual in absent if given.get(name, usual) != usual}
+
+
 def unused_of(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, float]:
     """Return those values that act in a model and not in the program of a record."""
     unused = {
@@ -439,7 +446,7 @@ def record_fields(definition: Definition, values: Mapping[str, float]) -> list[s
     """Return the fields behind a record's id, each number in the digits that give it back."""
     record = definition.record
     integers = dict(record.icons)
-    given = {**dict.fromkeys(record.ignored, 0.0), **integers, **values, **dict(record.absent)}
+    given = {**dict.fromkeys(record.ignored, 0.0), **integers, **dict(record.absent), **values}
     given = with_exchanged(record, given)
     if {*OF_SATURATION} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):

@@ -376,6 +376,25 @@ def test_what_its_program_does_without_is_0_in_a_case_and_stays_in_the_file(name
     assert f"{name}: PSS/E ignores {symbol} = 0.4" in acting.warnings
 
 
+@pytest.mark.parametrize("name", ["GGOV1", "IEEEG1", "HYG3", "HYGOVR1", "H6E"])
+def test_what_a_governor_s_model_does_not_have_goes_back_as_it_was(name, fit):
+    own = DEFINITIONS[name]
+    unmodelled = {symbol: 0.5 * usual + 0.25 for symbol, usual in own.record.absent}
+    parts = {of: typical(of.model.sheet) | dict(of.record.held) for of in (GENROU, ESAC1A, own)}
+    parts[own] |= unmodelled
+    text = "".join(f"{record_text(of, values, 7, '1')}\n" for of, values in parts.items())
+    unit = unit_of(text.encode(), 7)
+    case = imported_case(unit, "units.dyr").text
+    found = parse_case(case, Path("unit.yaml")).as_found.unused
+    assert found == {own.prefix + symbol: value for symbol, value in unmodelled.items()}
+    values = {**values_of(unit), "KA": 321.0}
+    result = verified(fit, unit, values, case_text=case, case=Path("unit.yaml"))
+    written = export(result, 7, "1")
+    assert f"{record_text(own, parts[own], 7, '1')}\n" in written.text
+    for symbol in unmodelled:
+        assert any(f" {symbol} = " in warning for warning in written.warnings)
+
+
 def test_the_rating_of_a_turbine_is_named_at_import_and_stays_in_the_file(fit):
     """It is in MW, the case has its share of the machine's base, which is not in a .dyr file."""
     parts = (GENROU, ESAC1A, DEFINITIONS["GGOV1"])
