@@ -13,7 +13,7 @@ from exfit.case.yaml import QUESTION
 from exfit.dsp.quality import SPIKE_LIMIT
 from exfit.errors import ExfitError, RecordError
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
-from exfit.records.channel_inspection import InspectedChannel, InspectedPhases
+from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.channel_names import connection_of
 from exfit.records.contradictions import FIELD, ScaleRange, is_on_load, scale_to_find
 from exfit.records.formats import open_table
@@ -291,7 +291,7 @@ def _voltage(inspection: Inspection, base: Base | None) -> Section:
     if inspection.channel_of("vt") is not None:
         return {}
     for group in inspection.phases:
-        first = _first_phase(inspection, group)
+        first = next(each for each in inspection.channels if each.name == group.columns[0])
         unit, value = _unit_and_base(first, base)
         phases = {
             "phases": list(group.columns),
@@ -403,10 +403,6 @@ def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, s
     if base is None:
         return known or QUESTION, QUESTION
     return known or base.unit or QUESTION, base.in_unit(known, channel.name)
-
-
-def _first_phase(inspection: Inspection, group: InspectedPhases) -> InspectedChannel:
-    return next(channel for channel in inspection.channels if channel.name == group.columns[0])
 
 
 def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) -> str:

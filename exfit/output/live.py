@@ -188,7 +188,10 @@ class LiveIterations:
         It has the columns that there is room for: none is cut in two.
         """
         rows, count = min(room, MOST_ITERATIONS), 1
-        while count < len(COLUMNS) and _width(COLUMNS[: count + 1]) <= width:
+        while (
+            count < len(COLUMNS)
+            and sum(each.width + 1 for each in COLUMNS[: count + 1]) <= width + 1
+        ):
             count += 1
         hidden, columns = len(self.lines) - rows, COLUMNS[:count]
         titles = [["", *column.heading.splitlines()][-2:] for column in columns]
@@ -238,10 +241,6 @@ def _row(columns: Sequence[IterationColumn], texts: Sequence[str]) -> str:
         for column, text in zip(columns, texts, strict=True)
     )
     return " ".join(cells)
-
-
-def _width(columns: Sequence[IterationColumn]) -> int:
-    return sum(column.width + 1 for column in columns) - 1
 
 
 def task(case: Case, strategy: str | None) -> str:

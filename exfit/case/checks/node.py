@@ -27,8 +27,10 @@ class ContentNode:
         """Return the place under the keys and indices, one within the other."""
         value = self.value
         for key in keys:
-            inside = value.get(key) if isinstance(value, dict) else None
-            value = _entry(value, key) if isinstance(value, list) else inside
+            if isinstance(value, list):
+                value = value[key] if isinstance(key, int) and key < len(value) else None
+            else:
+                value = value.get(key) if isinstance(value, dict) else None
         return ContentNode((*self.place, *keys), value)
 
     def __contains__(self, key: str) -> bool:
@@ -89,7 +91,3 @@ class ContentNode:
     def fault(self, text: str) -> Fault:
         """Return a fault of this place."""
         return Fault(self.place, text)
-
-
-def _entry(values: list[Any], key: str | int) -> Any:
-    return values[key] if isinstance(key, int) and key < len(values) else None
