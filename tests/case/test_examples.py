@@ -33,12 +33,9 @@ def keys(part, schema, known):
 
 
 def test_every_key_of_the_schema_stands_in_an_example():
-    missing = {
-        key
-        for key in keys(json_schema(), json_schema(), set())
-        if not re.search(rf"(?m)(^|[\s{{,`(]){re.escape(key)}:(\s|$)", EXAMPLES)
-    }
-    assert sorted(missing) == []
+    shown = re.findall(r"(?m)(?:^|(?<=[\s{,`(]))([^\s{},`(:]+):(?=\s|$)", EXAMPLES)
+    schema = json_schema()
+    assert sorted({*keys(schema, schema, set())} - {*shown}) == []
 
 
 SECTIONS = {"record": RecordFile, "estimate": Estimate, "criteria": CriteriaSection}
