@@ -8,6 +8,7 @@ import signal
 import sys
 import tempfile
 import zlib
+from collections import defaultdict
 from pathlib import Path
 
 import hypothesis
@@ -38,7 +39,7 @@ FEW = (
 
 # folders whose tests are of the models themselves; elsewhere a law takes a model as an example
 OF_MODELS = {"models", "planner"}
-PART = 3  # of the laws over the other models one in so many runs as on another processor
+PART = 3  # one in so many examples of a law runs as on another processor
 
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)
 hypothesis.settings.register_profile("all", max_examples=100, deadline=None, derandomize=True)
@@ -50,8 +51,8 @@ def pytest_addoption(parser):
         choices=("few", "others", "numerical", "long", "all"),
         default="few",
         help="few: one model of each family; others: the laws of models over all the others; "
-        "numerical: a third of these with fewer examples, and the linear algebra; long: what takes "
-        "long; all: every law over every model",
+        "numerical: a third of the examples of these laws and of the linear algebra; long: what "
+        "takes long; all: every law over every model",
     )
 
 
@@ -123,8 +124,20 @@ def pytest_collection_modifyitems(config, items):
     if models == "all":
         return
     selected = [item for item in items if _is_selected(item, models)]
-    config.hook.pytest_deselected(items=[item for item in items if not _is_selected(item, models)])
+    if models == "numerical":
+        selected = [*_in_part(selected)]
+    config.hook.pytest_deselected(items=[*{*items}.difference(selected)])
     items[:] = selected
+
+
+def _in_part(items):
+    """Yield every third example of each law, and one of a law with fewer; of each law others."""
+    laws = defaultdict(list)
+    for item in items:
+        laws[item.nodeid.partition("[")[0]].append(item)
+    for law, examples in laws.items():
+        step = min(PART, len(examples))
+        yield from examples[zlib.crc32(law.encode()) % step :: step]
 
 
 def _is_selected(item, models):
@@ -139,8 +152,7 @@ def _is_selected(item, models):
         return False
     if _is_given_another_model(item):
         is_law_of_models = item.get_closest_marker("each_model") or OF_MODELS & {*item.path.parts}
-        is_in_part = models != "numerical" or zlib.crc32(item.name.encode()) % PART == 0
-        return models != "few" and is_law_of_models and is_in_part
+        return models != "few" and is_law_of_models
     is_drawn = hypothesis.is_hypothesis_test(getattr(item, "obj", None))
     if models == "numerical":
         return is_drawn or _is_of_algebra(item.path)

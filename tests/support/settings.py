@@ -1,8 +1,8 @@
 """Settings under which a machine computes as another would, and how to see that they took effect.
 
 ``python tests/support/settings.py oldest`` runs the numerical part of the tests under one of
-them, ``... oldest tests/cli`` other tests; further arguments go to pytest. A third of
-the laws of models run over the others: so many need no second look at the few.
+them, ``... oldest tests/cli`` other tests; further arguments go to pytest. Of each law every third
+example runs; those of models run over the others: so many need no second look at the few.
 """
 
 import os
