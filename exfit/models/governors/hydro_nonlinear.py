@@ -54,6 +54,8 @@ COLUMN = sheet(
 IN_HERTZ = f"{OF_TWO_PROGRAMS}; DBH, DBL and BLG, per unit, are not in the record"
 HELD = {**PLAIN, "BLG": 0.0}
 PAIRS = range(1, 7)
+CURVE_POINTS = " ".join(f"GV{k} PGV{k}" for k in PAIRS)
+VELOCITIES = {"VELOPEN": "velop", "VELCLOSE": "velcl"}
 
 
 def gate_servo(c: Signal, s: Signal, p: Signal, d: Signal, low: Signal, high: Signal) -> Signal:
@@ -150,6 +152,17 @@ HYGOVR = governor(
         held=HELD,
         doubt=IN_HERTZ,
     ),
+    pslf_records=record(  # GMAX and GMIN limit c
+        "hygovr",
+        "PMAX PMIN R Td T1 T2 T3 T4 T5 T6 T7 T8 Tp VELOPEN VELCLOSE Kp Kg GMAX GMIN Tt DB1 EPS "
+        f"DB2 Tw At Dturb qNL H0 {CURVE_POINTS}",
+        absent={
+            **{"GMAX": 99.0, "GMIN": -99.0, "H0": 1.0},
+            **dict.fromkeys(f"DB1 EPS DB2 {CURVE_POINTS}".split(), 0.0),
+        },
+        held=HELD,
+        spelled={**VELOCITIES, "Kp": "ki"},
+    ),
     setpoints="PMAX0 PMIN0",
 )
 
@@ -238,7 +251,7 @@ HYG3 = governor(
     hyg3,
     hyg3_rest,
     sheet(
-        ("Cflag", 1.0, "1", (0.0, 1.0), "controller: 1 PID, 0 double derivative"),
+        ("Cflag", 1.0, "1", (-1.0, 1.0), "controller: 1 PID, 0 (PSLF: -1) double derivative"),
         ("Rgate", 0.05, *UP_TO_10, "droop of the gate"),
         ("Relec", 0.0, *UP_TO_10, "droop of the electrical power"),
         ("Tt", 0.2, *TIME, "power transducer lag"),
@@ -257,13 +270,22 @@ HYG3 = governor(
     records=record(
         "HYG3",
         "Rgate Relec Tt Td K2 Ki K1 Tf Kg Tp VELOPEN VELCLOSE PMAX PMIN DB2 "
-        + " ".join(f"GV{k} PGV{k}" for k in PAIRS)
+        + CURVE_POINTS
         + " H0 qNL Tw At Dturb Trate DB1 EPS DB1L",
         icons={"Cflag": 1},
         absent=dict.fromkeys(("DB2", "DB1", "EPS", "DB1L"), 0.0),
         ignored="Trate",
         held=HELD,
         doubt=IN_HERTZ,
+    ),
+    pslf_records=record(
+        "hyg3",
+        "PMAX PMIN Cflag Rgate Relec Td Tf Tp VELOPEN VELCLOSE K1 K2 Ki Kg Tt DB1 EPS DB2 Tw At "
+        f"Dturb qNL H0 {CURVE_POINTS}",
+        icons={"Cflag": 1},
+        absent=dict.fromkeys(("DB1", "EPS", "DB2"), 0.0),
+        held=HELD,
+        spelled=VELOCITIES,
     ),
     setpoints="PMAX0 PMIN0",
 )
