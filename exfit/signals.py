@@ -131,6 +131,7 @@ PHASOR_COLUMNS = "phasors."  # how the columns begin that are computed of phasor
 COMPARED_IN_EVENT = ("p", "q", "efd", "ifd", "speed")  # what a record of an event mostly holds
 OF_STEP = ("vt", "p", "q")  # what shows whether steps are short enough where nothing is compared
 OF_FLAT_RUN = ("efd", "p", "q")  # what shows whether a unit rests where nothing is compared
+OF_GOVERNOR = ("speed", "p", "gate")  # what shows the droop and the gate curve of a unit
 OF_BUMP_TEST = ("vt", "efd", "ifd")  # what a record of a bump test mostly holds
 TERMINALS, FIELDS = ("p", "q", "vt"), ("ifd", "efd")  # what is read of a unit at rest on load
 POSITIVE_AT_REST = tuple(row.symbol for row in ROWS if row.positive)

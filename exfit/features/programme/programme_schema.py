@@ -27,7 +27,7 @@ from exfit.case.schema.values import (
     nothing,
     thawed,
 )
-from exfit.signals import FIELDS, TERMINALS
+from exfit.signals import FIELDS, OF_GOVERNOR, TERMINALS
 from exfit.util.file_names import LONGEST_NAME
 
 SATURATION: Final = "saturation"
@@ -46,7 +46,7 @@ ORDER = (
 MOST_POINTS = 1000  # of a list; a longer one is a file
 POINT_SIGNALS = (*TERMINALS, *FIELDS)
 CURVE_SIGNALS = ("vt", *FIELDS)
-GOVERNOR_SIGNALS = ("time", "speed", "p", "gate")
+GOVERNOR_SIGNALS = ("time", *OF_GOVERNOR)
 
 if TYPE_CHECKING:
     PointSignal = str
