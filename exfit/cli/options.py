@@ -14,7 +14,7 @@ import click
 from exfit.cli.given_files import GivenFile, Kind, ParameterFile
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
-from exfit.util.interrupts import SIGNALLED
+from exfit.util.interrupts import SIGNALLED, interrupted
 from exfit.util.text import printable
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ class Output(NamedTuple):
 
     def draw(self, figures: "FigureFiles", listed: bool = True) -> None:
         """Draw the figures of a run, last of all it does; ``listed``: with a line for each."""
-        if not self.figures:
+        if not self.figures or interrupted(2):
             return
         if self.shown and listed:
             from exfit.output import terminal

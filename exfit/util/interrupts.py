@@ -60,9 +60,9 @@ def _deferred(*numbers: signal.Signals) -> Iterator[None]:
         signal.raise_signal(first)
 
 
-def interrupted() -> bool:
-    """Tell whether an interruption has come, whoever has caught it: nothing new is begun then."""
-    return any(_received)
+def interrupted(times: int = 1) -> bool:
+    """Tell whether so many interruptions have come, whoever caught them: nothing new is begun."""
+    return any(len(numbers) >= times for numbers in _received)
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import contextlib
 import json
 import random
 import signal
+from pathlib import Path
 
 import injected
 import pytest
@@ -11,7 +12,7 @@ from ended_commands import contents
 from writers import INTERRUPTED
 
 from exfit.cli.options import Interruption
-from exfit.output import events
+from exfit.output import events, run_folder
 from exfit.util import files
 
 COMMANDS = {  # that announce their stages
@@ -96,6 +97,23 @@ def test_an_interruption_that_something_swallows_is_an_exit_code(run, monkeypatc
     ran = run("simulate", "case.yaml", "--no-plots", "-q", "-o", "folder")
     assert ran.code == 3
     assert ran.err == "Interrupted: what was done until then is kept\n"
+
+
+def test_figures_are_drawn_after_one_interruption_and_none_after_two(run, monkeypatch):
+    for times, drawn in ((1, True), (2, False)):
+        real = run_folder.write_simulation
+
+        def interrupting(*arguments, times=times, real=real):
+            written = real(*arguments)
+            for _ in range(times):
+                with contextlib.suppress(KeyboardInterrupt):
+                    signal.raise_signal(signal.SIGINT)
+            return written
+
+        with monkeypatch.context() as patched:
+            patched.setattr(run_folder, "write_simulation", interrupting)
+            assert run("simulate", "case.yaml", "-q", "-o", f"met{times}").code == 3
+        assert any(Path(f"met{times}").glob("*.png")) is drawn
 
 
 def test_an_interruption_is_said_where_another_meets_its_message(monkeypatch):

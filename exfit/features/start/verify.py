@@ -31,6 +31,7 @@ from exfit.features.start.command import (
     model_option,
     mva_option,
 )
+from exfit.util.interrupts import interrupted
 
 if TYPE_CHECKING:
     from exfit.output.events import Events
@@ -118,6 +119,8 @@ def verify(
         echo(f"record: {source.name}; tests: {counts}")
         echo(f"case: {case}" + (f"; typical, not of this unit: {left}" if left else ""))
     result, folder = fit_case(load(case), show)
+    if interrupted():  # the fit is kept; exfit report writes the page of it
+        raise SystemExit(NOT_CONVERGED)
     pages = write_report(folder, place, force)
     if show.shown:
         echo(f"report: {', '.join(map(str, pages))}")

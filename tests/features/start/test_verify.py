@@ -1,7 +1,9 @@
 """verify: one command from a recorder's file to the report; answers from a file, in scripts too."""
 
 import json
+import signal
 import sys
+from contextlib import suppress
 from shutil import copy
 
 import pytest
@@ -15,6 +17,7 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.features.start.answers import Answers
+from exfit.output import run_folder
 
 ANSWERS = SAMPLES / "field_answers.yaml"
 TRUTH = {
@@ -55,6 +58,24 @@ def test_one_command_leads_from_a_record_to_a_report_whose_intervals_hold_the_tr
     assert missed == ["KD"]  # the maker's saturation leaves it open
     page = (empty_folder / "report.html").read_text(encoding="utf-8")
     assert "N. N." in page
+
+
+def test_an_interrupted_verify_keeps_the_fit_and_begins_no_report(
+    empty_folder, run, locally, monkeypatch
+):
+    write = run_folder.write_fit
+
+    def interrupting(*arguments):
+        written = write(*arguments)
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return written
+
+    monkeypatch.setattr(run_folder, "write_fit", interrupting)
+    ran = run("verify", SAMPLES / "field_record.csv", "--answers", ANSWERS, "-o", "r.html", "-q")
+    assert (ran.code, ran.err) == (3, "Interrupted: what was done until then is kept\n")
+    assert result_in(empty_folder / "runs" / "field_record-fit")["model"] == "AC1A"
+    assert not (empty_folder / "r.html").exists()
 
 
 def test_verify_writes_case_fit_and_report_and_ends_with_the_verdict_and_its_page(
