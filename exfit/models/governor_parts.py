@@ -95,8 +95,8 @@ def banded(name: str, cons: str, **given: Any) -> Records:
 def with_band(name: str, cons: str, **given: Any) -> Records:
     """Return the record of the form of a governor with a dead band; it may have the rating."""
     cons = f"{cons} DBH DBL{'' if 'Trate' in cons.split() else ' Trate'}"
-    ignored = f"Trate {given.get('ignored', '')}"
-    return record(f"{name}D", cons, **{**given, "held": ON_RATING, "ignored": ignored})
+    ignored = dict.fromkeys(["Trate", *given.get("ignored", "").split()])
+    return record(f"{name}D", cons, **{**given, "held": ON_RATING, "ignored": " ".join(ignored)})
 
 
 def governor(
