@@ -270,9 +270,9 @@ def pss4c(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     The first input is the speed, the second the electrical power, with the sign of
     the swing equation as in PSS4B. The drawing is InterPSS's, with PowerWorld's
     parameters; GridKit has the bands alone, which PowerWorld 24 has too (its states
-    within 2e-8 pu), behind another transducer of the power. M is 2 H; programs that read M = 0 as
-    the 2 H of the machine need its value here. Typical data of the bands are the
-    standard's, as GridKit has them, of the transducers PSS4B's.
+    within 2e-8 pu), behind another transducer of the power. M is 2 H; programs that
+    read M = 0 as the 2 H of the machine need its value here. Typical data of the
+    bands are the standard's, as GridKit has them, of the transducers PSS4B's.
     """
     low, high = transduced(of_swing(s, u, p, d), s, u, p, d)
     bands = band("VL", low, s, p, d) + band("L", low, s, p, d)
