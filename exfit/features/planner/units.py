@@ -174,7 +174,7 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
                 or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
                 tuple(sorted(wrong, key=lambda fault: fault.line)),
                 first.bus_name,
-                _machine_alone(own),
+                None if faults else _machine_alone(own),  # what cannot be read may be its exciter
             )
         )
     return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical, devices)
