@@ -1,11 +1,11 @@
 """LCFB1: load controller of a turbine, with a bias of the frequency (WECC; PSS/E, PSLF).
 
-                                       emax          Irmax
-Pset ─────────────►(+)─►[band db]─►[clip]─┬─►[Ki]─►(+)─►[clip]─► to pref
-                   -▲              -emax  │  [s ]   ▲   -Irmax
-p ─►[Pbf/(1 + sTpelec)]                   └─►[Kp]───┘
-                    │
-dw ─►[Fbf Fb]───────┘
+                                           emax          Irmax
+Pset ─────────────────►(+)─►[band db]─►[clip]─┬─►[Ki]─►(+)─►[clip]─► to pref
+                       -▲              -emax  │  [s ]   ▲   -Irmax
+p ─►[Pbf/(1 + sTpelec)]─┤                     └─►[Kp]───┘
+                        │
+dw ─►[Fbf Fb]───────────┘
 
 Pset is the power at the start. What is added to the governor's reference is in
 its unit: a speed or a power. The integral has Irmax as a non-windup limit, too. A
