@@ -1,6 +1,6 @@
 """Fit twelve parameters of exciter, stabiliser, governor and machine to three events, many times.
 
-``python tests/studies/both_halves.py 100`` takes about 30 s for each draw of the noise. The records
+``python tests/studies/both_halves.py 100`` takes about 7 s for each draw of the noise. The records
 are those of tests/support/whole_unit_events.py, by another simulation; the start is a wrong
 baseline. Prints the seconds of processor, and how often the 95 % intervals hold the truth.
 ``--vt 2e-4`` is other noise of the voltage, which drives the unit.
