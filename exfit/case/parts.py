@@ -167,10 +167,10 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
             faults.append(Fault(place, text))
     added_models = (models["stabiliser"], models["governor"])
     found = Parts(exciter, machine, *added_models, tuple(parts), tuple(limiters.values()))
-    return _with_further(found, data, kind, named)
+    return _with_others(found, data, kind, named)
 
 
-def _with_further(found: Parts, data: Data, kind: PlantKind, named: Callable[..., Any]) -> Parts:
+def _with_others(found: Parts, data: Data, kind: PlantKind, named: Callable[..., Any]) -> Parts:
     """Return parts with the load controller of the governor, and with further units."""
     if "load_controller" in _mapping(data.get("governor")):
         from exfit.case.load_controller import with_load_controller

@@ -197,26 +197,8 @@ def _parameters(
 ) -> dict[str, FittedParameter]:
     rows, found = {row.symbol: row for row in governor.sheet}, {}
     for each in free:
-        row, known = rows.get(each.name), fit.confidence.parameters[each.name]
-        unit, meaning = MEANINGS[each.name] if row is None else (row.unit, row.meaning)
-        value = fit.values[each.name]
-        found[each.name] = FittedParameter(
-            value=value,
-            start=each.start,
-            min=each.low,
-            max=each.high,
-            at_bound=each.bound(value),
-            of_record=row is None,
-            std_error=known.std_error,
-            interval=known.interval,
-            interval_method=known.method,
-            why=known.why,
-            unit=unit,
-            meaning=meaning,
-            physical=row is None or row.is_physical(value),
-        )
-        if each.name in (LAG, SHARE):
-            found[each.name] = found[each.name].without_interval(STANDS_IN)
+        own = fit.parameter(each, rows.get(each.name), *MEANINGS.get(each.name, ("", "")))
+        found[each.name] = own.without_interval(STANDS_IN) if each.name in (LAG, SHARE) else own
     return found
 
 

@@ -13,8 +13,10 @@ from exfit.fitting.uncertainty import shared_reason
 from exfit.inference.confidence import Confidence, confidence, rises
 from exfit.inference.identifiability import Identifiability, identifiability
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
+from exfit.models.sheet import Parameter
 from exfit.results.intervals.determination import of_profiles
 from exfit.results.intervals.value_errors import first_order_shifts, widened_by
+from exfit.results.model import FittedParameter
 from exfit.util.arrays import Array
 from exfit.util.text import listed
 
@@ -132,6 +134,30 @@ class FittedPoints:
     def scatter(self, signal: str) -> float:
         """Return the standard deviation of a signal's weighted errors, less what was fitted."""
         return next(noise.estimated for noise in self.confidence.noise if noise.label == signal)
+
+    def parameter(
+        self, free: FreeParameter, row: Parameter | None, unit: str, meaning: str
+    ) -> FittedParameter:
+        """Return what was found of a free parameter; without a ``row`` of a sheet it is the test's.
+
+        ``unit`` and ``meaning`` are those of such a one.
+        """
+        value, known = self.values[free.name], self.confidence.parameters[free.name]
+        return FittedParameter(
+            value=value,
+            start=free.start,
+            min=free.low,
+            max=free.high,
+            at_bound=free.bound(value),
+            of_record=row is None,
+            std_error=known.std_error,
+            interval=known.interval,
+            interval_method=known.method,
+            why=known.why,
+            unit=unit if row is None else row.unit,
+            meaning=meaning if row is None else row.meaning,
+            physical=row is None or row.is_physical(value),
+        )
 
     @property
     def undetermined(self) -> tuple[str, ...]:

@@ -22,10 +22,7 @@ def steady_test_faults(test: ContentNode) -> Iterator[Fault]:
         yield columns.at(FIELDS[0]).fault(f"is missing: a column of {either}")
     for signal, column in columns.sections:
         base = column.at("base")
-        yield from _base_faults(column)
-        yield from _not_above_zero(base)
-        if column.at("scale").number == 0.0:
-            yield column.at("scale").fault("must not be 0")
+        yield from _conversion_faults(column)
         if signal in FIELDS:
             yield from _free_base_faults(base)
             continue
@@ -37,6 +34,14 @@ def steady_test_faults(test: ContentNode) -> Iterator[Fault]:
     if len(without_noise) < len(fields):
         for column in without_noise:
             yield column.at("noise").fault("is missing: the other one has it")
+
+
+def _conversion_faults(column: ContentNode) -> Iterator[Fault]:
+    """Yield what is wrong with unit, base and scale of a column."""
+    yield from _base_faults(column)
+    yield from _not_above_zero(column.at("base"))
+    if column.at("scale").number == 0.0:
+        yield column.at("scale").fault("must not be 0")
 
 
 def _base_faults(column: ContentNode) -> Iterator[Fault]:
@@ -113,12 +118,9 @@ def governor_test_faults(test: ContentNode) -> Iterator[Fault]:
         yield columns.at("gate").fault("give either gate or p beside speed")
     for _, column in columns.sections:
         base = column.at("base")
-        yield from _base_faults(column)
-        yield from _not_above_zero(base)
+        yield from _conversion_faults(column)
         if base.is_section:
             yield base.fault("must be a number")
-        for key in ("scale",) if column.at("scale").number == 0.0 else ():
-            yield column.at(key).fault("must not be 0")
         if "noise" in column:
             yield column.at("noise").fault(f"only allowed for {' or '.join(FIELDS)}")
 

@@ -294,23 +294,11 @@ def _parameters(
     rows = {row.symbol: row for row in fields.machine.sheet}
     fitted = {}
     for parameter in free:
-        row, known = rows.get(parameter.name), fit.confidence.parameters[parameter.name]
-        value, signal = fit.values[parameter.name], parameter.name.partition(".")[0]
-        fitted[parameter.name] = FittedParameter(
-            value=value,
-            start=parameter.start,
-            min=parameter.low,
-            max=parameter.high,
-            at_bound=parameter.bound(value),
-            of_record=row is None,
-            std_error=known.std_error,
-            interval=known.interval,
-            interval_method=known.method,
-            why=known.why,
-            unit=fields.points.measurements[signal].unit if row is None else row.unit,
-            meaning=f"1 pu of {signal}" if row is None else row.meaning,
-            physical=row is None or row.is_physical(value),
-        )
+        name, signal = parameter.name, parameter.name.partition(".")[0]
+        row, unit = rows.get(name), ""
+        if row is None:
+            unit = fields.points.measurements[signal].unit
+        fitted[name] = fit.parameter(parameter, row, unit, f"1 pu of {signal}")
     return fitted
 
 
