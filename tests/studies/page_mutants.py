@@ -64,7 +64,7 @@ def of_page(rng, given):
     for _ in range(ROUND):
         said = outcome(session, mutant(rng) if rng.random() < 0.2 else odd(rng))
         told.append(said.partition(":")[0])
-        if hasattr(session, "explorer"):
+        if session.view.explorer is not None:
             exfit.load_case(session.path)
     session.close()
     if beside.ident is not None:
