@@ -98,8 +98,8 @@ def field_on_load(
     machine's rotor axes); saturation as the machine's model has it.
     """
     active, reactive, voltage = (np.asarray(signal, np.float64) for signal in (p, q, vt))
-    terminals = Flow(active / voltage, reactive / voltage, voltage, np.zeros_like(voltage))
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # where a voltage is zero, too
+        terminals = Flow(active / voltage, reactive / voltage, voltage, np.zeros_like(voltage))
         ifd = loaded_at_rest(voltage, terminals, machine, Names(**data)).ifd
     return np.asarray(ifd, np.float64)
 

@@ -1,6 +1,7 @@
 """The field current on load: the textbook's closed form, and equations that are typed again."""
 
 import csv
+import warnings
 
 import numpy as np
 import pytest
@@ -42,6 +43,14 @@ def test_at_no_load_it_is_the_saturation_curve(machine):
     none = np.zeros(2)
     ifd = field_on_load(machine, data, none, none, np.array([1.0, 1.2]))
     assert ifd == pytest.approx([1.0 + 0.12, 1.2 * (1.0 + 0.45)], abs=1e-12)
+
+
+def test_without_a_voltage_there_is_no_rest(machine):
+    data, vt = typical(machine.sheet) | SATURATED, np.array([0.0, 1.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ifd = field_on_load(machine, data, np.array([0.2, 0.2]), np.array([0.1, 0.1]), vt)
+    assert np.isfinite(ifd).tolist() == [False, True]
 
 
 OF_ANDES = {
