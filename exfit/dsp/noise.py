@@ -4,7 +4,6 @@ from math import comb, sqrt
 from statistics import NormalDist
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from exfit.util.arrays import Array, distinct, median
 
@@ -36,7 +35,9 @@ def noise(samples: Array, order: int = 2) -> float:
             f"{len(samples)} samples: the noise is estimated from at least {order + 1}"
         )
     scatter = spread(np.diff(samples, order)) / sqrt(comb(2 * order, order))
-    lasting = median(sliding_window_view(samples, NEIGHBOURS), axis=-1)  # longer than a spike
+    before, at, after = samples[:-2], samples[1:-1], samples[2:]
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    lasting = np.minimum(np.maximum(at, low), high)  # medians of three: longer than a spike
     steps = np.diff(distinct(lasting))
     return max(float(scatter), UNIFORM_SPREAD * float(np.min(steps)) if len(steps) else 0.0)
 

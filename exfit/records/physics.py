@@ -240,8 +240,10 @@ def _law(time: Array, y: Array, x: Array) -> tuple[float, float, float]:
 
     Returns the slope, the share of what the line leaves of y that x explains, and its spread.
     """
-    line = np.column_stack([np.ones(len(time)), time - time[0]])
-    (beside_y, beside_x) = (v - line @ np.linalg.lstsq(line, v, rcond=None)[0] for v in (y, x))
+    along = time - np.mean(time)
+    along /= np.linalg.norm(along)
+    centred = (v - np.mean(v) for v in (y, x))
+    beside_y, beside_x = (v - (along @ v) * along for v in centred)
     power = float(beside_x @ beside_x)
     total = float(beside_y @ beside_y)
     if power <= 0.0 or total <= 0.0:
