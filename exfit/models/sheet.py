@@ -136,8 +136,8 @@ def sheet(*rows: Row | Parameter) -> Sheet:
     made: list[Parameter] = []
     for row in rows:
         if not isinstance(row, Parameter):
-            symbol, typical, unit, bounds, *described = row
-            row = Parameter(symbol, typical, unit, *bounds, *described)
+            symbol, typical, unit, (low, high), *described = row
+            row = Parameter(symbol, float(typical), unit, float(low), float(high), *described)
         made.append(row)
     return tuple(made)
 

@@ -85,12 +85,10 @@ def first_texts(texts: Sequence[str]) -> list[str]:
 def near(word: str, names: Iterable[str]) -> str:
     """Return a hint at the name that is meant by a word, or at all names."""
     all_names = list(names)
-    meant = None
     if len(all_names) <= MOST_COMPARED:
+        if meant := closest(word, all_names):
+            return f"did you mean {meant}?"
         all_names = list({name.casefold(): name for name in all_names}.values())
-        meant = closest(word, all_names)
-    if meant is not None:
-        return f"did you mean {meant}?"
     more = len(all_names) - MOST_NAMES
     return f"known: {', '.join(all_names[:MOST_NAMES])}{f' ... and {more:,} more' * (more > 0)}"
 
@@ -99,9 +97,11 @@ def closest(word: str, names: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Return the name that is nearly a word, None where none is by a share of ``cutoff``."""
     import difflib
 
-    folded = {name.casefold(): name for name in names}
+    known = list(names)
+    folded = [name.casefold() for name in known]
     close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=cutoff)
-    return folded[close[0]] if close else None
+    alike = [name for name, one in zip(known, folded, strict=True) if one in close]
+    return max(alike, key=lambda name: sum(letter in word for letter in name), default=None)
 
 
 def printable(text: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
-from exfit.errors import SimulationError
+from exfit.errors import CaseError, SimulationError
 from exfit.fitting.channel_weights import (
     MOST_SEARCHES,
     as_fitted,
@@ -108,10 +108,15 @@ def on_finer_grid(state: SearchState) -> SearchState:
     x, fitted = state.found.best.x, state.fitted
     values = state.problem.residuals.values(x)
     fine = tuple(setup.with_enough_substeps(values) for setup in fitted)
-    check_memory(state.case, [setup.experiment for setup in fine])
     steps = [[setup.experiment.simulator.step for setup in setups] for setups in (fitted, fine)]
     if steps[0] == steps[1]:
         return state
+    try:
+        check_memory(state.case, [setup.experiment for setup in fine])
+    except CaseError as fault:  # what was found is kept
+        note = f"not simulated with the shorter steps that simulation.accuracy needs: {fault}"
+        notes = (*state.found.notes, note)
+        return replace(state, searched=state.found._replace(notes=notes))
     residuals = with_setups(state.problem, fine).residuals
     problem = FitProblem(residuals, compressed(residuals, x))
     searched = state.continued(problem, state.found, x, ON_FINER_GRID)

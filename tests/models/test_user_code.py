@@ -23,6 +23,13 @@ def trap(folder):
     return f"from pathlib import Path\nPath({str(folder)!r}, 'run').touch()\n"
 
 
+def test_a_number_of_a_sheet_that_no_float_holds_is_refused(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(SOURCE.read_text().replace("(0.000001,", f"({10**400},", 1))
+    with pytest.raises(ModelError, match=r"own\.py: OverflowError: int too large"):
+        from_file(path)
+
+
 @pytest.fixture
 def case(tmp_path, monkeypatch):
     """A case with a model of its own and a record, in the working folder."""

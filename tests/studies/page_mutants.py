@@ -1,4 +1,4 @@
-"""Send the page of exfit app 10,000 mutants of its messages; count what it answers. Takes 10 min.
+"""Send the page of exfit app 10,000 mutants of its messages; count what it answers. Takes a minute.
 
 python tests/studies/page_mutants.py
 

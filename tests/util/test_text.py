@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mutant_runs import CONTROL
 
-from exfit.util.text import percentage, printable, rounded
+from exfit.util.text import near, percentage, printable, rounded
 
 TEXTS = st.text(st.one_of(st.characters(), st.sampled_from("\x00\x1b\x7f\x9b\u202e\u2066\r\n\t\\")))
 
@@ -43,3 +43,8 @@ def test_a_percentage_has_two_decimals():
         "999999.00",
     ]
     assert percentage(float("nan")) == "nan"
+
+
+@pytest.mark.parametrize(("word", "meant"), [("RR", "R"), ("rr", "r"), ("Tpd", "TPD0"), ("R", "R")])
+def test_a_hint_at_a_name_is_at_the_one_in_the_same_case(word, meant):
+    assert near(word, ["r", "R", "TPD0"]) == f"did you mean {meant}?"

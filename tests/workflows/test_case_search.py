@@ -9,8 +9,11 @@ from tiers import examples_of, few_of
 import exfit
 from exfit import estimate
 from exfit.case.load import load_case
+from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import fitted
+from exfit.util.vocabulary import ON_FINER_GRID
+from exfit.workflows import case_search
 from exfit.workflows.case_search import judge_of
 
 RNG = np.random.default_rng(3)
@@ -51,6 +54,24 @@ def test_noise_and_a_validation_that_holds_leave_no_doubt():
     assert doubt(TRUTH + NOISE[0]) == ""
     assert doubt(TRUTH + NOISE[0], 2.0 - TRUTH + NOISE[1]) == ""
     assert doubt(TRUTH) == ""  # an error that no recorder shows
+
+
+def test_a_fit_is_kept_whose_shorter_steps_need_more_memory(monkeypatch):
+    """A slow start needs steps of 10 ms; the response found is ten times as fast."""
+    time, fast = np.linspace(0.0, 2.0, 401), 20.0
+    truth = np.where(time < 0.5, 0.0, 2.0 - 2.0 * np.exp(-fast * (time - 0.5)))
+    content = {**FIRST_ORDER, "simulation": {}}
+    case = exfit.Case.from_dict(content, {"fit": exfit.Record.from_arrays(time, {"vt": truth})})
+    assert ON_FINER_GRID in [line.phase for line in exfit.fit(case).history]
+
+    def refuse(*_):
+        raise CaseError("the limit is 2 GB")
+
+    monkeypatch.setattr(case_search, "check_memory", refuse)
+    result = exfit.fit(case)
+    assert ON_FINER_GRID not in [line.phase for line in result.history]
+    assert result.parameters["a"].value == pytest.approx(fast, rel=1e-3)
+    assert any("shorter steps" in note and "2 GB" in note for note in result.notes)
 
 
 def test_an_error_that_is_not_noise_casts_doubt():

@@ -29,7 +29,7 @@ from exfit.features.design.candidates import (
     Stage,
     extremes_of,
 )
-from exfit.features.design.experiment_design import noise_levels, refuse_noise
+from exfit.features.design.experiment_design import comparable, noise_levels, refuse_noise
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Channel, Experiment, with_enough_substeps
 from exfit.fitting.memory import check_memory
@@ -202,11 +202,14 @@ def _bench(
     free = free_parameters(case)
     setups = build_experiments(case) if case.recordings else ()
     own = setups[0].experiment if setups else planned(case)
+    possible = comparable(case, [own])
+    if lacking := [signal for signal in channels if signal not in possible]:
+        raise CaseError(f"channels: {', '.join(lacking)}: not of this plant, which has no governor")
     noise_of = noise_levels(own, noise)
     candidates = tuple(
         Channel(signal, np.zeros(0), weight=1.0 / noise_of[signal])
-        for signal in case.kind.compared
-        if signal in (channels or case.kind.compared)
+        for signal in possible
+        if signal in (channels or possible)
     )
     starts = {parameter.name: parameter.start for parameter in free}
     fixed = {name: value for name, value in case.values().items() if name not in starts}

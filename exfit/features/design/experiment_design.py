@@ -224,8 +224,14 @@ def _variants(case: Case, own: Sequence[Experiment]) -> Iterator[tuple[str, list
 def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
     """Return the signals that are recorded, then those that could be."""
     present = [signal for experiment in own for signal in experiment.signals]
-    possible = case.kind.compared if case.kind.closed_loop else ()
+    possible = comparable(case, own) if case.kind.closed_loop else ()
     return tuple(dict.fromkeys([*present, *possible]))
+
+
+def comparable(case: Case, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Return the signals that a record of a case could have; the gate only of a governor."""
+    outputs = set[str]().union(*(each.simulator.system.outputs for each in experiments))
+    return tuple(signal for signal in case.kind.compared if signal in outputs)
 
 
 def _scaled(experiment: Experiment, size: float) -> Experiment:

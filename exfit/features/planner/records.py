@@ -431,6 +431,8 @@ def _knee_above(values: Mapping[str, float]) -> float | None:
     VX = B (E - A)^2 through both points is 0 below A, which then lies above them.
     """
     for low, high in pairwise(saturation_points(values)):
+        if min(low.e * low.se, high.e * high.se) < 0.0:
+            continue  # no data of a curve: refused where they are checked
         before, behind = sqrt(low.e * low.se), sqrt(high.e * high.se)
         if before > behind and low.e < high.e:
             return (high.e * before - low.e * behind) / (before - behind)

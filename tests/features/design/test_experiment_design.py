@@ -10,6 +10,7 @@ from records import UNIT, case_of, found_in, recording, several
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError
+from exfit.features.design.designed_test import design_test
 from exfit.features.design.experiment_design import identify
 from exfit.signals import NOISE
 from exfit.workflows import fit
@@ -147,6 +148,17 @@ def test_a_case_without_a_record_is_planned_on_its_own_clock(plain):
     assert (times[0], times[-1]) == (0.0, 10.0)
     assert list(plans(design)) == ["2 %", "5 %", "10 %", "longer", "+ efd", "+ ifd", "+ all"]
     assert design.noise == OFF_LINE
+
+
+def test_a_unit_without_a_governor_shows_no_gate(changed):
+    """On load, with what a governor moves among the signals that a plant may show."""
+    case = changed("ac8b_on_line", estimate={"search": "local"})
+    assert "gate" in case.kind.compared
+    shown = plans(identify(case, {}))
+    assert "+ speed" in shown
+    assert "+ gate" not in shown
+    with pytest.raises(CaseError, match="channels: gate: not of this plant"):
+        design_test(case, channels=["gate"])
 
 
 def test_a_plant_without_a_network_has_no_other_tests():

@@ -308,6 +308,12 @@ def test_buses_by_their_names_have_the_numbers_of_a_power_flow_file():
             read_unit(text, "unit.dyr", None, None, known)
 
 
+@pytest.mark.parametrize("points", ["3.14 -.03 4.18 .1", "-3.14 .03 4.18 .1", "3.14 .3 4.18 -.1"])
+def test_a_saturation_of_a_negative_value_is_refused(points):
+    with pytest.raises(DynamicsError, match=r"(E1|SE1|SE2)"):
+        read_unit(replaced("3.14 .03 4.18 .1", points), "unit.dyr")
+
+
 @pytest.mark.parametrize("points", ["0 0 0 0", "0 0 4.18 .1"])
 def test_a_saturation_of_zero_at_no_voltage_is_read_as_it_stands(points):
     values = read_unit(replaced("3.14 .03 4.18 .1", points), "unit.dyr").exciter.values
