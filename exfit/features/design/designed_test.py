@@ -202,22 +202,25 @@ def _bench(
     free = free_parameters(case)
     setups = build_experiments(case) if case.recordings else ()
     own = setups[0].experiment if setups else planned(case)
-    possible = comparable(case, [own])
-    if lacking := [signal for signal in channels if signal not in possible]:
-        raise CaseError(f"channels: {', '.join(lacking)}: not of this plant, which has no governor")
-    noise_of = noise_levels(own, noise)
-    candidates = tuple(
-        Channel(signal, np.zeros(0), weight=1.0 / noise_of[signal])
-        for signal in possible
-        if signal in (channels or possible)
-    )
     starts = {parameter.name: parameter.start for parameter in free}
     fixed = {name: value for name, value in case.values().items() if name not in starts}
     of_records = {row.name: row.start for setup in setups for row in setup.free}
     base = _at_levels(case, own, of_records, {**fixed, **starts})
     chosen = tuple(k for k, parameter in enumerate(free) if parameter.name in (of or starts))
     problem = Residuals([base], free, fixed, case.ties)
+    candidates = _candidates(case, own, channels, noise_levels(own, noise))
     return Bench(base, problem, candidates, chosen, criterion, limits)
+
+
+def _candidates(
+    case: Case, own: Experiment, channels: Sequence[str], noise: Mapping[str, float]
+) -> tuple[Channel, ...]:
+    """Return the channels that may be recorded; CaseError for one that the plant lacks."""
+    possible = comparable(case, [own])
+    if lacking := [signal for signal in channels if signal not in possible]:
+        raise CaseError(f"channels: {', '.join(lacking)}: not of this plant, which has no governor")
+    wanted = (signal for signal in possible if signal in (channels or possible))
+    return tuple(Channel(signal, np.zeros(0), weight=1.0 / noise[signal]) for signal in wanted)
 
 
 def _at_levels(
