@@ -220,7 +220,8 @@ def governor_sections(inspection: Inspection, file: str, bases: Mapping[str, Bas
         network = {"f0": f0, "R": 0.0, "X": Noted(QUESTION, "pu, reactance to the source")}
         network |= {"P": Noted(level, "pu of the machine, before"), "Q": Noted(QUESTION, "pu")}
         plant = {"type": Noted(INFINITE_BUS.name, "on load"), "network": network}
-    channels = channels_section(inspection, OF_GOVERNOR_TEST, bases)
+    driving = GOVERNOR_PLAYBACK.driving if kind == FOLLOWING else ()
+    channels = channels_section(inspection, OF_GOVERNOR_TEST, bases, driving)
     if inspection.channel_of("vt") is None:
         channels.pop("vt", None)
     test = {} if kind == FOLLOWING else {"test": _governor_test(inspection, level)}
@@ -261,11 +262,15 @@ def _per_unit_level(inspection: Inspection, signal: str) -> float | str:
 
 
 def channels_section(
-    inspection: Inspection, only: tuple[str, ...], bases: Mapping[str, Base]
+    inspection: Inspection,
+    only: tuple[str, ...],
+    bases: Mapping[str, Base],
+    driving: tuple[str, ...] = (),
 ) -> Section:
     """Suggest the entries of all channels, with what to check above each.
 
-    What is not compared is a comment; a recorded reference drives the simulation.
+    What is not compared is a comment; a recorded reference drives the simulation, as those do that
+    are ``driving``.
     """
     loaded = is_on_load(inspection.channels)
     section = _voltage(inspection, bases.get("vt"))
@@ -273,7 +278,7 @@ def channels_section(
         channel = inspection.channel_of(signal)
         if channel is None or (signal in OF_EVENT and signal not in only):
             continue
-        drives = channel is inspection.reference
+        drives = channel is inspection.reference or signal in driving
         compared = signal in only and (signal != SPEED or loaded)
         base = bases.get(signal)
         scale = None if base is not None else scale_to_find(channel, inspection.channels)

@@ -108,7 +108,7 @@ def _driving(inspection: Inspection, bases: Mapping[str, Base]) -> Section:
     which = Noted({"column": QUESTION}, "which column is it?")
     section: Section = {"vt": which}
     if voltage is not None:
-        section["vt"] = channel_entry(voltage, bases.get("vt"))
+        section["vt"] = channel_entry(voltage, bases.get("vt"), drives=True)
     if angle is not None:
         unit = angle.unit or unit_by_range(inspection.samples[angle.name]) or QUESTION
         why = "deg or rad" if unit == QUESTION else "by its range" if angle.unit is None else ""

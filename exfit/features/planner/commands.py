@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from exfit.features.planner.fitted_file import ChangedValue, FittedUnit, LeftUnit
     from exfit.features.planner.import_all import ImportedUnits
 
-MOST_BUSES = 999_999
+MOST_BUSES, DIGITS = 999_999, 20
 CONNECTIONS, ANGLE_UNITS = ("phase-to-ground", "phase-to-phase"), ("deg", "rad")
 BUSES = click.IntRange(1, MOST_BUSES)
 
@@ -39,7 +39,8 @@ def _number_or_name(
 ) -> int | str | None:
     """Return the number of a bus where the text is one."""
     if value is not None and value.lstrip("-").isdecimal():
-        return int(BUSES.convert(int(value), option, context))
+        begins = int(value[:DIGITS])  # of a longer one, out of the range too
+        return int(BUSES.convert(begins, option, context))
     return value
 
 

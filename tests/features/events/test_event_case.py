@@ -69,6 +69,18 @@ def test_a_table_with_an_angle_and_no_reference_is_an_event_too(tmp_path):
     assert not RecordSettings().inspect(write_table(tmp_path / "other.csv", columns)).is_event
 
 
+def test_spikes_are_left_out_of_what_is_compared_and_not_of_what_drives(tmp_path):
+    course, rng = smooth_course(slip=0.3), np.random.default_rng(2)
+    columns = {"t": course.time, "vt": course.vt, "p": course.p, "q": course.q}
+    for name in ("vt", "p", "q"):
+        columns[name] = columns[name] + 1e-5 * rng.standard_normal(len(course.time))
+        columns[name][60] += 0.05
+    columns["angle"] = np.degrees(course.angle) % 360.0
+    _, content = section(RecordSettings().inspect(write_table(tmp_path / "e.csv", columns)), {})
+    assert content["channels"]["p"] == {"column": "p", "outliers": 6.0}
+    assert content["channels"]["vt"] == "vt"
+
+
 @pytest.mark.parametrize("moved_by", ["grid", "reference", "line"])
 def test_a_frequency_shows_an_event_where_q_falls_as_the_voltage_rises(tmp_path, moved_by):
     """Or where p moves more than q, as behind the loss of a line, and not if a reference moves."""

@@ -34,6 +34,13 @@ from exfit.workflows import fit
 WIDTH = 80
 
 
+def test_a_bus_of_more_digits_than_python_reads_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["import", "unit.dyr", "--bus", "1" * 5000], prog_name="exfit")
+    assert ended.value.code == 2
+    assert "is not in the range 1<=x<=999999" in capsys.readouterr().err
+
+
 @pytest.fixture(autouse=True)
 def workplace(empty_folder):
     """Work in a folder that holds nothing but unit.dyr."""
