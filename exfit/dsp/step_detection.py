@@ -129,8 +129,11 @@ def first_step(time: Array, samples: Array) -> DetectedStep | None:
         return None
 
 
-def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
+def find_steps(time: Array, samples: Array, shaped: bool = True) -> tuple[DetectedStep, ...]:
     """Find all steps of a reference in its response (M,), of which ``find_step`` finds the first.
+
+    Where they are not ``shaped`` their instants are not sought by the shape of the rise: the errors
+    are those of any shape, in a third of the time.
 
     The next one is looked for where the response to the one before has settled; what is slower than
     a fifth of that one passes for its settling. A pulse, which stands for a while and then returns,
@@ -143,10 +146,10 @@ def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
     while True:
         t, y = time[first:], samples[first:]
         try:
-            step, rest = _step(t, y)
+            step, rest = _step(t, y, shaped)
             steps.append(step)
         except ReturnsError as fault:
-            pulse, rest = _pulse(t, y)
+            pulse, rest = _pulse(t, y, shaped)
             steps += pulse
             returns += [] if pulse else [fault]
             if len(returns) > MOST_RETURNS:
@@ -238,7 +241,7 @@ def _left_rest(time: Array, samples: Array) -> _LeftRest:
     return _LeftRest(smooth, scatter, level, far, left, gone)
 
 
-def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
+def _step(time: Array, samples: Array, shaped: bool = True) -> tuple[DetectedStep, int]:
     """Find the first step, and the place where the response to it has settled."""
     rest = _left_rest(time, samples)
     moves_until, start, end = _settled(rest)
@@ -246,12 +249,12 @@ def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
     if abs(size) < rest.far:
         begin = f"what begins at {time[rest.left]:g} s"
         raise ReturnsError(f"no step: {begin} leaves no lasting change")
-    sets_out = _onset(time, samples, rest, max(start, rest.gone))
+    sets_out = _onset(time, samples, rest, max(start, rest.gone), shaped)
     until = float(time[moves_until])
     return DetectedStep(sets_out.at, sets_out.error, size, rest.level, until), start
 
 
-def _pulse(time: Array, samples: Array) -> tuple[list[DetectedStep], int]:
+def _pulse(time: Array, samples: Array, shaped: bool) -> tuple[list[DetectedStep], int]:
     """Find the two steps of a response that returns, and the place where it has settled.
 
     There is none where it does not stand between them for as long as ``STANDS_FOR`` and
@@ -265,8 +268,8 @@ def _pulse(time: Array, samples: Array) -> tuple[list[DetectedStep], int]:
     t, y = time[reached : end + 1], samples[reached : end + 1]
     try:
         top = _left_rest(t, y)
-        back, _ = _step(t, y)
-        sets_out = _onset(time, samples, rest, peak)
+        back, _ = _step(t, y, shaped)
+        sets_out = _onset(time, samples, rest, peak, shaped)
     except ValueError:
         return [], settled
     stands = top.left >= STANDS_FOR * (top.gone - top.left)
@@ -276,7 +279,7 @@ def _pulse(time: Array, samples: Array) -> tuple[list[DetectedStep], int]:
     return [DetectedStep(sets_out.at, sets_out.error, size, rest.level, until), back], settled
 
 
-def _onset(time: Array, samples: Array, rest: _LeftRest, last: int) -> Onset:
+def _onset(time: Array, samples: Array, rest: _LeftRest, last: int, shaped: bool = True) -> Onset:
     """Find when a response sets out, by its samples up to the ``last``.
 
     Raises ValueError where too few of them are before.
@@ -286,7 +289,7 @@ def _onset(time: Array, samples: Array, rest: _LeftRest, last: int) -> Onset:
     peak = _first_peak(np.abs(rest.smooth[: last + 1] - rest.level), rest.gone)
     # what is slower than noise from sample to sample moves an instant as well
     at_rest = float(spread(clean[max(rest.left - LONGEST_REST, 0) : rest.left + 1]))
-    sets_out = onset(time, clean, rest.level, peak, max(rest.scatter, at_rest))
+    sets_out = onset(time, clean, rest.level, peak, max(rest.scatter, at_rest), shaped)
     if sets_out.at < time[SAMPLES_AT_REST - 1]:
         raise _early(time)
     return sets_out
@@ -341,7 +344,9 @@ def _settled(rest: _LeftRest) -> tuple[int, int, int]:
 # ---- the onset
 
 
-def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) -> Onset:
+def onset(
+    time: Array, samples: Array, level: float, peak: int, scatter: float, shaped: bool = True
+) -> Onset:
     """Find the interval in which a response (M,) sets out from its rest.
 
     The rise is compared with the step responses of chains of one to four equal lags, from a jump
@@ -355,11 +360,15 @@ def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) 
         level: where they rest.
         peak: the sample at which the first move ends.
         scatter: the standard deviation of the noise.
+        shaped: compare shapes; without, the interval is the one in which instants are tried.
     """
     whole = 0.0
     for rest_end, end in _rises(np.abs(samples[: peak + 1] - level), scatter):
         rise = float(time[end] - time[rest_end])
         whole = max(whole, rise)
+        if not shaped:
+            earliest = max(float(time[rest_end]) - SOUGHT_BEFORE * rise, float(time[0]))
+            return Onset(earliest, float(time[end]))
         first = int(np.searchsorted(time, time[rest_end] - COMPARED_REST * rise))
         window = slice(max(min(first, rest_end - FEWEST_RESTING), 0), end + 1)
         block = -(-(window.stop - window.start) // MOST_SAMPLES)

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -25,6 +26,7 @@ SAME_STEP = 0.25  # s: channels may show one step this far apart, beside their e
 SAME_STEP_ERRORS = 1.5  # times these errors
 INSTANT_WITHIN = 0.25  # s: how far the instant may be from where a record shows the step
 SIZE_WITHIN = 0.5  # of the size that a record shows: how far the size may be from it
+MOST_SHAPED = 100  # channels whose instants are sought by the shape of a rise, the clearest ones
 MOST_LEVELS = 12  # of a signal that switches
 SURELY = 2.0  # times the error of an instant: it does not lie beyond
 REST_BEFORE = 2.0  # s: so long a rest before a step is looked at for what sets out with it
@@ -93,7 +95,7 @@ def steps_of_record(
         references: names of recorded references.
         recognised: names of signals of a test.
     """
-    own = {name: _steps_of_channel(time, y, name in references) for name, y in signals.items()}
+    own = _steps_of_channels(time, signals, references, recognised)
     if not _some_step(own):
         own = {name: _from_start(time, signals[name], channel) for name, channel in own.items()}
     heard = {name: channel for name, channel in own.items() if name in recognised}
@@ -111,6 +113,27 @@ def steps_of_record(
             changes.append(replace(change, size=step.sizes.get(name, change.size)))
         own[name] = replace(channel, changes=tuple(changes))
     return StepsOfRecord(steps, own)
+
+
+def _steps_of_channels(
+    time: Array,
+    signals: Mapping[str, Array],
+    references: Collection[str],
+    recognised: Collection[str],
+) -> dict[str, ChannelSteps]:
+    """Find the steps of each signal, with instants by shapes of those alone that are clearest."""
+
+    def rank(name: str) -> tuple[bool, float]:
+        sizes = (abs(change.size) / (own[name].noise or inf) for change in own[name].changes)
+        return name in recognised, max(sizes, default=0.0)
+
+    few = len(signals) <= MOST_SHAPED
+    own = {name: _steps_of_channel(time, y, name in references, few) for name, y in signals.items()}
+    if not few:
+        showing = sorted((name for name in own if own[name].changes), key=rank, reverse=True)
+        for name in showing[:MOST_SHAPED]:
+            own[name] = _steps_of_channel(time, signals[name], name in references)
+    return own
 
 
 def _some_step(channels: Mapping[str, ChannelSteps]) -> bool:
@@ -131,7 +154,9 @@ def bounds_about(value: float, share: float = SIZE_WITHIN) -> tuple[float, float
 # ---- one channel
 
 
-def _steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSteps:
+def _steps_of_channel(
+    time: Array, samples: Array, reference: bool, shaped: bool = True
+) -> ChannelSteps:
     t, y = present_samples(time, samples)
     if not len(y):
         return ChannelSteps(remark="every sample is missing")
@@ -158,7 +183,7 @@ def _steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSt
         return ChannelSteps(changes)
     noise, block = noise_of(y), -(-len(y) // COARSE_SAMPLES)
     try:
-        steps = find_steps(*block_medians(t, y, block))
+        steps = find_steps(*block_medians(t, y, block), shaped)
     except ValueError as fault:
         early = isinstance(fault, MovesFromStartError)
         return ChannelSteps(remark=str(fault), moves_from_start=early, responds=True, noise=noise)

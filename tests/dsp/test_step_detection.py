@@ -188,6 +188,18 @@ def test_all_steps_are_found_in_their_order_and_no_others(reference, steps):
     assert detected_steps[0] == find_step(time, vt)
 
 
+@every_reference
+@pytest.mark.parametrize("scatter", [1e-6, 1e-4, 2e-3])
+def test_without_the_shape_of_the_rise_the_same_step_is_found_less_surely(reference, scatter):
+    time = np.arange(0.0, 20.0, 0.01)
+    vt = 1.0 + response(time, reference, 0.05, 5.0)
+    noisy = vt + np.random.default_rng(12).normal(0.0, scatter, time.size)
+    (shaped,), (plain,) = find_steps(time, noisy), find_steps(time, noisy, shaped=False)
+    assert abs(plain.at - 5.0) <= plain.error
+    assert plain.at - plain.error <= shaped.at <= plain.at + plain.error
+    assert (plain.size, plain.level, plain.until) == (shaped.size, shaped.level, shaped.until)
+
+
 def test_a_slow_drift_before_the_step_is_not_the_step():
     time = np.arange(0.0, 20.0, 0.01)
     vt = 1.0 + 2e-3 * np.exp(-time) + response(time, "reference_ac1a", 0.05, 5.0)

@@ -8,6 +8,7 @@ from tiers import few_of
 from exfit.features.start.starting_tests import starting_tests
 from exfit.records.inspection import inspect
 from exfit.records.recorded_tests import tests_of as recorded_tests
+from exfit.records.steps import MOST_SHAPED, steps_of_record
 
 TIME = np.arange(0.0, 40.0, 0.02)
 UP, DOWN = 3.2, 20.0  # s
@@ -57,6 +58,24 @@ def test_a_column_that_is_no_signal_moves_no_step(seed):
     assert beside.channel_of("frequency").name == "f"
     for step, other in zip(alone.steps, beside.steps, strict=True):
         assert (step.at, step.error, step.seen_in) == (other.at, other.error, other.seen_in)
+
+
+def test_of_many_channels_the_clearest_say_when_a_step_was_made():
+    """By the shapes of their rises; the others show the same steps within wider errors."""
+    rng = np.random.default_rng(59)
+    clear = {f"c{k}": moved(UP, 0.3) + rng.normal(0.0, 1e-4, len(TIME)) for k in range(MOST_SHAPED)}
+    faint = {f"d{k}": moved(UP, 1.0) + rng.normal(0.0, 5e-3, len(TIME)) for k in range(20)}
+    alone, together = (steps_of_record(TIME, each) for each in (clear, {**clear, **faint}))
+    (step,), (other,) = alone.steps, together.steps
+    assert (step.at, step.error) == (other.at, other.error)
+    assert abs(other.at - UP) <= other.error
+    for name in clear:
+        assert together.channels[name] == alone.channels[name]
+    by_shape = steps_of_record(TIME, faint).channels
+    for name in faint:
+        (change,), (shaped,) = together.channels[name].changes, by_shape[name].changes
+        assert change.error >= shaped.error
+        assert abs(change.at - UP) <= change.error
 
 
 def sizes(inspection, size):
