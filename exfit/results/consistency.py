@@ -29,6 +29,9 @@ def contradictions(result: FitResult) -> Iterator[str]:
     if any(not error.shifts.keys() <= result.parameters.keys() for error in given.values()):
         yield "knowledge: given_errors: what they move are not the parameters of the fit"
     if result.knowledge is not None:
+        known = result.knowledge.confidence.parameters.keys()
+        if known != result.parameters.keys():
+            yield "knowledge: confidence: its parameters are not those of the fit"
         yield from (f"knowledge: {text}" for text in _of_knowledge(result.knowledge))
 
 

@@ -90,6 +90,14 @@ def test_a_comparison_without_a_channel_is_refused_wherever_it_is(saved):
             load_result(written(saved, **changes))
 
 
+def test_errors_of_another_fit_are_refused(saved):
+    _, content = saved
+    known = content["knowledge"]["confidence"]["parameters"]
+    known["other"] = known.pop("k")
+    with pytest.raises(ExfitError, match="confidence: its parameters are not those of the fit"):
+        load_result(written(saved))
+
+
 def test_a_file_of_another_version_is_refused_with_what_to_do(saved):
     path, content = saved
     with pytest.raises(ExfitError, match=f"version: {VERSION + 1}: written by a later exfit"):
