@@ -1,15 +1,17 @@
 """A unit in the network of InterPSS's single-machine cases, as PowerWorld and PSS/E ran them.
 
-Bus 1 with the unit, j0.1 to bus 2 with a load of 1 + j0.5, j0.05 to a stiff source; per unit of 100
-MVA, the base of the machine. The disturbance is a fault of j0.2 at bus 1 for 50 ms, or a pulse of
-the reference. PowerWorld multiplies the voltage behind the stator by the speed and has a load of
-constant admittance, as PSS/E has unless the case says ``"load": "power"``. The plant infinite-bus
-has this network.
+Bus 1 with the unit, j0.1 to bus 2 with a load of 1 + j0.5, j0.05 to a source; per unit of 100
+MVA, the base of the machine. The source is a GENCLS whose H of 99999 s swings against that of the
+unit: p is 8e-6 off with a stiff one. The disturbance is a fault of j0.2 at bus 1 for 50 ms, or a
+pulse of the reference. PowerWorld multiplies the voltage behind the stator by the speed and has a
+load of constant admittance, as PSS/E has unless the case says ``"load": "power"``. The plant
+infinite-bus has this network, but for the swing of the source.
 """
 
 import csv
 import json
 from contextlib import nullcontext
+from dataclasses import replace
 from itertools import pairwise
 from unittest.mock import patch
 
@@ -46,6 +48,7 @@ MACHINE_RECORD = """\
 BASE = 100.0  # MVA of the machine
 P, Q = 0.50001, 0.01251  # at bus 1, whose voltage is 1
 LINE, SOURCE, SHUNT, LOAD = 0.1, 0.05, 0.2, (1.0, 0.5)  # X, X, X, P and Q
+SOURCE_H = 99999.0  # s
 FAULT = (0.05, 0.10)  # s
 STEP = 5e-4  # s, of both programs too
 
@@ -114,6 +117,34 @@ def by_the_last_saturation():
         return at, i
 
     return patch.object(loaded, "connected", connected)
+
+
+def swinging(system):
+    """Return the system of a unit whose source is a machine of constant power, as GENCLS is."""
+
+    def rest(p):
+        at = system.rest(p)
+        return at._replace(states={**at.states, "source.dw": 0.0, "source.angle": 0.0})
+
+    def motion(p, r, x, u):
+        at = system.motion(p, r, x, {**u, "angle": x["source.angle"]})
+        vt, power, reactive = (at.outputs[signal] for signal in ("vt", "p", "q"))
+        with_fault = reactive + u.get("fault_B", 0.0) * vt * vt
+        ahead, aside = vt - LINE * with_fault / vt, LINE * power / vt
+        load = p.get(f"{NETWORK}PL", 0.0)
+        load = load + p.get(f"{NETWORK}YP", 0.0) * (ahead * ahead + aside * aside)
+        surplus = (LOAD[0] - p[f"{NETWORK}P"]) - (load - power)
+        slopes = {"source.dw": surplus / (2.0 * SOURCE_H)}
+        slopes["source.angle"] = 2.0 * np.pi * p[f"{NETWORK}f0"] * x["source.dw"]
+        return at._replace(slopes={**at.slopes, **slopes})
+
+    return replace(
+        system,
+        states=(*system.states, "source.dw", "source.angle"),
+        inputs=tuple(name for name in system.inputs if name != "angle"),
+        rest=rest,
+        motion=motion,
+    )
 
 
 class TwoBuses:
@@ -189,12 +220,16 @@ class TwoBuses:
     @property
     def system(self):
         """The unit in its network."""
+        return swinging(self.behind_a_source((*self.moved, "angle")))
+
+    def behind_a_source(self, moved):
+        """Return the unit in its network, whose source has what these inputs say."""
         unit = self.unit
         return infinite_bus.__wrapped__(
             unit.exciter,
             unit.machine,
             unit.saturation,
-            self.moved,
+            moved,
             "Q",
             unit.stabiliser,
             unit.dialect,
@@ -220,13 +255,16 @@ class TwoBuses:
         size = {"vref": self.pulse} if self.pulse else {"fault_B": -1.0 / SHUNT}
         return {**dict.fromkeys(self.moved, 0.0), **(size if on else {})}
 
-    def stepped(self, times):
-        """Return the same by Heun's rule, in steps that a switching divides."""
+    def stepped(self, times, held=lambda t, states: {}):
+        """Return the same by Heun's rule, in steps that a switching divides.
+
+        ``held`` gives further inputs from time and states, for each step anew.
+        """
         system, shown = self.system, {}
         states, setpoints = system.rest(self.values)
         ends = np.union1d(np.arange(0.0, max(times) + 2 * self.step, self.step).round(9), FAULT)
         for start, end in pairwise(ends):
-            inputs = self.moved_at(start)
+            inputs = self.moved_at(start) | held(start, states)
             now = system.motion(self.values, setpoints, states, inputs)
             shown[round(start, 6)] = now.outputs
             ahead = {x: states[x] + (end - start) * now.slopes[x] for x in states}
@@ -288,6 +326,11 @@ class BehindALine(TwoBuses):
         self.moves = {name: after[name] - before[name] for name in before}
         self.angles, self.moved = (before["angle"], after["angle"]), ("vref", *self.moves)
 
+    @property
+    def system(self):
+        """The unit behind its line."""
+        return self.behind_a_source(self.moved)
+
     def sources(self):
         """Yield E, its angle to bus 1, R and X that bus 2 sees, before the line opens and then."""
         load = np.conj(self.LOAD) / self.V3**2
@@ -326,6 +369,52 @@ class BehindALine(TwoBuses):
         """Return the same in the program's own steps."""
         shown = super().repeated(times)
         return [self.with_degrees(*row) for row in zip(times, shown, strict=True)]
+
+
+def wesgov_of_a_held_error():
+    """Return WESGOV as PowerWorld 24 has it between two samples: pref is the error, 0 at rest."""
+
+    def equations(s, u, p, d):
+        _, d.PE = lag(u.p, s.PE, 1.0, p.TPE)
+        d.INTEG = u.pref / p.TI
+        valve, d.VALVE = lag(p.KP * u.pref + s.INTEG, s.VALVE, 1.0, p.T1)
+        power, d.PM = lag(valve, s.PM, 1.0, p.T2)
+        return power
+
+    def rest(pm, u, p, x):
+        x.PE, x.INTEG, x.VALVE, x.PM = u.p, pm, pm, pm
+        return 0.0
+
+    states = ("PE", "INTEG", "VALVE", "PM")
+    return replace(GOVERNORS["WESGOV"], equations=equations, rest=rest, states=states)
+
+
+class Sampled(TwoBuses):
+    """A unit with WESGOV that samples: the speed each DTC, the power each DTP, from 0 s on."""
+
+    def __init__(self, told):
+        super().__init__(told)
+        self.unit = self.unit._replace(governor=wesgov_of_a_held_error())
+        self.moved, self.step = (*self.moved, "pref"), STEP
+
+    def shown(self, times):
+        """Return what the unit shows at some instants."""
+        last = {}
+
+        def due(t, period):
+            return round(t / STEP) % round(self.values[GOVERNOR + period] / STEP) == 0
+
+        def held(t, states):
+            if due(t, "DTP"):
+                last["power"] = states["governor.PE"]
+            if due(t, "DTC"):
+                dw = states["dw"]
+                within = min(max(dw, self.values["governor.DBL"]), self.values["governor.DBH"])
+                droop = self.values["governor.DROOP"] * (last["power"] - P)
+                last["error"] = within - dw - droop
+            return {"pref": last["error"]}
+
+        return self.stepped(times, held)
 
 
 def case_of(told, **changes):
