@@ -60,6 +60,8 @@ OTHERS: Mapping[str, str] = {
     for name in names.split()
 }
 
+Driven = Mapping[tuple[str, str], Head]
+SECOND = ("JBUS", "M")  # of a record of IEEEG1: bus and id of a machine beside its own
 COMPENSATION = "IEEEVC"  # |vt + (Rc + jXc) it|
 CLASSICAL = {"GENCLS": "a constant voltage behind a reactance, with nothing to verify"}
 
@@ -149,6 +151,7 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
     files that have their names.
     """
     heads, faults = format_of(file).heads(text, buses)
+    driven = _driven(heads)
     units, refused, classical = list[Unit](), list[RefusedUnit](), 0
     devices = Counter[str]()
     for own in _by_unit(heads).values():
@@ -158,7 +161,7 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
         if _is_device(own):
             devices.update({head.name for head in own})
             continue
-        unit, wrong = _unit_of(own)
+        unit, wrong = _unit_of(own, driven)
         if unit is not None:
             units.append(unit)
             continue
@@ -202,7 +205,7 @@ def read_unit(
         chosen = _chosen(_by_unit(heads), file, bus, machine_id)
     except DynamicsError as fault:
         raise DynamicsError([*located(unread, file), *fault.faults]) from None
-    unit, faults = _unit_of(chosen)
+    unit, faults = _unit_of(chosen, _driven(heads))
     if unit is None:
         faults += _missing(_missing_kinds(chosen), chosen)
         raise DynamicsError(located([*unread, *faults], file))
@@ -256,16 +259,26 @@ def _listed(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
         yield f"  and {len(units) - MOST_LISTED} more"
 
 
-def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
+def _driven(heads: Iterable[Head]) -> Driven:
+    """Return the records of IEEEG1 that drive a second machine, by its bus and id in capitals."""
+    return {
+        (head.fields[0].text, head.fields[1].text.upper()): head
+        for head in heads
+        if head.definition is not None and head.definition.names[:2] == SECOND and head.fields[1:]
+    }
+
+
+def _unit_of(heads: Sequence[Head], driven: Driven) -> tuple[Unit | None, list[DynamicsFault]]:
     """Return the unit of its records, and their faults, with which it is None.
 
-    It is None, too, where it has no machine or exciter that exfit knows.
+    It is None, too, where it has no machine or exciter that exfit knows. ``driven`` are the
+    records of other units that drive a machine.
     """
     faults, warnings = list[DynamicsFault](), list[DynamicsFault]()
     parts = _parts(heads, faults, warnings)
     if faults or not parts.keys() >= {MACHINE, ""}:
         return None, faults
-    exciter, governor = parts[""], parts.get(GOVERNOR)
+    exciter = parts[""]
     of_load = next((head for head in heads if head.name.upper() == COMPENSATION), None)
     compensation = None if of_load is None else _compensation(of_load)
     if of_load is not None and compensation is not None:
@@ -275,13 +288,14 @@ def _unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     unknown = [head for head in heads if head.definition is None and head is not known]
     warnings += [DynamicsFault(head.line, _left_out(head.name)) for head in unknown]
     controller = _moving(parts, warnings)
+    governor = _governing(parts.get(GOVERNOR), heads, driven, warnings)
     unit = Unit(
         heads[0].bus,
         heads[0].id,
         parts[MACHINE],
         exciter,
         parts.get(STABILISER),
-        None if governor is None else _on_its_base(governor, heads, warnings),
+        governor,
         tuple(_attached(parts.values(), exciter, warnings)),
         tuple(sorted(warnings, key=lambda warning: warning.line)),
         tuple(head.name for head in unknown),
@@ -407,10 +421,20 @@ def _attached(
         yield replace(limiter, place=place)
 
 
-def _on_its_base(
-    governor: Reading, heads: Iterable[Head], warnings: list[DynamicsFault]
-) -> Reading:
-    """Return a governor with its base as a share of the machine's, or add that this is unknown."""
+def _governing(
+    governor: Reading | None, heads: Sequence[Head], driven: Driven, warnings: list[DynamicsFault]
+) -> Reading | None:
+    """Return a governor with its base as a share of the machine's, or add that this is unknown.
+
+    Without one, add that the governor of another machine drives this one, if it does.
+    """
+    if governor is None:
+        other = driven.get((str(heads[0].bus), heads[0].id.upper()))
+        if other is not None:
+            what = f"{other.name} of machine {other.id} at bus {other.bus} drives this machine, too"
+            what += ": not modelled, its power is constant"
+            warnings.append(DynamicsFault(other.line, what))
+        return None
     bases = {head.definition.kind: head.base for head in heads if head.definition is not None}
     own, machine = bases.get("governor"), bases.get("machine")
     if own is None or own == machine:

@@ -53,8 +53,8 @@ def ieeeg1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
                       └──────────►(+)─────────►(+)─────────►(+)─► Pm
 
     pref is a power, that of the valve. UC is negative, the rate of closing. The
-    limits of the valve are non-windup. The shares K2, K4, K6 and K8 are those of
-    a second, low pressure machine of a cross compound unit, which is not modelled.
+    limits of the valve are non-windup. Its machine is that of the high pressure:
+    K2, K4, K6 and K8, of a second one of a cross compound unit, do nothing to it.
     Pm is the sum of the shares: where they do not make 1, the valve is at rest at
     Pm over their sum (ANDES scales them to 1). T1 = 0 bypasses its block with T2.
     Typical data are those of IEC 61970-302 (GovSteamIEEE1).

@@ -45,6 +45,20 @@ def test_a_fault_of_one_unit_leaves_the_others(old, new, words):
     assert {fault.line for fault in refused.faults} <= {5, 6, 7, 8, 9}
 
 
+def test_a_machine_that_the_governor_of_another_drives_is_known_to_have_constant_power():
+    shares = "20 0 0 .1 1 -1 1 0 .3 .2 0 5 .3 .2 .5 0 .3 0 0 0 /"
+    text = at_bus(102) + at_bus(103) + f"102 IEEEG1 1 103 '1' {shares}\n"
+    first, second = read_units(text, "f").units
+    assert not any("drives this machine" in each.text for each in first.warnings)
+    assert second.governor is None
+    (warning,) = second.warnings
+    drives = "IEEEG1 of machine 1 at bus 102 drives this machine, too"
+    assert warning.text == f"{drives}: not modelled, its power is constant"
+    assert read_unit(text, "unit.dyr", 103).warnings == second.warnings
+    governed = text + f"103 IEEEG1 1 0 0 {shares}\n"
+    assert not any("drives" in each.text for each in read_units(governed, "f").units[1].warnings)
+
+
 @pytest.mark.parametrize("damaged", ["-14.5 /", ".4 /"])
 def test_a_record_without_an_end_leaves_the_other_units(damaged):
     whole = at_bus(103)
