@@ -25,7 +25,8 @@ from exfit import __main__
 from exfit.util import interrupts
 
 OWN = str(Path(__main__.__file__).parent) + os.sep
-CODES = (3, 130)
+CODES = KEPT, NOTHING_KEPT = 3, 130
+MARK = '"interrupted": true'  # of a result that was written before its end
 
 
 class Entry(NamedTuple):
@@ -148,11 +149,16 @@ class Ended(NamedTuple):
     seconds: tuple[float, float]
 
 
+def _stamps(folder: Path) -> dict[Path, int]:
+    """Return when each file of a folder was written, ns."""
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+
 def interrupted(
     arguments: tuple[str, ...], at: Entry, gap: int, whole: set[Path], folder: Path
 ) -> Ended:
     """Interrupt a command once or twice; ``whole`` are the files of a run without that."""
-    injection, faults = Injection(at, gap), []
+    injection, faults, before = Injection(at, gap), [], _stamps(folder)
     ran = run(arguments, injection)
     if not injection.sent:
         return Ended([], (0.0, 0.0))
@@ -163,6 +169,12 @@ def interrupted(
         faults.append(f"not said: {ran.code} {ran.err!r}")
     if "Traceback" in ran.err:
         faults.append(ran.err)
+    written = [path for path, stamp in _stamps(folder).items() if before.get(path) != stamp]
+    if ran.code == KEPT and not written:
+        faults.append(f"exit code {KEPT}, but nothing is kept: {ran.err}")
+    partial = [path for path in written if path.suffix == ".json" and MARK in path.read_text()]
+    if ran.code == NOTHING_KEPT and partial:
+        faults.append(f"exit code {NOTHING_KEPT}, but {partial[0]} is kept")
     if others := {*contents(folder)} - whole:
         faults.append(f"files: {sorted(map(str, others))}")
     return Ended(faults, ran.seconds)
