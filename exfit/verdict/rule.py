@@ -30,6 +30,7 @@ from exfit.verdict.residual_tests import residual_tests
 if TYPE_CHECKING:
     from exfit.verdict.score_tests import Contradiction, Refuted
 
+MOST_OTHERS = 4  # that explain a record as well as what is named
 MOST_CAUSES = 5  # that a reader is given
 VALUES = "values of the case"
 UNTESTED = f"interrupted before the {VALUES} were tested"
@@ -61,16 +62,28 @@ def verdict_of(evidence: Evidence) -> Verdict:
         words, reason = MATCHES, UNTESTED
         evidence.pace.stopped((VALUES,), interrupted=True)
     contradicted += _shown(averages, matched, reason)
+    either = (*_either(evidence),)
     contradicted.sort(key=lambda each: -each.likelihood)
     if contradicted and good_but_for_averages:
         words, reason = MATCHES, contradicted[0].reason
     of_values = tuple(each.cause for each in contradicted)
     causes = causes_of(evidence, matched)
     # beside a misfit a value may have moved to make up for what is wrong
-    causes = (*of_values, *causes) if matched else (*causes, *of_values)
+    causes = (*of_values, *either, *causes) if matched else (*causes, *of_values, *either)
     if words == MATCHES:
         causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
+
+
+def _either(evidence: Evidence) -> Iterator[Cause]:
+    """Name given values that were fitted where others explain the record as well."""
+    for refined in evidence.refined:
+        if refined.others:
+            given, others = listed([*refined.names]), ", ".join(refined.others[:MOST_OTHERS])
+            more = len(refined.others) - MOST_OTHERS
+            others += f" and {more} more" if more > 0 else ""
+            words = f"not as given is {given}, now fitted, or, as likely, {others}"
+            yield Cause(words, "measure what can be measured: the record does not tell which")
 
 
 def _refuted(evidence: Evidence) -> "Sequence[Refuted]":

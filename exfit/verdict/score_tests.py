@@ -18,6 +18,7 @@ from exfit.inference.whitening import BIAS_KNOWN_TO
 from exfit.plants import REFERENCES, SPEED, VT0
 from exfit.registry import parts
 from exfit.results.cause import Cause, Remedy
+from exfit.results.intervals.averages import averaged_residuals, unstated
 from exfit.results.verdict import REJECTED
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
@@ -35,6 +36,7 @@ from exfit.verdict.causes.trials import (
 from exfit.verdict.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
 
 SAME = 1e-6  # of a direction: what other parameters leave of it is rounding below
+ALIKE = 4.0  # chi-square: what explains no less is not told apart
 LEAST_SHARE = 0.5  # of the largest chi-square: what has less is explained by that
 SMALL = 0.1  # change of a logarithm that is given in per cent
 LARGEST_CHANGE = log(LARGEST_FACTOR)  # of a logarithm: no given value is farther off
@@ -93,6 +95,11 @@ class Contradiction(NamedTuple):
         if not self.held.names:
             return by_record - 2.0 * self.held.rare
         return by_record * self.held.std_error**2 / (self.held.std_error**2 + self.by_record**2)
+
+    @property
+    def explains(self) -> float:
+        """By how much chi-square falls: that by the record where nothing is given of it."""
+        return self.gain if self.held.names else self.gain + 2.0 * self.held.rare
 
     @property
     def reason(self) -> str:
@@ -171,8 +178,15 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
     return sorted(rejected, key=lambda each: -each.likelihood)
 
 
-def values_that_the_record_refines(evidence: Evidence) -> tuple[str, ...]:
-    """Name the given value whose fit with its standard error would explain most; none if nothing.
+class Refinement(NamedTuple):
+    """Given values that the record knows better; what explains it as well, in words."""
+
+    names: tuple[str, ...]
+    others: tuple[str, ...] = ()
+
+
+def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
+    """Return the given value whose fit with its standard error would explain most, if any.
 
     It is tested against what it would leave of the errors, which may be far from white before.
     None, too, where what a test or a record holds would explain more.
@@ -180,19 +194,63 @@ def values_that_the_record_refines(evidence: Evidence) -> tuple[str, ...]:
     try:
         linear, directions, shift = _linearised(evidence)
     except SimulationError:
-        return ()
-    residuals, scores = evidence.residuals, list[tuple[Contradiction, Array]]()
-    own_spread = spread_of_errors(residuals, linear.beyond(linear.errors), white=True)
-    for held, direction in directions:
-        score = _score(held, direction, linear, own_spread, shift)
-        if score is not None:
-            scores.append((score, direction))
+        return None
+    tested = [*directions]
+    residuals = evidence.residuals
+
+    def scored(spread: Array) -> list[tuple[Contradiction, Array]]:
+        pairs = ((_score(held, each, linear, spread, shift), each) for held, each in tested)
+        return [(score, each) for score, each in pairs if score is not None]
+
+    scores = scored(spread_of_errors(residuals, linear.beyond(linear.errors), white=True))
     if not scores:
-        return ()
+        return None
     best, direction = max(scores, key=lambda each: each[0].gain)
-    left = linear.beyond(linear.errors + best.change * direction)
-    best = _score(best.held, direction, linear, spread_of_errors(residuals, left), shift) or best
-    return best.held.names if _is_significant(best.gain, len(scores)) else ()
+    left = spread_of_errors(residuals, linear.beyond(linear.errors + best.change * direction))
+    best = _score(best.held, direction, linear, left, shift) or best
+    if not (best.held.names and _is_significant(best.gain, len(scores))):
+        return None
+    tested += _of_speed(evidence)
+    alike = sorted((each for each, _ in scored(left)), key=lambda each: -each.explains)
+    others = [
+        listed([*each.held.names]) or each.held.words
+        for each in alike
+        if each.explains > best.gain - ALIKE and each.held.names != best.held.names
+    ]
+    others += _averages(evidence, linear, left, best.gain)
+    return Refinement(best.held.names, tuple(others))
+
+
+def _of_speed(evidence: Evidence) -> Iterator[tuple[Held, Array]]:
+    """Yield what another speed does to the errors, one at rest and one that changes evenly."""
+    from exfit.verdict.causes.speed import turning  # of most fits nothing is refined
+
+    count = len(evidence.solution.x)
+    for number, residuals, opened in turning(evidence):
+        extended = with_opened(residuals, number, opened)
+        theta = np.append(evidence.solution.x, extended.start[count:])
+        try:
+            _, columns = extended.errors(theta, range(count, count + len(opened)))
+        except SimulationError:
+            continue
+        columns /= slopes_of(extended, theta)[count:]
+        for words, column in zip(("the speed", "a falling speed"), columns.T, strict=True):
+            if np.isfinite(column).all():
+                yield Held(f"{words}{evidence.name_of(number)}", unit="pu"), column
+
+
+def _averages(evidence: Evidence, linear: LinearFit, spread: Array, gain: float) -> Iterator[str]:
+    """Yield averages of the recorder, if they explain the errors as well as a value that gains."""
+    numbers = [*unstated(evidence.case, evidence.residuals)]
+    before = float(np.sum((linear.beyond(linear.errors) / spread) ** 2))
+    for _, _, averaged in averaged_residuals(evidence.residuals, numbers) if numbers else ():
+        try:
+            errors = averaged(evidence.solution.x)[: averaged.count]
+        except SimulationError:
+            return
+        if before - float(np.sum((linear.beyond(errors) / spread) ** 2)) > gain - ALIKE:
+            yield "a recorder that averages"
+            return
 
 
 def _is_significant(chi_square: float, tests: int) -> bool:
@@ -336,7 +394,7 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
         steps = tuple(step for step in steps if step.signal in REFERENCES)
     for place, step in enumerate(steps):
         if step.step and step.signal != SPEED and ("step", place) not in found:
-            words = f"the step of {step.step:+g} pu{of_record}"
+            words = f"the size of the step, {step.step:+g} pu{of_record}"
             yield (
                 Held(words, _of_steps(evidence, number, {place: step.step}), step.step),
                 opened("step", step.step, place),

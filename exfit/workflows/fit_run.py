@@ -121,6 +121,7 @@ def fit_result(
         uncertainty=uncertainty,
         validation=analysis.validation,
         averages=analysis.averages,
+        refined=state.refined,
         interrupted=interrupted,
         pace=pace,
     )

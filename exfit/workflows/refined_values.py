@@ -15,7 +15,7 @@ from exfit.util.vocabulary import REFINING_VALUES
 from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.causes.trials import freed_within, with_freed
 from exfit.verdict.causes.unit import LARGEST_FACTOR
-from exfit.verdict.score_tests import values_that_the_record_refines
+from exfit.verdict.score_tests import value_that_the_record_refines
 from exfit.workflows.search_state import SearchState, ignore
 
 MOST_VALUES = 4  # each the one that explains most of what is left
@@ -29,8 +29,8 @@ def with_refined_values(state: SearchState) -> SearchState:
     """
     std_errors = given_std_errors(state.case)
     for _ in range(MOST_VALUES):
-        names = () if state.interrupted else values_that_the_record_refines(_evidence(state))
-        if not names:
+        refined = None if state.interrupted else value_that_the_record_refines(_evidence(state))
+        if refined is None:
             break
         fixed = state.problem.residuals.fixed
         added = [
@@ -38,10 +38,10 @@ def with_refined_values(state: SearchState) -> SearchState:
                 freed_within(name, fixed[name], LARGEST_FACTOR),
                 prior=Prior(fixed[name], std_errors[name]),
             )
-            for name in names
+            for name in refined.names
             if name in std_errors
         ]
-        state = _with_freed(state, added)
+        state = _with_freed(replace(state, refined=(*state.refined, refined)), added)
     return state
 
 

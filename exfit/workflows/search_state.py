@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TYPE_CHECKING
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -18,6 +19,9 @@ from exfit.fitting.search import CaseSearches
 from exfit.results.intervals.determination import Determination
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS
+
+if TYPE_CHECKING:
+    from exfit.verdict.score_tests import Refinement
 
 UNKNOWN = Determination(None)
 
@@ -50,6 +54,7 @@ class SearchState:
     searched: SearchResult | None = None
     determined: Determination = UNKNOWN
     line_notes: tuple[str, ...] = ()
+    refined: "tuple[Refinement, ...]" = ()
 
     @property
     def found(self) -> SearchResult:

@@ -44,7 +44,7 @@ def recorder_averages(
     also where the record excludes them, and where the case says whether the recorder averages.
     Raises KeyboardInterrupt at an interruption.
     """
-    numbers = [*_unstated(case, residuals)]
+    numbers = [*unstated(case, residuals)]
     if not numbers or sum(residuals.sizes) > MOST_SAMPLES:
         return None
     found = []
@@ -93,7 +93,7 @@ def _is_beyond(value: float, interval: Interval | None) -> bool:
     return (low is not None and value < low) or (high is not None and value > high)
 
 
-def _unstated(case: Case, residuals: Residuals) -> Iterator[int]:
+def unstated(case: Case, residuals: Residuals) -> Iterator[int]:
     """Yield the records of which neither the case nor what drives them says if they average."""
     if case.external is not None or case.kind.finds_rest:
         return
@@ -124,7 +124,7 @@ def _likeliest(
     # what the parameters can do, orthonormal
     basis = np.asarray(left[:, singular > UNSEEN * np.max(singular, initial=0.0)])
     gains, candidates = list[float](), list[tuple[float, bool, Residuals]]()
-    for window, of_rate, averaged in _averaged(residuals, numbers):
+    for window, of_rate, averaged in averaged_residuals(residuals, numbers):
         # the errors alone: to differentiate them takes three times as long
         off = replace(averaged, robust=None)(theta)[: averaged.count]
         if not np.isfinite(off).all():
@@ -143,7 +143,7 @@ def _likeliest(
             yield window, averaged
 
 
-def _averaged(
+def averaged_residuals(
     residuals: Residuals, numbers: Sequence[int]
 ) -> Iterator[tuple[float, bool, Residuals]]:
     """Yield residuals with averages over a window (s), and whether that is the rate's.

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from exfit.case.changes import between
 from exfit.fitting.nuisances import OF_SYSTEM, Nuisance
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import system_of
 from exfit.plants import SPEED
 from exfit.results.cause import Cause
@@ -19,8 +20,11 @@ FARTHEST = 0.1  # pu: protection trips a unit that is farther off
 RARE = 5.0  # log-likelihood: a unit is mostly tested at rated speed
 
 
-def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
-    """Suspect the speed: off the rated one, and falling or rising evenly."""
+def turning(evidence: Evidence) -> Iterator[tuple[int, Residuals, list[Opened]]]:
+    """Yield the residuals with each test whose speed nobody gives, and what to leave open of it.
+
+    That is the speed at its start, and how far it changes, evenly, until its end.
+    """
     case = evidence.case
     for number, _, experiment in evidence.tests:
         own, recording = experiment.simulator, case.recordings[number]
@@ -32,14 +36,18 @@ def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
         change = InputStep(begin, 0.0, SPEED, ramp=end - begin)
         inputs = replace(own.inputs, steps=(*steps, change))
         levels = {**experiment.own, OF_SYSTEM["speed"]: 1.0}
-        turning = replace(
-            experiment, simulator=own.remade(system=system, inputs=inputs), own=levels
-        )
+        simulator = own.remade(system=system, inputs=inputs)
+        changed = replace(experiment, simulator=simulator, own=levels)
         opened = [
             Opened.around(Nuisance("cause.speed", "speed"), 1.0, FARTHEST),
             Opened.around(Nuisance("cause.change", "step", len(steps)), 0.0, FARTHEST),
         ]
-        changed = with_experiment(evidence.residuals, number, turning)
+        yield number, with_experiment(evidence.residuals, number, changed), opened
+
+
+def other_speed(evidence: Evidence) -> Iterator[Suspicion]:
+    """Suspect the speed: off the rated one, and falling or rising evenly."""
+    for number, changed, opened in turning(evidence):
         trial = refitted(evidence, with_opened(changed, number, opened))
         if trial is None:
             continue
