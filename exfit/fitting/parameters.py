@@ -123,6 +123,15 @@ def units_of(free: Iterable[FreeParameter]) -> NDArray[np.float64]:
     return np.array([parameter.unit for parameter in free])
 
 
+def freed_within(
+    name: str, value: float, factor: float, std_error: float | None = None
+) -> FreeParameter:
+    """Return a fixed value as a parameter that may change by a factor, with its error if given."""
+    low, high = sorted((value / factor, value * factor))
+    prior = None if std_error is None else Prior(value, std_error)
+    return FreeParameter(name, value, low, high, logarithmic=value > 0.0, prior=prior)
+
+
 def scaled_values(
     free: Iterable[FreeParameter], values: Mapping[str, float]
 ) -> NDArray[np.float64]:

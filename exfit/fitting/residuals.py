@@ -405,6 +405,13 @@ class Residuals:
         return np.repeat(scales, self.sizes)
 
 
+def with_freed(residuals: Residuals, freed: Sequence[FreeParameter]) -> Residuals:
+    """Return residuals with more free parameters, which were fixed."""
+    names = {parameter.name for parameter in freed}
+    fixed = {name: value for name, value in residuals.fixed.items() if name not in names}
+    return replace(residuals, free=[*residuals.free, *freed], fixed=fixed, counter=None)
+
+
 def _stacked(blocks: Sequence[Array], axis: int = 0) -> Array:
     """Return the blocks of all records as one, without a copy of a single one."""
     return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=axis)

@@ -11,7 +11,8 @@ from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
-from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals
+from exfit.fitting.parameters import freed_within
+from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals, with_freed
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slices, slopes_of, spread_of, spread_of_errors
 from exfit.inference.whitening import BIAS_KNOWN_TO
@@ -27,10 +28,8 @@ from exfit.verdict.causes.channels import check_zero, is_found, measured_vt0, re
 from exfit.verdict.causes.trials import (
     LinearFit,
     Opened,
-    freed_within,
     linear_model,
     moving,
-    with_freed,
     with_opened,
 )
 from exfit.verdict.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of

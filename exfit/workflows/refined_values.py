@@ -7,13 +7,13 @@ import numpy as np
 from exfit.case.given_errors import given_std_errors
 from exfit.fitting.compression import compressed
 from exfit.fitting.global_search import extended
-from exfit.fitting.parameters import FreeParameter, Prior
+from exfit.fitting.parameters import FreeParameter, freed_within
 from exfit.fitting.problem import FitProblem
+from exfit.fitting.residuals import with_freed
 from exfit.fitting.search import CaseSearches
 from exfit.results.compare_with_record import compare_with_record
 from exfit.util.vocabulary import REFINING_VALUES
 from exfit.verdict.causes import Evidence, FittedRecord
-from exfit.verdict.causes.trials import freed_within, with_freed
 from exfit.verdict.causes.unit import LARGEST_FACTOR
 from exfit.verdict.score_tests import value_that_the_record_refines
 from exfit.workflows.search_state import SearchState, ignore
@@ -34,10 +34,7 @@ def with_refined_values(state: SearchState) -> SearchState:
             break
         fixed = state.problem.residuals.fixed
         added = [
-            replace(
-                freed_within(name, fixed[name], LARGEST_FACTOR),
-                prior=Prior(fixed[name], std_errors[name]),
-            )
+            freed_within(name, fixed[name], LARGEST_FACTOR, std_errors[name])
             for name in refined.names
             if name in std_errors
         ]

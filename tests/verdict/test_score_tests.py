@@ -8,10 +8,12 @@ from records import TEST, TIME, case_of, one, synthetic
 from tiers import few_of
 
 from exfit.case.load import load_case
+from exfit.fitting.parameters import freed_within
+from exfit.fitting.residuals import with_freed
 from exfit.fitting.uncertainty import spread_of
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.verdict import score_tests
-from exfit.verdict.causes.trials import freed_within, linear_model, refitted, with_freed
+from exfit.verdict.causes.trials import linear_model, refitted
 from exfit.verdict.score_tests import Held, _linearised, _score
 from exfit.workflows import fit
 

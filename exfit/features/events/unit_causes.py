@@ -11,8 +11,8 @@ from exfit.case.case import Case
 from exfit.case.changes import between, freed, number_text
 from exfit.case.parts import added_part
 from exfit.case.schema import Governor, Stabiliser
-from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.residuals import Residuals
+from exfit.fitting.parameters import FreeParameter, freed_within
+from exfit.fitting.residuals import Residuals, with_freed
 from exfit.fitting.system import system_of
 from exfit.models import GOVERNORS, STABILISERS
 from exfit.models.sheet import Model
@@ -20,7 +20,7 @@ from exfit.plants import GOVERNOR, MACHINE, NETWORK, STABILISER
 from exfit.results.cause import Cause
 from exfit.verdict.causes.evidence import Evidence, Suspicion, likelihood, suspected
 from exfit.verdict.causes.exciters import STRUCTURE
-from exfit.verdict.causes.trials import freed_within, refitted, tried, with_freed
+from exfit.verdict.causes.trials import refitted, tried
 
 LARGEST_FACTOR = 4.0  # of the inertia
 MOST_DAMPING = 20.0  # pu

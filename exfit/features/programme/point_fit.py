@@ -285,7 +285,7 @@ def allowing_for_errors(
     own = problem.jacobian(theta) / problem.slopes(theta)
     of_values = np.zeros((len(own), len(errors)))
     of_values[: len(linear.errors)] = np.stack([*errors.values()], axis=1)
-    shifts = first_order_shifts(own, of_values, linear.free, bounds_hold=False)
+    shifts = first_order_shifts(own, of_values, linear.free)
     parameters = {
         parameter.name: widened_by(
             hypot(*moved), fit.confidence.parameters[parameter.name], parameter, x, size, [*errors]

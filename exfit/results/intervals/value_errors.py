@@ -28,6 +28,7 @@ from exfit.inference.noise import Noise, effective_samples
 from exfit.plants import VT0
 from exfit.results.influences import first_of
 from exfit.results.intervals.determination import without_linear_intervals
+from exfit.results.intervals.free_values import sides_with_values, starts_of_values
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
@@ -38,12 +39,14 @@ UNSEEN = 1e-9  # of the largest singular value: rounding
 class ErrorsOfValues(NamedTuple):
     """Standard errors of given values, with effects; ``without`` has those without derivatives.
 
-    ``together`` is by how much they move each parameter in all, a standard error in its unit.
+    ``together`` is by how much they move each parameter in all, a standard error in its unit;
+    ``sides`` (N, 2) is how far down and up it may lie where the first order does not serve.
     """
 
     given: Mapping[str, GivenError]
     together: Mapping[str, float]
     without: tuple[str, ...] = ()
+    sides: Array | None = None
 
 
 def errors_of_values(
@@ -73,14 +76,15 @@ def errors_of_values(
     std_errors |= levels[1]
     if not std_errors:
         return ErrorsOfValues({}, {})
-    influence = influence_of_values(levels[0], theta, std_errors, bounds_hold=False)
+    influence = influence_of_values(levels[0], theta, std_errors)
     if influence is None:
         return ErrorsOfValues({}, {}, tuple(std_errors))
     of_priors = np.full(len(residuals.priors), residuals.noise)
     spread = np.append(spread_of(residuals, noises), of_priors)
     known = influence.beyond / spread[:, None]
     precision = np.eye(len(std_errors)) + known.T @ known
-    mean = -np.linalg.solve(precision, known.T @ (residuals(theta) / spread))
+    pull = known.T @ (residuals(theta) / spread)
+    mean = -np.linalg.solve(precision, pull)
     covariance = np.linalg.inv(precision)
     variance = np.sum(influence.shifts @ covariance * influence.shifts, axis=1)
     together = np.sqrt(variance + (influence.shifts @ mean) ** 2)
@@ -91,7 +95,15 @@ def errors_of_values(
         for (name, std_error), column in zip(std_errors.items(), left.T, strict=True)
         if np.any(np.abs(column) > NEGLIGIBLE * together)
     }
-    return ErrorsOfValues(given, dict(zip(names, together.tolist(), strict=True)))
+    sides = None
+    if case.external is None and not case.kind.finds_rest:
+        starts = [*starts_of_values(residuals, theta, std_errors, setups)]
+        share = np.diag(known.T @ known @ covariance)  # of each value that the record knows
+        chance = float(np.sum(share))
+        surprising = -float(pull @ mean) > chance + 2.0 * sqrt(2.0 * chance)
+        if surprising or len(starts) > 1 or not influence.moving.all():
+            sides = sides_with_values(residuals, theta, std_errors, spread, starts)
+    return ErrorsOfValues(given, dict(zip(names, together.tolist(), strict=True)), sides=sides)
 
 
 def allowing_for(
@@ -120,13 +132,15 @@ def allowing_for(
     if not errors.given:
         return uncertainty
     sizes = linearisation(problem, theta, of_record).own_size
-    widened, given = {}, errors.given
+    widened, given = dict[str, Uncertainty](), errors.given
     for parameter, x, size in zip(problem.residuals.free, theta, sizes, strict=True):
         own, name = uncertainty.confidence.parameters[parameter.name], parameter.name
         of_name = {value: abs(error.shifts[name]) for value, error in given.items()}
         names = sorted(of_name, key=lambda value: -of_name[value])
         shift = errors.together[name]
-        widened[name] = widened_by(shift, own, parameter, float(x), float(size), names)
+        sides = (0.0, 0.0) if errors.sides is None else errors.sides[len(widened)].tolist()
+        at = float(x), float(size)
+        widened[name] = widened_by(shift, own, parameter, *at, names, sides)
     return replace(uncertainty, given_errors=given).with_parameters(widened)
 
 
@@ -183,11 +197,14 @@ def widened_by(
     scaled: float,
     size: float,
     names: Sequence[str],
+    sides: Sequence[float] = (0.0, 0.0),
 ) -> Uncertainty:
     """Widen the uncertainty of a parameter by a shift for the errors of values.
 
-    ``size`` is what counts as 100 %; ``names`` are those of the values.
+    ``size`` is what counts as 100 %; ``names`` are those of the values; ``sides`` are the least
+    distances of the ends of the interval.
     """
+    shift = max(shift, *(side / NORMAL for side in sides))
     linear = own.std_error if own.method == "linear" else None
     share, value = hypot(linear or 0.0, shift) / size, parameter.value(scaled)
     std_error = None if own.std_error is None else hypot(own.std_error, shift)
@@ -233,23 +250,24 @@ def _with_levels_open(
 class Influence(NamedTuple):
     """What K values do at a minimum: to the N parameters, in their units, and to the residuals.
 
-    ``beyond`` (M, K) is what the parameters cannot reproduce.
+    ``beyond`` (M, K) is what the parameters cannot reproduce; those that ``moving`` (N,) masks lie
+    on no bound.
     """
 
     shifts: Array
     beyond: Array
+    moving: NDArray[np.bool_]
 
 
 def influence_of_values(
-    residuals: Residuals, theta: Array, deviations: Mapping[str, float], bounds_hold: bool
+    residuals: Residuals, theta: Array, deviations: Mapping[str, float]
 ) -> Influence | None:
     """Return what deviations of K values would move at the minimum theta (N,).
 
     ``deviations`` are those of the values by name. The gradient stays zero, so that to first order
     the parameters move by -(J'J)^-1 J' dr/dv times the deviation of v: one Jacobian with a column
-    more for each of these values gives both. A parameter on a bound stays there or, unless
-    ``bounds_hold``, moves as if it were let go, the others as if it stayed. None where a derivative
-    is not finite.
+    more for each of these values gives both. A parameter on a bound moves as if it were let go,
+    the others as if it stayed. None where a derivative is not finite.
 
     Source: the implicit function theorem on the gradient, with the Gauss-Newton matrix.
     """
@@ -276,19 +294,17 @@ def influence_of_values(
     count, values = len(residuals.free), residuals.values(theta)
     own, of_values = jacobian[:, :count], jacobian[:, count:] * [*deviations.values()]
     moving = np.array([free.bound(values[free.name]) is None for free in residuals.free])
-    shifts = first_order_shifts(own, of_values, moving, bounds_hold)
-    return Influence(shifts, of_values + own[:, moving] @ shifts[moving])
+    shifts = first_order_shifts(own, of_values, moving)
+    return Influence(shifts, of_values + own[:, moving] @ shifts[moving], moving)
 
 
-def first_order_shifts(
-    own: Array, of_values: Array, moving: NDArray[np.bool_], bounds_hold: bool
-) -> Array:
+def first_order_shifts(own: Array, of_values: Array, moving: NDArray[np.bool_]) -> Array:
     """Shift of each parameter with changes of the residuals (M, K), (N, K).
 
     ``own`` (M, N) is the Jacobian by the parameters, ``moving`` (N,) those that lie on no bound.
     """
     shifts = np.zeros((own.shape[1], of_values.shape[1]))
-    if not (bounds_hold or moving.all()):
+    if not moving.all():
         shifts = -_least_squares(own, of_values)
     shifts[moving] = -_least_squares(own[:, moving], of_values)
     return shifts

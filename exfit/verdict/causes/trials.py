@@ -68,19 +68,6 @@ def with_opened(residuals: Residuals, number: int, opened: Sequence[Opened]) -> 
     return replace(changed, free=[*(f for f in residuals.free if f.name not in again), *free])
 
 
-def with_freed(residuals: Residuals, freed: Sequence[FreeParameter]) -> Residuals:
-    """Return residuals with more free parameters, which were fixed."""
-    names = {parameter.name for parameter in freed}
-    fixed = {name: value for name, value in residuals.fixed.items() if name not in names}
-    return replace(residuals, free=[*residuals.free, *freed], fixed=fixed, counter=None)
-
-
-def freed_within(name: str, value: float, factor: float) -> FreeParameter:
-    """Return a fixed value as a parameter that may change by a factor."""
-    low, high = sorted((value / factor, value * factor))
-    return FreeParameter(name, value, low, high, logarithmic=value > 0.0)
-
-
 def refitted(evidence: Evidence, residuals: Residuals) -> Trial | None:
     """Return the better end of two descents, from the case's start and from the solution.
 

@@ -10,7 +10,8 @@ from exfit.case.case import Case
 from exfit.case.changes import freed, number_text, part_of
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
-from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.parameters import FreeParameter, freed_within
+from exfit.fitting.residuals import with_freed
 from exfit.plants import MACHINE
 from exfit.results.cause import Cause, Remedy
 from exfit.simulation.limits import Extreme, extremes
@@ -23,10 +24,8 @@ from exfit.verdict.causes.evidence import (
 )
 from exfit.verdict.causes.trials import (
     DEPENDENT,
-    freed_within,
     linear_fit,
     refitted,
-    with_freed,
 )
 
 LARGEST_FACTOR = 4.0  # of a fixed value

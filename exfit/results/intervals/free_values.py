@@ -1,0 +1,148 @@
+"""Intervals with the given values free as well, where the first order of their errors fails.
+
+That is where a parameter on a bound would leave it, where a limit acts for other values that are as
+likely, or where the record asks for more of the values at once than chance does.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from math import inf, isfinite, sqrt
+
+import numpy as np
+
+from exfit.errors import SimulationError
+from exfit.fitting.descents import short_descent
+from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.parameters import freed_within
+from exfit.fitting.residuals import Residuals, with_freed
+from exfit.fitting.uncertainty import slopes_of
+from exfit.inference.confidence import NORMAL
+from exfit.simulation.limits import extremes
+from exfit.util.arrays import Array
+
+FACTOR = 4.0  # by which a value may differ from the given one
+MOST_ITERATIONS, TOLERANCE = 25, 1e-3  # of a descent: the end of an interval is no estimate
+MOST_HELD = 4  # parameters on bounds that may leave them
+ROUNDING = 1e-9  # of a bound
+
+
+def starts_of_values(
+    residuals: Residuals,
+    theta: Array,
+    std_errors: Mapping[str, float],
+    setups: Sequence[ExperimentSetup],
+) -> Iterator[dict[str, float]]:
+    """Yield given values to start from: none changed, and each limit of which some would act.
+
+    That is one that the response does not meet, but would within 1.96 of its standard errors.
+    """
+    yield {}
+    values, reached = residuals.values(theta), dict[str, float]()
+    for setup in setups:
+        try:
+            for each in extremes(*setup.experiment.at(values)):
+                reached[each.limit] = max(each.share, reached.get(each.limit, 0.0))
+        except SimulationError:
+            continue
+    for name, share in reached.items():
+        given = residuals.fixed.get(name, 0.0)
+        if given and name in std_errors:
+            least = 1.0 - NORMAL * std_errors[name] / abs(given)
+            if least < share < 1.0:
+                yield {name: 0.5 * (least + share) * given}
+
+
+def sides_with_values(
+    residuals: Residuals,
+    theta: Array,
+    std_errors: Mapping[str, float],
+    spread: Array,
+    starts: Sequence[Mapping[str, float]],
+) -> Array:
+    """Return how far down and up (N, 2) from theta (N,) each parameter may lie at 95 %.
+
+    The values are fitted with their errors as priors, from each start; about each minimum that is
+    likely enough these are the ends of the profiles of the linear model there, in which the
+    ``spread`` (M,) is the standard deviation of the errors.
+
+    Source: Raue et al. 2009, Bioinformatics 25, 1923-1929 (profiles with nuisances and priors).
+    """
+    added = [
+        freed_within(name, value, FACTOR, std_errors[name])
+        for name, value in residuals.fixed.items()
+        if value and name in std_errors
+    ]
+    whole = with_freed(residuals, added)
+    points = [
+        np.append(theta, [each.scaled(start.get(each.name, each.start)) for each in added])
+        for start in starts
+    ]
+    ends = [short_descent(whole, at, MOST_ITERATIONS, tolerance=TOLERANCE) for at in points]
+    found = [end for end in ends if end is not None and np.isfinite(end.cost)]
+    least, count = min((end.cost for end in found), default=inf), len(theta)
+    spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
+    sides, at = np.zeros((count, 2)), residuals.values(theta)
+    for end in found:
+        rise = NORMAL**2 - 2.0 * (end.cost - least) / whole.noise**2
+        if rise > 0.0:
+            values = whole.values(end.x)
+            slopes = whole.exact(end.x) / slopes_of(whole, end.x)  # in their own units
+            rows = np.column_stack([slopes[:, count:], slopes[:, :count], whole(end.x)])
+            free = residuals.free
+            room = {
+                k: (each.low - values[each.name], each.high - values[each.name])
+                for k, each in enumerate(free)
+                if each.bound(values[each.name]) is not None
+            }
+            own = sides_within(room, rows / spread[:, None], count, rise)
+            moved = np.array([values[each.name] - at[each.name] for each in free])
+            sides = np.maximum(sides, own + moved[:, None] * [-1.0, 1.0])
+    return sides
+
+
+def sides_within(
+    room: Mapping[int, tuple[float, float]], rows: Array, count: int, rise: float
+) -> Array:
+    """Return how far down and up (N, 2) the profiles of ``count`` parameters reach.
+
+    The ``rows`` (M, K + N + 1) are a linear model, in standard deviations: the derivatives by K
+    given values and by the parameters, and the errors; the sum of squares rises by ``rise``.
+    Parameters with ``room`` stay within it: each lies on one of its ends, or between them.
+
+    Source: Venzon & Moolgavkar 1988, of a quadratic form.
+    """
+    values = rows.shape[1] - count - 1
+    triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+    left = triangle[values:, values:]
+    size = np.linalg.norm(left[:, :count], axis=0)
+    size[size == 0.0] = 1.0
+    matrix, errors = left[:, :count] / size, left[:, count]
+    low, high = np.full(count, -inf), np.full(count, inf)
+    for k, ends in room.items():
+        low[k], high[k] = np.multiply(ends, size[k])
+
+    def is_within(at: Array) -> bool:
+        return bool(np.all((at >= low - ROUNDING * size) & (at <= high + ROUNDING * size)))
+
+    cases, least, held = list[tuple[float, Array, Array]](), inf, [*room][:MOST_HELD]
+    choices = [[*filter(isfinite, (low[k], high[k])), None] for k in held]
+    for bounds in product(*choices):
+        at, free = np.zeros(count), np.ones(count, dtype=bool)
+        for k, bound in zip(held, bounds, strict=True):
+            if bound is not None:
+                at[k], free[k] = bound, False
+        inverse, root = np.linalg.pinv(matrix[:, free]), np.zeros((count, len(matrix)))
+        at[free] = -inverse @ (errors + matrix @ at)
+        root[free] = inverse
+        cost = float(np.sum((errors + matrix @ at) ** 2))
+        cases.append((cost, at, root @ root.T))
+        least = min(least, cost) if is_within(at) else least
+    sides = np.zeros((count, 2))
+    for cost, at, covariance in cases:
+        reach = sqrt(max(least + rise - cost, 0.0)) if cost < least + rise < inf else 0.0
+        for k, sign in product(range(count), (-1.0, 1.0) if reach else ()):
+            end = at + sign * reach * covariance[k] / sqrt(covariance[k, k] or 1.0)
+            if is_within(end):
+                side = int(sign > 0.0)
+                sides[k, side] = max(sides[k, side], sign * end[k] / size[k])
+    return sides

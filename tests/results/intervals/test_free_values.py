@@ -1,0 +1,46 @@
+"""Intervals with the given values free as well: the profiles of a linear model within bounds."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, lsq_linear
+
+from exfit.results.intervals.free_values import sides_within
+
+COUNT, VALUES, ROWS = 3, 2, 12  # of parameters, given values, errors
+RISE = 3.84
+FAR = 1e3  # beyond every end
+
+
+def profile_end(matrix, errors, low, high, k, sign):
+    """Return how far a parameter can go until the least cost of bounded least squares has risen."""
+    others = np.delete(np.arange(matrix.shape[1]), k)
+
+    def least(at):
+        left = -errors - matrix[:, k] * at
+        bounds = low[others], high[others]
+        return 2.0 * lsq_linear(matrix[:, others], left, bounds, method="bvls").cost
+
+    best = lsq_linear(matrix, -errors, (low, high), method="bvls")
+    end = float(np.clip(sign * FAR, low[k], high[k]))
+    allowed = 2.0 * best.cost + RISE
+    if least(end) > allowed:
+        end = brentq(lambda at: least(at) - allowed, best.x[k], end, xtol=1e-10)
+    return sign * end
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("bounded", [(), (1,), (0, 2)])
+def test_profiles_within_bounds_are_those_of_bounded_least_squares(seed, bounded):
+    """To the tolerances of these, where a parameter lies on its bound and may leave it."""
+    rng = np.random.default_rng([seed, *bounded])
+    rows = rng.normal(size=(ROWS, VALUES + COUNT + 1))
+    rows = np.vstack([rows, np.eye(VALUES, VALUES + COUNT + 1)])
+    room = dict.fromkeys(bounded, (0.0, 0.4 if seed % 2 else np.inf))
+    low, high = np.full(VALUES + COUNT, -np.inf), np.full(VALUES + COUNT, np.inf)
+    for k, ends in room.items():
+        low[VALUES + k], high[VALUES + k] = ends
+    sides = sides_within(room, rows, COUNT, RISE)
+    for k in range(COUNT):
+        for side, sign in enumerate((-1.0, 1.0)):
+            end = profile_end(rows[:, :-1], rows[:, -1], low, high, VALUES + k, sign)
+            assert sides[k, side] == pytest.approx(max(end, 0.0), abs=1e-5)
