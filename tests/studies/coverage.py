@@ -10,6 +10,9 @@ The first ``--dense`` records of each case are also profiled densely: the others
 values over the whole range of a parameter, from all minima that the search found and from the
 truth. That interval, by the true covariance of the noise, is what the width of the printed one is
 compared with.
+
+With ``--given drawn`` each true value that the case gives lies about that one by its default error;
+counted are the intervals of all that is fitted, given values too.
 """
 
 import argparse
@@ -29,11 +32,13 @@ from scipy.stats import binomtest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from coverage_cases import HARD_CASES, noisy, truth_of
+from coverage_cases import HARD_CASES, drawn, noisy, truth_of
 from dense_profiles import dense_intervals
 from truths import holds
 
+from exfit.errors import ExfitError
 from exfit.util.files import write
+from exfit.workflows import fit
 from exfit.workflows.case_search import STAGES
 from exfit.workflows.search_state import SearchState, in_turn
 
@@ -42,6 +47,9 @@ DENSE = 20
 EVERY = 15.0  # s: how often the results are written
 BAND = (0.92, 0.98)
 WIDEST = 1.3  # times the dense profile's
+OF_DRAWN = (
+    "linear", "ac1a_limit", "ac1a_kd", "ac8b_unit2", "ac8b_ifd", "st3a", "uneven", "st6b_instant"
+)  # fmt: skip
 
 
 def ignore(_):
@@ -80,6 +88,38 @@ def record_of(task):
         outcome["dense"] = dense_intervals(name, problem, search, printed)
         outcome["dense_seconds"] = round(time.process_time() - began - seconds, 3)
     return name, number, outcome
+
+
+def drawn_of(task):
+    """Return the intervals of a fit whose given values are drawn, each with its truth."""
+    name, number, seed, _ = task
+    began = time.process_time()
+    case, truth = drawn(name, np.random.default_rng([seed, number, *name.encode()]))
+    try:
+        result = fit(case)
+    except ExfitError as refusal:
+        return name, number, {"seconds": 0.0, "parameters": {}, "refused": str(refusal)}
+    known = {
+        parameter: [*own.interval, truth[parameter]]
+        for parameter, own in result.parameters.items()
+        if own.interval is not None and parameter in truth
+    }
+    seconds = round(time.process_time() - began, 3)
+    return name, number, {"seconds": seconds, "parameters": known}
+
+
+def table_of_drawn(outcomes):
+    """Return the table of cases whose given values are drawn."""
+    table = Table(title="given values drawn by their default errors")
+    for heading in ("case", "records", "intervals", "hold", "%", "s"):
+        table.add_column(heading, justify="right")
+    every = {"all": [each for of in outcomes.values() for each in of.values()]}
+    for name, of in {**{name: [*of.values()] for name, of in outcomes.items()}, **every}.items():
+        known = [holds(each[:2], each[2]) for o in of for each in o["parameters"].values()]
+        share = percent(sum(known) / len(known)) if known else "-"
+        seconds = f"{np.mean([each['seconds'] for each in of]):.2f}"
+        table.add_row(name, str(len(of)), str(len(known)), str(sum(known)), share, seconds)
+    return table
 
 
 def width(interval, parameter):
@@ -181,6 +221,7 @@ def arguments():
     parser.add_argument("--case", action="append", choices=[*HARD_CASES], help="all by default")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--given", choices=("exact", "drawn"), default="exact")
     parser.add_argument("--dense", type=int, default=DENSE, help="records with dense profiles")
     parser.add_argument("--results", type=Path, help="JSON file, written as it goes")
     return parser.parse_args()
@@ -197,12 +238,14 @@ def main():
             write(given.results, json.dumps(content))
 
     with ProcessPoolExecutor(given.threads) as pool:
-        for name in given.case or HARD_CASES:
+        by_drawing = given.given == "drawn"
+        for name in given.case or (OF_DRAWN if by_drawing else HARD_CASES):
             done, saved = outcomes.setdefault(name, {}), time.monotonic()
             numbers = [n for n in range(given.records) if str(n) not in done]
             tasks = [(name, number, given.seed, number < given.dense) for number in numbers]
             try:
-                for count, (_, number, outcome) in enumerate(pool.map(record_of, tasks), 1):
+                made = pool.map(drawn_of if by_drawing else record_of, tasks)
+                for count, (_, number, outcome) in enumerate(made, 1):
                     done[str(number)] = outcome
                     if time.monotonic() > saved + EVERY:
                         print(f"{name}: {count} of {len(tasks)}", flush=True)
@@ -210,9 +253,13 @@ def main():
                         saved = time.monotonic()
             finally:
                 save()
+            if by_drawing:
+                continue
             table, figures_of[name] = table_of(name, [done[key] for key in sorted(done, key=int)])
             console.print(table)
             save()
+    if by_drawing:
+        console.print(table_of_drawn(outcomes))
 
 
 if __name__ == "__main__":

@@ -16,9 +16,12 @@ from linearised import autoregressive
 from places import CONFIGS
 from scipy.signal import lfilter
 
+from exfit.case.case import Case
+from exfit.case.given_errors import given_std_errors
 from exfit.case.load import parse_case
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import problem_of, residuals_of
+from exfit.records.record import Record
 
 # what the sample records were made with: sample_data/README.md
 AC1A = {"KA": 364.1523, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542}
@@ -26,6 +29,7 @@ AC1A |= {"KC": 0.486, "KD": 0.4039}
 UNIT2 = {"KPR": 85.6266, "KIR": 2.5912, "KDR": 25.381, "TDR": 0.2044, "TE": 1.8426}
 UNIT2 |= {"KC": 0.3233, "KD": 0.0265}
 FINE, COARSE = 1e-4, 5e-4  # pu: noise of vt, and the digit of a coarse recorder
+LEAST = 0.3  # of a given value: what is left of it by a large error
 TIME = np.linspace(0.0, 10.0, 1001)
 EVERY_5_MS = np.linspace(0.0, 6.0, 1201)
 
@@ -182,6 +186,34 @@ def with_noise(setup, hard, rng):
 
     channels = tuple(recorded(channel) for channel in setup.experiment.channels)
     return replace(setup, experiment=replace(setup.experiment, channels=channels))
+
+
+def drawn(name, rng):
+    """Return a case whose given values are as wrong as their default errors say, and the truth.
+
+    Each true value lies about the given one by its error, those of no unit left out; the record is
+    the response to these, with noise.
+    """
+    hard, content = HARD_CASES[name], content_of(HARD_CASES[name])
+    content.pop("given", None)
+    del content["record"]["file"]
+    blank = {signal: np.ones_like(hard.time) for signal in hard.noise}
+    case = Case.from_dict(content, Record.from_arrays(hard.time, blank))
+    values, errors = case.values(), given_std_errors(case)
+    truth = {
+        given: values[given] * max(1.0 + rng.standard_normal() * error / abs(values[given]), LEAST)
+        for given, error in errors.items()
+    }
+    truth |= hard.truth
+    (setup,) = build_experiments(case)
+    setup = setup.with_enough_substeps({**values, **truth})
+    samples = setup.experiment.samples({**values, **truth})[0]
+    recorded = {
+        channel.signal: samples[:, k]
+        + hard.noise[channel.signal] * rng.standard_normal(len(samples))
+        for k, channel in enumerate(setup.experiment.channels)
+    }
+    return Case.from_dict(content, Record.from_arrays(hard.time, recorded)), truth
 
 
 def truth_of(name, problem):
