@@ -79,11 +79,10 @@ def _either(evidence: Evidence) -> Iterator[Cause]:
     """Name given values that were fitted where others explain the record as well."""
     for refined in evidence.refined:
         if refined.others:
-            given, others = listed([*refined.names]), ", ".join(refined.others[:MOST_OTHERS])
-            more = len(refined.others) - MOST_OTHERS
-            others += f" and {more} more" if more > 0 else ""
-            words = f"not as given is {given}, now fitted, or, as likely, {others}"
-            yield Cause(words, "measure what can be measured: the record does not tell which")
+            others, more = refined.others[:MOST_OTHERS], len(refined.others) - MOST_OTHERS
+            listing = ", or ".join([*others, *([f"{more} more"] if more > 0 else [])])
+            words = f"not as given: {listed([*refined.names])}, now fitted, or as likely {listing}"
+            yield Cause(words, "measure what you can: the record does not tell which")
 
 
 def _refuted(evidence: Evidence) -> "Sequence[Refuted]":

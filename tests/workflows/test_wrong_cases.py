@@ -55,3 +55,22 @@ def test_a_fault_is_named_and_not_called_good(kind, level, unit, number):
     verdict = fit(case.case).verdict
     assert verdict.verdict != GOOD
     assert 0 < cause_line(case.names, verdict.causes) <= LINES, verdict.causes
+
+
+@pytest.mark.parametrize(
+    ("kind", "level", "unit", "number", "fitted"),
+    [
+        ("speed", 2, "AC8B", 348, "machine.Tpd0"),
+        ("speed", 1, "EXAC1", 344, "machine.Tpd0"),
+        ("values", 2, "AC8B", 189, "machine.S10"),
+    ],
+)
+def test_what_a_record_does_not_tell_from_the_value_that_is_fitted_is_named(
+    kind, level, unit, number, fitted
+):
+    """With vt alone a speed is a gain and another saturation: n times the flux, n times efd."""
+    case = drawn(Task(kind, level, unit, (92417, number)))
+    result = fit(case.case)
+    assert fitted in result.parameters
+    assert fitted not in case.names
+    assert cause_line(case.names, result.verdict.causes) == 1, result.verdict.causes
