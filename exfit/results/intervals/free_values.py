@@ -78,26 +78,29 @@ def sides_with_values(
         for start in starts
     ]
     ends = [short_descent(whole, at, MOST_ITERATIONS, tolerance=TOLERANCE) for at in points]
-    found = [end for end in ends if end is not None and np.isfinite(end.cost)]
-    least, count = min((end.cost for end in found), default=inf), len(theta)
+    found = [(end.x, end.cost) for end in ends if end is not None]
+    least, count = min((cost for _, cost in found), default=inf), len(theta)
     spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
     sides, at = np.zeros((count, 2)), residuals.values(theta)
-    for end in found:
-        rise = NORMAL**2 - 2.0 * (end.cost - least) / whole.noise**2
+    for x, cost in found:
+        rise = NORMAL**2 - 2.0 * (cost - least) / whole.noise**2
         if rise > 0.0:
-            values = whole.values(end.x)
-            slopes = whole.exact(end.x) / slopes_of(whole, end.x)  # in their own units
-            rows = np.column_stack([slopes[:, count:], slopes[:, :count], whole(end.x)])
-            free = residuals.free
-            room = {
-                k: (each.low - values[each.name], each.high - values[each.name])
-                for k, each in enumerate(free)
-                if each.bound(values[each.name]) is not None
-            }
-            own = sides_within(room, rows / spread[:, None], count, rise)
-            moved = np.array([values[each.name] - at[each.name] for each in free])
+            values = whole.values(x)
+            slopes = whole.exact(x) / slopes_of(whole, x)  # in their own units
+            rows = np.column_stack([slopes[:, count:], slopes[:, :count], whole(x)])
+            own = sides_within(_room(residuals, values), rows / spread[:, None], count, rise)
+            moved = np.array([values[each.name] - at[each.name] for each in residuals.free])
             sides = np.maximum(sides, own + moved[:, None] * [-1.0, 1.0])
     return sides
+
+
+def _room(residuals: Residuals, values: Mapping[str, float]) -> dict[int, tuple[float, float]]:
+    """Return how far the parameters on bounds may move down and up, by their places."""
+    return {
+        k: (each.low - values[each.name], each.high - values[each.name])
+        for k, each in enumerate(residuals.free)
+        if each.bound(values[each.name]) is not None
+    }
 
 
 def sides_within(
