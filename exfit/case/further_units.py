@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from exfit.case.load_controller import with_load_controller
 from exfit.case.parts import Contradictions, Data, Part, Parts, added_part, machine_part
 from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
@@ -40,6 +41,10 @@ def with_further_units(
                 part = machine_part(model, True) if machine else added_part(key, "", model)
                 begin = prefix if key == "exciter" else f"{prefix}{key}."
                 parts.append(replace(part, kind=begin[:-1], prefix=begin, section=(*place, key)))
+        if isinstance(entry.get("governor"), dict):
+            moved = with_load_controller(found["governor"], entry, place, prefix, named)
+            found["governor"], controller = moved
+            parts += controller
         parts.append(_place_part(entry.get("network"), prefix + NETWORK, place, kind))
         if (model := found["stabiliser"]) is not None:
             heard = entry["stabiliser"].get("inputs")

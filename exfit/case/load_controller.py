@@ -1,25 +1,30 @@
-"""The load controller of a case's governor."""
+"""The load controller of a governor of a case."""
 
 from collections.abc import Callable
 from typing import Any
 
-from exfit.case.parts import Data, Parts, added_part
+from exfit.case.parts import Data, Part, added_part
 from exfit.models import LOAD_CONTROLLERS
 from exfit.models.load_control import controlled
+from exfit.models.sheet import Model
 from exfit.plants import LOAD_CONTROLLER, MOVING_PREF
+from exfit.util.text import Place
 
 PLACE = ("governor", "load_controller")
 
 
-def with_load_controller(found: Parts, section: Data, named: Callable[..., Any]) -> Parts:
-    """Return parts whose governor has the load controller of its section, with that as a part.
+def with_load_controller(
+    governor: Model | None, unit: Data, at: Place, prefix: str, named: Callable[..., Any]
+) -> tuple[Model | None, tuple[Part, ...]]:
+    """Return a unit's governor with the load controller beside it, and that as a part.
 
-    ``named`` finds what a section names in a catalogue, and adds a fault where there is none.
+    ``at`` is the place of the unit, and ``prefix`` begins the names of its parameters. ``named``
+    finds what a section names in a catalogue, and adds a fault where there is none.
     """
-    own, model = section[PLACE[-1]], (*PLACE, "model")
-    controller = named(own, model, LOAD_CONTROLLERS, LOAD_CONTROLLER)
-    if controller is None or found.governor is None:
-        return found
-    part = added_part(LOAD_CONTROLLER, MOVING_PREF, controller, PLACE)
-    governor = controlled(found.governor, controller)
-    return found._replace(governor=governor, all=(*found.all, part))
+    place, section = (*at, *PLACE), unit[PLACE[0]].get(PLACE[1])
+    controller = named(section, (*place, "model"), LOAD_CONTROLLERS, LOAD_CONTROLLER)
+    if controller is None or governor is None:
+        return governor, ()
+    kind = f"{prefix}{MOVING_PREF}"[:-1] if prefix else LOAD_CONTROLLER
+    part = added_part(kind, prefix + MOVING_PREF, controller, place)
+    return controlled(governor, controller), (part,)

@@ -175,7 +175,8 @@ def _with_others(found: Parts, data: Data, kind: PlantKind, named: Callable[...,
     if "load_controller" in _mapping(data.get("governor")):
         from exfit.case.load_controller import with_load_controller
 
-        found = with_load_controller(found, data["governor"], named)
+        governor, part = with_load_controller(found.governor, data, (), "", named)
+        found = found._replace(governor=governor, all=(*found.all, *part))
     entries = _entries(data.get("further_units"))
     if not entries or not kind.beside:
         return found

@@ -68,10 +68,10 @@ def taken_apart(content: Content) -> Apart:
 def sections_of(content: Content) -> Iterator[Place]:
     """Yield the places of the sections in which values may have sources."""
     top = ContentNode((), content)
-    nodes = [top.at(key) for key in ("parameters", "plant", "stabiliser", "governor")]
-    nodes += [top.at("governor", "load_controller"), *top.at("limiters").entries]
+    nodes = [*map(top.at, ("parameters", "plant", *PARTS)), *top.at("limiters").entries]
     for unit in top.at("further_units").entries:
         nodes += [unit, *map(unit.at, PARTS)]
+    nodes += [node.at("load_controller") for node in nodes]
     for key in ("records", "validate", "tests"):
         nodes += [entry.at("plant") for entry in top.at(key).entries]
     return (node.place for node in nodes if node.is_section)

@@ -196,11 +196,9 @@ def _faults_without_governor(
 
 def _fits(content: ContentNode) -> bool:
     """Tell if a parameter of any part is free."""
-    places = ("parameters", "plant", "stabiliser", "governor")
-    sections = [*map(content.at, places), content.at("governor", "load_controller")]
-    sections += content.at("limiters").entries
+    sections = [*(part for _, part in content.sections), *content.at("limiters").entries]
     sections += [part for unit in content.at("further_units").entries for _, part in unit.sections]
-    return any(section.at("free").content for section in sections)
+    return any(x.at("free").content or x.at("load_controller", "free").content for x in sections)
 
 
 def _estimate_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:

@@ -366,7 +366,7 @@ class FurtherUnitSection(Section):
     exciter: Later[AddedModel] = Field(description="Its exciter.")
     machine: Later[AddedModel] = Field(description="Its machine.")
     stabiliser: Later[Stabiliser] | None = Field(default=None, description="Its stabiliser.")
-    governor: Later[AddedModel] | None = Field(default=None, description="Its governor.")
+    governor: Later[Governor] | None = Field(default=None, description="Its governor.")
     network: Frozen[Known] = Field(
         description="base: its MVA over those of the case's unit; share_P and share_Q: what it has "
         "of p and q at the start; R, X, Ra, Rc and Xc as of the case's unit. pu on its base."

@@ -155,6 +155,28 @@ def test_exciters_of_two_units_are_found_from_their_sums(folder):
     }
 
 
+def test_a_load_controller_of_a_further_unit_does_what_that_of_the_first_does(tmp_path):
+    """Of two equal units, which share the power, it does not matter which one has it."""
+    recorded(tmp_path / "one.csv")
+    governor = {"model": "TGOV1", "parameters": {"R": 0.05}}
+    free = {"start": 0.5, "min": 0.05, "max": 5.0}
+    controller = {"model": "LCFB1", "parameters": {"Kp": 1.0}, "free": {"Ki": free}}
+    moved, powers = governor | {"load_controller": controller}, []
+    equal = {
+        "exciter": {"model": "SEXS", "parameters": FIXED | TRUTH},
+        "machine": {"model": "GENROU", "parameters": UNIT},
+        "network": {"base": 1.0, "share_P": 0.5, "share_Q": 0.5},
+    }
+    for first, second in ((moved, governor), (governor, moved)):
+        units = {"governor": first, "further_units": [equal | {"governor": second}]}
+        case = load_case(event_case(tmp_path, "one", free=False, **units))
+        powers.append(simulate(case, {}).response.signals["p"])
+    assert case.free().keys() == {"unit2.governor.load_controller.Ki"}
+    idle = simulate(case, {"unit2.governor.load_controller.Irmax": 0.0}).response.signals["p"]
+    assert np.abs(idle - powers[0]).max() > 1e-3
+    np.testing.assert_allclose(powers[0], powers[1], rtol=0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -167,6 +189,10 @@ def test_exciters_of_two_units_are_found_from_their_sums(folder):
             "[0].stabiliser.inputs: 2 given; PSS1A takes 1",
         ),
         ({"governor": {"model": "TGOV1", "parameters": {"R": -1}}}, "governor.parameters.R: -1"),
+        (
+            {"governor": {"model": "TGOV1", "load_controller": {"model": "LCFB2"}}},
+            "[0].governor.load_controller.model: 'LCFB2' is not a load controller model",
+        ),
         ({"limiters": []}, "further_units[0].limiters: "),
     ],
 )
