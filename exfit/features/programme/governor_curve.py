@@ -7,10 +7,16 @@ from typing import Literal
 
 import numpy as np
 
+from exfit.dsp.noise import noise
 from exfit.errors import ModelError, RecordError
 from exfit.estimate.solver import NotFinite
 from exfit.features.programme.point_fit import FittedPoints, PointProblem, fit_points
-from exfit.features.programme.result import LARGEST_SHARE, FieldReading, GovernorCurve
+from exfit.features.programme.result import (
+    LARGEST_NOISES,
+    LARGEST_SHARE,
+    FieldReading,
+    GovernorCurve,
+)
 from exfit.fitting.parameters import FreeParameter
 from exfit.inference.linear import ResidualBlock
 from exfit.models.governor_parts import outside_band
@@ -108,7 +114,8 @@ def droop_curve(
 
     It is ``level`` less the speed outside the dead band, over the droop, behind a ``lag``; both are
     found, too. Of the record (M,), evenly sampled, with a reference that stays, the beginning is
-    not compared. Arguments as of ``gate_curve``; ``answer`` is named.
+    not compared. Arguments as of ``gate_curve``; ``answer`` is named. The usual limit is
+    LARGEST_SHARE of its rms about the mean, or LARGEST_NOISES times its noise if that is larger.
 
     Raises RecordError for samples that are not even, ModelError for a governor without a droop.
     """
@@ -170,12 +177,13 @@ def _fitted(
     if not np.isfinite(response).all():
         at = int(np.argmin(np.isfinite(response)))
         raise RecordError(f"point {at + 1} ({x_name} {show(x[at])} pu): the governor has no rest")
+    noises = LARGEST_NOISES * noise(measured) if x_name == "speed" else 0.0
     about = measured if x_name == "p" else measured - np.mean(measured)
+    moved = float(np.sqrt(np.mean(about**2)))
+    usual = max(LARGEST_SHARE * moved, noises)
     scatter = None if fit is None else fit.scatter(name) / weight
-    usual = LARGEST_SHARE * float(np.sqrt(np.mean(measured**2)))
     reading = FieldReading(name, "pu", 1.0, measured, response, None, scatter, limit or usual)
     parameters = {} if fit is None else _parameters(governor, free, fit)
-    moved = float(np.sqrt(np.mean(about**2)))
     return GovernorCurve(
         governor=governor.name,
         over=x_name,

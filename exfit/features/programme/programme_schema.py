@@ -178,7 +178,8 @@ class GovernorTest(TestAtRest):
     )
     accept: Limit | None = Field(
         default=None,
-        description="Limit of the rms difference of gate or p, pu. Default: 2 % of its rms.",
+        description="Limit of the rms difference of gate or p, pu. Default: 2 % of its rms; with "
+        "speed about its mean, or 3 times its noise.",
     )
 
 

@@ -20,7 +20,8 @@ from exfit.util.typed import IN_FILE, KEY, plain
 SaturationForm = Literal["quadratic", "exponential", "exponential-se"]
 WithValues = TypeVar("WithValues", "FittedCurve", "SaturationResult")
 
-LARGEST_SHARE = 0.02  # of the rms of a field signal: what instruments and model may leave
+LARGEST_SHARE = 0.02  # of the rms of a signal: what instruments and model may leave
+LARGEST_NOISES = 3.0  # times its noise: a misfit that still counts as a match
 
 
 @dataclass(frozen=True)

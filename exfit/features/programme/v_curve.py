@@ -19,6 +19,7 @@ from exfit.features.programme.point_fit import (
     fit_points,
 )
 from exfit.features.programme.result import (
+    LARGEST_NOISES,
     LARGEST_SHARE,
     FieldReading,
     PowerLevel,
@@ -40,7 +41,6 @@ Values = Mapping[str, float]
 
 SALIENCY = "saliency"  # (1 - Xq / Xd)^2, in which the field current is smooth up to Xq = Xd
 UP_TO_XD = "has no upper limit: the points do not exclude Xq = Xd"
-LARGEST_NOISES = 3.0  # times the noise that is given: a misfit that still counts as a match
 LEVEL_GAP = 0.04  # pu of power, between points of one level and those of the next
 CURVE_POINTS = 101  # of the model's curve of a level, odd: one lies at its middle
 WIDER = 0.1  # of the range of q: how far the model's curve goes beyond the points

@@ -105,6 +105,20 @@ def test_a_programme_finds_the_droop_the_band_and_the_gate_curve_and_passes_them
     assert again.values == result.values
 
 
+def test_a_reference_that_moves_in_a_slow_record_is_no_match(monkeypatch):
+    """By ten times the noise of the gate, of which 2 % are more than is left."""
+    monkeypatch.setattr(droop, "LENGTH", 900.0)
+    generator = np.random.default_rng(5)
+    _, columns = droop.drawn(generator)
+    still = droop.fitted(columns, generator)
+    assert still.verdict.verdict != "no match"
+    assert still.reading.limit == pytest.approx(3.0 * droop.NOISE["gate"], rel=0.15)
+    columns["gate"] += 1e-2 * (np.abs(columns["time"] - 450.0) < 150.0)
+    moved = droop.fitted(columns, generator)
+    assert moved.reading.rms < 0.02 * 0.6
+    assert moved.verdict.verdict == "no match"
+
+
 def test_intervals_hold_the_truth_of_some_records(monkeypatch):
     """The study has 200 hours of each; these are quarters of an hour."""
     monkeypatch.setattr(droop, "LENGTH", 900.0)
