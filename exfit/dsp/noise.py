@@ -35,9 +35,8 @@ def noise(samples: Array, order: int = 2) -> float:
             f"{len(samples)} samples: the noise is estimated from at least {order + 1}"
         )
     scatter = spread(np.diff(samples, order)) / sqrt(comb(2 * order, order))
-    before, at, after = samples[:-2], samples[1:-1], samples[2:]
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    lasting = np.minimum(np.maximum(at, low), high)  # medians of three: longer than a spike
+    sides = samples[:-2], samples[2:]  # medians of three are longer than a spike
+    lasting = np.clip(samples[1:-1], np.minimum(*sides), np.maximum(*sides))
     steps = np.diff(distinct(lasting))
     return max(float(scatter), UNIFORM_SPREAD * float(np.min(steps)) if len(steps) else 0.0)
 

@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
+from unittest import mock
 
 from mutants import Mutant
 from places import ROOT
@@ -196,12 +197,12 @@ def tried(mutant: Mutant, workplace: Path) -> Tried:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     os.chdir(folder)
-    os.environ["EXFIT_CONFIG"] = str(folder / CONFIGURATION)
     wrong: list[Finding] = []
     codes, seconds = [], 0.0
     for arguments in commands(mutant, folder):
         before = _listing(folder)
-        ran = run(arguments)
+        with mock.patch.dict(os.environ, EXFIT_CONFIG=str(folder / CONFIGURATION)):
+            ran = run(arguments)
         wrong += judged(ran)
         wrong += written(ran, folder, before)
         codes.append(ran.code)
