@@ -4,14 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from exfit.case.case_draft import (
-    CaseDraft,
-    Noted,
-    Section,
-    in_comment,
-    parameter,
-    with_sources,
-)
+from exfit.case.case_draft import CaseDraft, Noted, Section, in_comment, parameter, with_sources
 from exfit.errors import DynamicsError, ExfitError
 from exfit.features.planner.buses import NO_BUSES, Buses
 from exfit.features.planner.fields import DynamicsFault, text_of

@@ -13,14 +13,7 @@ from exfit.models import GOVERNORS, LIMITERS, LOAD_CONTROLLERS, MODELS, STABILIS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.machines.machine import unusual_reactances
-from exfit.models.sheet import (
-    DynamicsRecord,
-    Model,
-    Parameter,
-    Sheet,
-    saturation_points,
-    typical,
-)
+from exfit.models.sheet import DynamicsRecord, Model, Parameter, Sheet, saturation_points, typical
 from exfit.plants import LOAD_CONTROLLER, MOVING_PREF
 from exfit.util.text import rounded, show, show_value
 

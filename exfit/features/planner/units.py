@@ -286,7 +286,11 @@ def _unit_of(heads: Sequence[Head], driven: Driven) -> tuple[Unit | None, list[D
         warnings.append(DynamicsFault(of_load.line, what))
     known = None if compensation is None else of_load
     unknown = [head for head in heads if head.definition is None and head is not known]
-    warnings += [DynamicsFault(head.line, _left_out(head.name)) for head in unknown]
+    for head in unknown:
+        kind = OTHERS.get(head.name.upper())
+        what = f"{head.name} is left out: not a known model"
+        what = what if kind is None else f"{kind} {head.name} is left out"
+        warnings.append(DynamicsFault(head.line, what))
     controller = _moving(parts, warnings)
     governor = _governing(parts.get(GOVERNOR), heads, driven, warnings)
     unit = Unit(
@@ -551,10 +555,3 @@ def _meant(name: str, program: str) -> str | None:
     """Return the machine or exciter whose name is nearly this one, if one is."""
     names = [known for kind in NEEDED for known in _names_of(kind, program)]
     return closest(name, names, NEARLY_THE_NAME)
-
-
-def _left_out(name: str) -> str:
-    kind = OTHERS.get(name.upper())
-    return (
-        f"{name} is left out: not a known model" if kind is None else f"{kind} {name} is left out"
-    )

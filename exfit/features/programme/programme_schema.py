@@ -4,14 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, TypeVar
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Tag,
-    WrapSerializer,
-)
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, WrapSerializer
 
 from exfit.case.schema import CaseDocument, FreeSection, Recording
 from exfit.case.schema.estimate import Limit

@@ -13,15 +13,7 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.governor_parts import (
-    BAND,
-    PLAIN,
-    backlash,
-    curve,
-    governor,
-    in_use,
-    outside_band,
-)
+from exfit.models.governor_parts import BAND, PLAIN, backlash, curve, governor, in_use, outside_band
 from exfit.models.governors.hygov import SHUT
 from exfit.models.sheet import (
     DIVIDING_TIME,

@@ -1,32 +1,8 @@
 """Gas turbines by Rowen, whose exhaust temperature limits the fuel: GAST2A and GASTWD."""
 
-from exfit.models.blocks import (
-    Signal,
-    clip,
-    lag,
-    larger,
-    limited,
-    pid,
-    smaller,
-    where,
-)
-from exfit.models.governor_parts import (
-    BAND,
-    banded,
-    delayed,
-    governor,
-    in_use,
-    outside_band,
-)
-from exfit.models.sheet import (
-    DIVIDING_TIME,
-    LONG_TIME,
-    SHORT_TIME,
-    TIME,
-    WITHIN_10,
-    limits,
-    sheet,
-)
+from exfit.models.blocks import Signal, clip, lag, larger, limited, pid, smaller, where
+from exfit.models.governor_parts import BAND, banded, delayed, governor, in_use, outside_band
+from exfit.models.sheet import DIVIDING_TIME, LONG_TIME, SHORT_TIME, TIME, WITHIN_10, limits, sheet
 
 TURBINE = """
                                         MAX

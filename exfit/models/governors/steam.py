@@ -1,15 +1,6 @@
 """Governors of steam turbines: IEEEG1, IEESGO and TGOV1."""
 
-from exfit.models.blocks import (
-    Signal,
-    clip,
-    lag,
-    larger,
-    lead_lag,
-    limited,
-    limited_lag,
-    smaller,
-)
+from exfit.models.blocks import Signal, clip, lag, larger, lead_lag, limited, limited_lag, smaller
 from exfit.models.governor_parts import (
     BAND,
     PLAIN,
@@ -19,15 +10,7 @@ from exfit.models.governor_parts import (
     outside_band,
     with_band,
 )
-from exfit.models.sheet import (
-    DIVIDING_TIME,
-    TIME,
-    UP_TO_100,
-    WITHIN_10,
-    limits,
-    record,
-    sheet,
-)
+from exfit.models.sheet import DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, limits, record, sheet
 
 # a dead band and a valve's curve, which the model does not have
 NOT_MODELLED = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6"
