@@ -196,10 +196,9 @@ def ggov1(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     of wf to fsrt where Dm is not negative (InterPSS multiplies it with the speed
     there) and the input of Kimw/s (pe, or p without its lag). The delay of a
     diesel engine, Teng, stands where OpenIPSL and Dynawo have it; it is a Padé
-    approximant of order two (see DEGOV1). Rup and Rdown, rates of the load limit, do
-    nothing here, as in PowerWorld, whose diagram says so (GridKit at 366540c7); only
-    Dynawo has them, at fsrt. Typical data are those of the public libraries
-    (OpenIPSL, InterPSS).
+    approximant of order two (see DEGOV1). Rup and Rdown, rates of the load limit,
+    do nothing, as in PowerWorld, whose diagram says so (GridKit at 366540c7); only
+    Dynawo has them, at fsrt. Typical data are those of OpenIPSL and InterPSS.
     """
     low, high, Ldref = (
         in_use(s.VMIN0, p.VMIN),
