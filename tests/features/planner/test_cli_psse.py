@@ -227,7 +227,7 @@ def test_a_fitted_stabiliser_is_written_behind_its_exciter(run, fitted, pssx):
     parameters = {**result_of(fitted)["parameters"], "stabiliser.k": of_value(7.0)}
     changes = {"stabiliser_model": "PSSX", "stabiliser": {"k": 5.0, "a": 3.0}}
     sources = {**result_of(fitted)["sources"], "stabiliser.k": "fitted"}
-    named(fitted, parameters=parameters, history=[], sources=sources, **changes)
+    named(fitted, parameters=parameters, history=[], knowledge=None, sources=sources, **changes)
     code, out, _ = run("export", fitted)
     assert code == 0
     assert out.splitlines()[-1].split() == ["1", "'PSSX'", "1", "1", "3.0", "7.0", "/"]
@@ -404,7 +404,7 @@ def test_a_result_or_its_folder_gives_the_same_on_the_terminal(run, fitted):
 def test_fitted_values_of_the_machine_go_over_those_of_the_case(run, fitted):
     parameters = {**result_of(fitted)["parameters"], "machine.Tpd0": of_value(5.5)}
     sources = {**result_of(fitted)["sources"], "machine.Tpd0": "fitted"}
-    named(fitted, parameters=parameters, history=[], sources=sources)
+    named(fitted, parameters=parameters, history=[], knowledge=None, sources=sources)
     _, out, _ = run("export", fitted)
     assert read_unit(out, "out.dyr").machine.values["Tpd0"] == 5.5
     assert "// GENROU: fitted: Tpd0." in out.splitlines()
@@ -450,7 +450,8 @@ def with_limiter(folder, model, name, place=None, **changes):
     text = "" if place is None else f"limiters: [{{model: {name}, place: {place}}}]\n"
     at = {"limiter_models": {"oel": name}, "limiters": {"oel": values}}
     exciter = {"model": model, "fixed": typical(MODELS[model].sheet), "parameters": {}}
-    named(folder, **at, **exciter, history=[], inputs={}, case_text=text, **changes)
+    of_none = {"history": [], "inputs": {}, "knowledge": None}
+    named(folder, **at, **exciter, **of_none, case_text=text, **changes)
     return values
 
 
