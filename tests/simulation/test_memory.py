@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 import yaml
 from extreme_cases import TYPICAL, run, write_case
-from places import CONFIGS, SAMPLES
+from places import SAMPLES
 
-import exfit
 from exfit.cli import main
 from exfit.errors import SimulationError
 from exfit.fitting.memory import check_fit
 from exfit.simulation.memory import GIGABYTE, RunSize, check_run
-from exfit.workflows import case_search
 
 RUN = RunSize(2e6, 10_000, 11)
 RECORD = RunSize(1e5, 20_000, 11, 2)
@@ -38,13 +36,6 @@ def test_located_crossings_and_a_written_result_take_memory():
     check_fit([short] * 2, 1, 1.0)
     with pytest.raises(SimulationError, match="1 parameters to 200000 samples"):
         check_fit([short] * 10, 1, 1.0)
-
-
-def test_steps_that_the_response_found_needs_are_checked_for_all_records(monkeypatch):
-    checked = []
-    monkeypatch.setattr(case_search, "check_memory", lambda _, each: checked.append(each))
-    exfit.fit(CONFIGS / "ac1a_typical.yaml", search="local")
-    assert [[each.name for each in records] for records in checked] == [["fit"]]
 
 
 SIMULATING = (

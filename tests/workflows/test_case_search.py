@@ -64,11 +64,15 @@ def test_a_fit_is_kept_whose_shorter_steps_need_more_memory(monkeypatch):
     case = exfit.Case.from_dict(content, {"fit": exfit.Record.from_arrays(time, {"vt": truth})})
     assert ON_FINER_GRID in [line.phase for line in exfit.fit(case).history]
 
-    def refuse(*_):
+    asked = []
+
+    def refuse(_, experiments):
+        asked.append([each.name for each in experiments])
         raise CaseError("the limit is 2 GB")
 
     monkeypatch.setattr(case_search, "check_memory", refuse)
     result = exfit.fit(case)
+    assert asked == [["fit"]]
     assert ON_FINER_GRID not in [line.phase for line in result.history]
     assert result.parameters["a"].value == pytest.approx(fast, rel=1e-3)
     assert any("shorter steps" in note and "2 GB" in note for note in result.notes)
