@@ -11,6 +11,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from exfit.errors import SimulationError
+from exfit.estimate import half_square
 from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import freed_within
@@ -32,11 +33,7 @@ def starts_of_values(
     std_errors: Mapping[str, float],
     setups: Sequence[ExperimentSetup],
 ) -> Iterator[dict[str, float]]:
-    """Yield given values to start from: none changed, and each limit of which some would act.
-
-    That is one that the response does not meet, but would within 1.96 of its standard errors.
-    """
-    yield {}
+    """Yield each limit that the response would meet within 1.96 of its errors, as it then acts."""
     values, reached = residuals.values(theta), dict[str, float]()
     for setup in setups:
         try:
@@ -79,7 +76,8 @@ def sides_with_values(
     ]
     ends = [short_descent(whole, at, MOST_ITERATIONS, tolerance=TOLERANCE) for at in points]
     found = [(end.x, end.cost) for end in ends if end is not None]
-    least, count = min((cost for _, cost in found), default=inf), len(theta)
+    count, least = len(theta), half_square(residuals(theta))  # of the values as given
+    least = min([least, *(cost for _, cost in found)])
     spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
     sides, at = np.zeros((count, 2)), residuals.values(theta)
     for x, cost in found:

@@ -101,7 +101,9 @@ def errors_of_values(
         share = np.diag(known.T @ known @ covariance)  # of each value that the record knows
         chance = float(np.sum(share))
         surprising = -float(pull @ mean) > chance + 2.0 * sqrt(2.0 * chance)
-        if surprising or len(starts) > 1 or not influence.moving.all():
+        if surprising or not influence.moving.all():
+            starts.append({})
+        if starts:
             sides = sides_with_values(residuals, theta, std_errors, spread, starts)
     return ErrorsOfValues(given, dict(zip(names, together.tolist(), strict=True)), sides=sides)
 
