@@ -286,7 +286,10 @@ class _Run(CrossingSearch):
         due = w.let(f"fcmp ole double {position}, {end}")
         w.put(f"br i1 {due}, label %sampled, label %samples.done")
         w.label("sampled")
-        s = self.splat(w.let(f"fsub double {position}, {k}"))
+        s, last = w.let(f"fsub double {position}, {k}"), self.get(self.end)
+        # the sum of k and the end may be rounded up to the sample, which this difference exceeds
+        past = w.let(f"fcmp ogt double {s}, {last}")
+        s = self.splat(w.let(f"select i1 {past}, double {last}, double {s}"))
         inside = self.both(self.test("ole", s, te), self.test("ogt", s, after))
         inside = self.both(inside, committed)
         way = self.op("fdiv", self.op("fsub", s, tb), length)
@@ -494,6 +497,7 @@ class _Run(CrossingSearch):
         j = w.let(f"add i64 {self.get(self.j)}, 1")
         more = w.let(f"icmp slt i64 {j}, %m")
         self.put(self.tb, self.splat(self.get(self.end)))
+        self.put(self.after, self.number(EVER))  # what is read is passed
         w.put(f"br i1 {more}, label %substep, label %step")
 
         w.label("step")

@@ -133,6 +133,16 @@ def test_every_choice_has_a_mode_also_one_that_only_an_output_makes(model):
     assert symbols <= known
 
 
+def test_a_sample_at_the_end_of_a_sub_step_is_read_however_its_place_is_rounded():
+    """A nanosecond later the response differs by 1e-8 pu at most."""
+    ends, directions = np.linspace(0.0, 6.0, 3001), each(("KA",))
+    tests = [unit("AC1A", 1e-2, times=ends + late).remade(least=5) for late in (0.0, 1e-9)]
+    at, beside = (test.samples(values("AC1A"), ("vt",))[0] for test in tests)
+    assert np.abs(at - beside).max() < 1e-8
+    at, beside = (test.tangents(values("AC1A"), ("vt",), directions) for test in tests)
+    assert all(np.abs(a - b).max() < 1e-8 for a, b in zip(at, beside, strict=True))
+
+
 def test_samples_may_be_asked_for_in_any_order():
     rng = np.random.default_rng(2)
     places = rng.permutation(len(TIMES))
