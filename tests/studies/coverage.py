@@ -48,7 +48,7 @@ EVERY = 15.0  # s: how often the results are written
 BAND = (0.92, 0.98)
 WIDEST = 1.3  # times the dense profile's
 OF_DRAWN = (
-    "linear", "ac1a_limit", "ac1a_kd", "ac8b_unit2", "ac8b_ifd", "st3a", "uneven", "st6b_instant"
+    "linear", "ac1a_limit", "ac1a_kd", "ac8b_unit2", "ac8b_ifd", "st3a", "st6b_instant"
 )  # fmt: skip
 
 
