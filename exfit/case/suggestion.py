@@ -237,8 +237,8 @@ def _governor_test(inspection: Inspection, level: float | str) -> Section:
         section["vt0"] = Noted(QUESTION, "pu, the voltage before")
     opening, steps = inspection.opening, inspection.steps
     if opening is not None:
-        gone = {"at": rounded(opening.at), "YP": 0.0, "YQ": 0.0}
-        return {**section, "network": [Noted(gone, f"the breaker opens, +- {opening.error:.1g} s")]}
+        at = Noted(rounded(opening.at), f"the breaker opens, +- {opening.error:.1g} s")
+        return {**section, "network": [{"at": at, "YP": 0.0, "YQ": 0.0}]}
     if inspection.kind.name == ISOLATED_LOAD:
         power = inspection.channel_of("p")
         after = power.change_at(steps[0]) if power is not None else None

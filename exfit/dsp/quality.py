@@ -126,8 +126,9 @@ def mains_frequency(time: Array, samples: Array) -> float | None:
     t, y = time[:WAVE_SAMPLES], samples[:WAVE_SAMPLES]
     if len(y) < OUTLIER_WINDOW or t[-1] - t[0] <= 0.0 or np.isinf(y).any():
         return None
-    mean, deviation = float(np.mean(y)), float(np.std(y))
-    if deviation == 0.0 or abs(mean) > LARGEST_MEAN * deviation:
+    with np.errstate(all="ignore"):  # of numbers that are too large for a sum
+        mean, deviation = float(np.mean(y)), float(np.std(y))
+    if not 0.0 < deviation < np.inf or abs(mean) > LARGEST_MEAN * deviation:
         return None
     step = median_step(t)
     power = np.abs(np.fft.rfft((y - mean) * np.hanning(len(y)))) ** 2

@@ -91,4 +91,4 @@ def iterations(history: Iterable["Iteration"]) -> Iterator[Block]:
     yield Table(heads, tuple(row(*(each.text(line) for each in COLUMNS)) for line in lines))
     yield Note(LEGEND, mark="faint")
     for phase in dict.fromkeys(line.phase for line in lines):
-        yield Note(HISTORY_PHASES[phase], label=f"{phase}:", mark="faint")
+        yield Note(HISTORY_PHASES.get(phase, phase), label=f"{phase}:", mark="faint")

@@ -67,7 +67,7 @@ MOST_DECIMALS = 7  # of a number: a smaller one has an exponent
 LARGEST_PERCENTAGE = 1e6  # with two decimals: a larger one has an exponent
 MOST_TEXTS = 20  # faults or warnings that are listed
 LONGEST_TEXT = 1000  # characters of one of them
-MOST_NAMES = 60  # that are listed
+MOST_NAMES = 30  # that are listed
 MOST_COMPARED = 1000  # names among which the nearest is looked for: each word takes a millisecond
 LONGEST_VALUE = 60  # characters of a wrong value
 

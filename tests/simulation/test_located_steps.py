@@ -8,7 +8,7 @@ from places import ROOT
 from step_scenarios import KINDS, models_of, scenarios
 from tiers import few_of
 
-sys.path.insert(0, str(ROOT / "tests" / "studies"))
+sys.path.append(str(ROOT / "tests" / "studies"))
 
 from located_steps import ACCURACY, chosen, error_of
 

@@ -207,7 +207,7 @@ def _unit(rng, kind, loaded, at, length, rate, f0):
         "frequency": frequency, "speed": speed,
         "vref": vref0 - efd0 / gain + np.where(time >= at, size, 0.0) if loaded
         else v0 + np.where(time >= at, size, 0.0),
-        "temperature": 61.0 + 0.02 * time, "gate": 34.0 + 0.1 * np.sin(0.2 * time),
+        "temperature": 61.0 + 0.02 * time, "gate": 0.34 + 1e-3 * np.sin(0.2 * time),
     }  # fmt: skip
     crest = np.sqrt(2.0 / 3.0) * signals["vt"]
     turns = omega0 * time + angle
@@ -227,7 +227,7 @@ def _units(rng, style, f0, kv, mva):
         "efd": [(95.0, "V")], "ifd": [(640.0, "A"), (38.4, "mV")], "p": [(mva, "MW")],
         "q": [(mva, "Mvar")], "frequency": [(f0, "Hz")],
         "angle": [(180.0 / np.pi, "deg"), (1.0, "rad")], "speed": [(300.0, "rpm")],
-        "vref": [(100.0, "%"), (kv, "kV")], "temperature": [(1.0, "°C")], "gate": [(1.0, "%")],
+        "vref": [(100.0, "%"), (kv, "kV")], "temperature": [(1.0, "°C")], "gate": [(100.0, "%")],
         **{phase: [(kv, "kV"), (110.0, "V")] for phase in PHASES},
     }  # fmt: skip
     if style == "engineering":
@@ -301,7 +301,7 @@ def drawn(number: int, seed: int = 34) -> NamelessFile:
         if of == "angle" and rng.random() < 0.5:
             noisy = np.angle(np.exp(1j * noisy))
         if of in ("temperature", "gate"):
-            noisy = made[of] + rng.normal(0.0, 0.01, len(time))
+            noisy = made[of] + rng.normal(0.0, 0.01 if of == "temperature" else 1e-4, len(time))
         numbers[header] = base * noisy
     clock = "t" if rng.random() < 0.5 else "Time (s)"
     return NamelessFile(

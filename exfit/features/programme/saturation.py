@@ -263,8 +263,11 @@ def fitted(form: SaturationForm, points: CurvePoints) -> FormFit:
 def at_minimum(fit: FormFit) -> FormFit:
     """Return the fit with the parameters that match best."""
     search = SearchVariables(fit, AT_12)
+    start = search.of(fit.x)
+    if not np.isfinite(search.residuals(start)).all():
+        raise ExfitError("saturation: no curve lies near the points: check ifd, vt and its base")
     least = least_squares(
-        search.residuals, search.of(fit.x), search.jacobian, search.bounds, method="lm-then-dgn"
+        search.residuals, start, search.jacobian, search.bounds, method="lm-then-dgn"
     )
     return replace(fit, x=search.parameters(least.x))
 

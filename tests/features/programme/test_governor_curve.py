@@ -16,7 +16,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.models import GOVERNORS
 from exfit.models.sheet import typical
 
-sys.path.insert(0, str(ROOT / "tests" / "studies"))
+sys.path.append(str(ROOT / "tests" / "studies"))
 
 import droop
 
