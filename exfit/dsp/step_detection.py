@@ -289,7 +289,8 @@ def _onset(time: Array, samples: Array, rest: _LeftRest, last: int, shaped: bool
     peak = _first_peak(np.abs(rest.smooth[: last + 1] - rest.level), rest.gone)
     # what is slower than noise from sample to sample moves an instant as well
     at_rest = float(spread(clean[max(rest.left - LONGEST_REST, 0) : rest.left + 1]))
-    sets_out = onset(time, clean, rest.level, peak, max(rest.scatter, at_rest), shaped)
+    found = onset if shaped else _onset_of_any_shape
+    sets_out = found(time, clean, rest.level, peak, max(rest.scatter, at_rest))
     if sets_out.at < time[SAMPLES_AT_REST - 1]:
         raise _early(time)
     return sets_out
@@ -344,9 +345,7 @@ def _settled(rest: _LeftRest) -> tuple[int, int, int]:
 # ---- the onset
 
 
-def onset(
-    time: Array, samples: Array, level: float, peak: int, scatter: float, shaped: bool = True
-) -> Onset:
+def onset(time: Array, samples: Array, level: float, peak: int, scatter: float) -> Onset:
     """Find the interval in which a response (M,) sets out from its rest.
 
     The rise is compared with the step responses of chains of one to four equal lags, from a jump
@@ -360,15 +359,11 @@ def onset(
         level: where they rest.
         peak: the sample at which the first move ends.
         scatter: the standard deviation of the noise.
-        shaped: compare shapes; without, the interval is the one in which instants are tried.
     """
     whole = 0.0
     for rest_end, end in _rises(np.abs(samples[: peak + 1] - level), scatter):
         rise = float(time[end] - time[rest_end])
         whole = max(whole, rise)
-        if not shaped:
-            earliest = max(float(time[rest_end]) - SOUGHT_BEFORE * rise, float(time[0]))
-            return Onset(earliest, float(time[end]))
         first = int(np.searchsorted(time, time[rest_end] - COMPARED_REST * rise))
         window = slice(max(min(first, rest_end - FEWEST_RESTING), 0), end + 1)
         block = -(-(window.stop - window.start) // MOST_SAMPLES)
@@ -384,6 +379,15 @@ def onset(
         if left <= known * (1.0 + FIT_QUANTILE * sqrt(2.0 / freedom)):
             break
     return result
+
+
+def _onset_of_any_shape(
+    time: Array, samples: Array, level: float, peak: int, scatter: float
+) -> Onset:
+    """Find the interval in which `onset` seeks that of a response (M,), whatever its shape."""
+    rest_end, end = next(_rises(np.abs(samples[: peak + 1] - level), scatter))
+    earliest = time[rest_end] - SOUGHT_BEFORE * (time[end] - time[rest_end])
+    return Onset(max(float(earliest), float(time[0])), float(time[end]))
 
 
 def _rises(way: Array, scatter: float) -> Iterator[tuple[int, int]]:

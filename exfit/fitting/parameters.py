@@ -13,6 +13,7 @@ from exfit.case.parts import bounds_of
 from exfit.case.schema import FreeSection
 from exfit.models.sheet import Parameter
 
+LARGEST_FACTOR = 4.0  # by which a value may differ from the given one
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 

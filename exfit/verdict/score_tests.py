@@ -11,7 +11,7 @@ from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
 from exfit.errors import SimulationError
 from exfit.fitting.nuisances import Nuisance, NuisanceKind
-from exfit.fitting.parameters import freed_within
+from exfit.fitting.parameters import LARGEST_FACTOR, freed_within
 from exfit.fitting.residuals import MOST_NUMBERS_AT_ONCE, Residuals, with_freed
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import slices, slopes_of, spread_of, spread_of_errors
@@ -32,7 +32,7 @@ from exfit.verdict.causes.trials import (
     moving,
     with_opened,
 )
-from exfit.verdict.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
+from exfit.verdict.causes.unit import RARE, SATURATION, of_machine, remedy_of
 
 SAME = 1e-6  # of a direction: what other parameters leave of it is rounding below
 ALIKE = 4.0  # chi-square: what explains no less is not told apart

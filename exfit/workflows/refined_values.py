@@ -7,14 +7,13 @@ import numpy as np
 from exfit.case.given_errors import given_std_errors
 from exfit.fitting.compression import compressed
 from exfit.fitting.global_search import extended
-from exfit.fitting.parameters import FreeParameter, freed_within
+from exfit.fitting.parameters import LARGEST_FACTOR, FreeParameter, freed_within
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import with_freed
 from exfit.fitting.search import CaseSearches
 from exfit.results.compare_with_record import compare_with_record
 from exfit.util.vocabulary import REFINING_VALUES
 from exfit.verdict.causes import Evidence, FittedRecord
-from exfit.verdict.causes.unit import LARGEST_FACTOR
 from exfit.verdict.score_tests import value_that_the_record_refines
 from exfit.workflows.search_state import SearchState, ignore
 

@@ -100,9 +100,8 @@ def commands(mutant: Mutant, folder: Path) -> Iterator[tuple[str, ...]]:
         case "text" | "comtrade":
             yield from of_record(main, folder, to)
         case "workbook" | "mat" | "parquet":  # each is read in a process that takes long to begin
-            yield [*of_record(main, folder, to)][
-                number // 10 % 4
-            ]  # of the first ten some are drawn
+            turn = number // 10 % 4  # of each ten: some are drawn of all commands
+            yield [*of_record(main, folder, to)][turn]
         case "play-in":
             yield ("inspect", main, *to)
             (folder / "event.yaml").write_text(CASE_OF_EVENT)

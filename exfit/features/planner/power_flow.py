@@ -207,7 +207,8 @@ def _step_ups(
         if power > 0.0 and kv[0] != kv[1]:
             at = kv.index(min(kv))
             taps = [_tap(*own, first, faults) for own in zip(windings, kv, strict=True)]
-            low, high, share = taps[at], taps[1 - at], taps[at] * (taps[at] / power)
+            low, high = taps[at], taps[1 - at]
+            share = low * low / power  # as a power it would raise for 1e200
             behind = max(kv) * high / low if min(taps) > 0.0 else max(kv)
             own = _Transformer(share * resistance, share * reactance, float(f"{behind:.6g}"))
             found.setdefault(first.fields[at].text, []).append(own)

@@ -286,11 +286,7 @@ def _unit_of(heads: Sequence[Head], driven: Driven) -> tuple[Unit | None, list[D
         warnings.append(DynamicsFault(of_load.line, what))
     known = None if compensation is None else of_load
     unknown = [head for head in heads if head.definition is None and head is not known]
-    for head in unknown:
-        kind = OTHERS.get(head.name.upper())
-        what = f"{head.name} is left out: not a known model"
-        what = what if kind is None else f"{kind} {head.name} is left out"
-        warnings.append(DynamicsFault(head.line, what))
+    warnings += [DynamicsFault(head.line, _left_out(head.name)) for head in unknown]
     controller = _moving(parts, warnings)
     governor = _governing(parts.get(GOVERNOR), heads, driven, warnings)
     unit = Unit(
@@ -435,8 +431,8 @@ def _governing(
     if governor is None:
         other = driven.get((str(heads[0].bus), heads[0].id.upper()))
         if other is not None:
-            what = f"{other.name} of machine {other.id} at bus {other.bus} drives this machine, too"
-            what += ": not modelled, its power is constant"
+            of = f"{other.name} of machine {other.id} at bus {other.bus}"
+            what = f"{of} drives this machine, too: not modelled, its power is constant"
             warnings.append(DynamicsFault(other.line, what))
         return None
     bases = {head.definition.kind: head.base for head in heads if head.definition is not None}
@@ -555,3 +551,10 @@ def _meant(name: str, program: str) -> str | None:
     """Return the machine or exciter whose name is nearly this one, if one is."""
     names = [known for kind in NEEDED for known in _names_of(kind, program)]
     return closest(name, names, NEARLY_THE_NAME)
+
+
+def _left_out(name: str) -> str:
+    kind = OTHERS.get(name.upper())
+    return (
+        f"{name} is left out: not a known model" if kind is None else f"{kind} {name} is left out"
+    )

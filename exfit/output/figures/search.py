@@ -106,7 +106,7 @@ def _by_phase(axes: Axes, result: "FitResult", values: Sequence[float], marker: 
             color=COLOURS[phase],
             markersize=4,
             clip_on=False,
-            label=HISTORY_PHASES.get(phase, phase),
+            label=HISTORY_PHASES[phase],
         )
 
 

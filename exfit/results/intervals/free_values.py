@@ -14,14 +14,13 @@ from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.descents import short_descent
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.parameters import freed_within
+from exfit.fitting.parameters import LARGEST_FACTOR, freed_within
 from exfit.fitting.residuals import Residuals, with_freed
 from exfit.fitting.uncertainty import slopes_of
 from exfit.inference.confidence import NORMAL
 from exfit.simulation.limits import extremes
 from exfit.util.arrays import Array
 
-FACTOR = 4.0  # by which a value may differ from the given one
 MOST_ITERATIONS, TOLERANCE = 25, 1e-3  # of a descent: the end of an interval is no estimate
 MOST_HELD = 4  # parameters on bounds that may leave them
 ROUNDING = 1e-9  # of a bound
@@ -65,7 +64,7 @@ def sides_with_values(
     Source: Raue et al. 2009, Bioinformatics 25, 1923-1929 (profiles with nuisances and priors).
     """
     added = [
-        freed_within(name, value, FACTOR, std_errors[name])
+        freed_within(name, value, LARGEST_FACTOR, std_errors[name])
         for name, value in residuals.fixed.items()
         if value and name in std_errors
     ]

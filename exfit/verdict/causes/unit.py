@@ -10,7 +10,7 @@ from exfit.case.case import Case
 from exfit.case.changes import freed, number_text, part_of
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
-from exfit.fitting.parameters import FreeParameter, freed_within
+from exfit.fitting.parameters import LARGEST_FACTOR, FreeParameter, freed_within
 from exfit.fitting.residuals import with_freed
 from exfit.plants import MACHINE
 from exfit.results.cause import Cause, Remedy
@@ -28,7 +28,6 @@ from exfit.verdict.causes.trials import (
     refitted,
 )
 
-LARGEST_FACTOR = 4.0  # of a fixed value
 MORE_ITERATIONS = 20  # times
 WIDER = 10.0  # times: how much farther a bound is put
 MOST_FIXED = 2  # values that are tried, those that would explain most
