@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from exfit.case.given_errors import given_std_errors
+from exfit.fitting.channel_weights import balanced, residual_deviations
 from exfit.fitting.compression import compressed
 from exfit.fitting.global_search import extended
 from exfit.fitting.parameters import LARGEST_FACTOR, FreeParameter, freed_within
@@ -58,6 +59,10 @@ def _with_freed(state: SearchState, added: list[FreeParameter]) -> SearchState:
     more = np.array([free.scaled(free.start) for free in added])
     point = np.append(state.found.best.x, more)
     problem = FitProblem(residuals, compressed(residuals, point))
+    by_noise = any(each.whitening is not None for each in residuals.experiments)
+    if state.options.weights == "balanced" and not by_noise:  # until now by what a value explains
+        deviations = residual_deviations(problem.compressed, point)
+        problem = balanced(problem, point, counter, deviations)
     searches = CaseSearches(problem, state.options, ignore, state.counter)
     searched = extended(
         searches, state.found, more, replace(state, problem=problem).on_line, REFINING_VALUES

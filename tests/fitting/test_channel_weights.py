@@ -44,6 +44,15 @@ def test_balanced_weights_are_those_of_the_minimum_that_they_lead_to():
         assert channel.residual_deviation == pytest.approx(rmse[channel.signal], rel=0.02)
 
 
+def test_channels_are_balanced_anew_where_a_given_value_is_fitted():
+    """T'd0 is 6 s: with 3.6 s vt has six times the residuals that its noise leaves."""
+    case = three_channels(weights="balanced")
+    result = exfit.fit(case, given="uncertain", values={"machine.Tpd0": 3.6})
+    assert result.verdict.reason == "the record contradicts machine.Tpd0 = 3.6"
+    for noise in result.knowledge.confidence.noise:  # all are weighted to the finest
+        assert noise.estimated == pytest.approx(NOISE["vt"], rel=0.12), noise.label
+
+
 def test_the_weights_do_not_depend_on_the_first_ones():
     _, problem = fitted(three_channels(weights="balanced"))
     own = balanced(problem, problem.residuals.start).residuals
