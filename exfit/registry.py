@@ -9,7 +9,7 @@ feature is imported before it is used:
     SECTIONS  keys of a case file that other commands read: a class of fields, and why not a case
     SUGGESTIONS  sections of a case that an inspected file suggests, none where it is another kind
     PLANTS    kinds of plant, by the names that a case gives them
-    INPUT_NOISE  of the signals that drive a simulation: to weigh errors by it, to take out its bias
+    INPUT_NOISE  of the signals that drive a simulation: to weigh errors by it, its bias, its size
     CAUSES_BEFORE_FIT  causes of a misfit that a record shows before a fit, (case, recording)
     PROGRAMS  what simulates a case in place of exfit, by the kind of its plant: given the case, a
               context that provides an `exfit.fitting.program.Program`

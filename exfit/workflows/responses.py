@@ -23,6 +23,7 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.fitting.system import values_of
 from exfit.models import find
+from exfit.registry import parts
 from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import (
@@ -97,11 +98,12 @@ def validation_of(
 ) -> Comparison:
     """Judge `aligned` values on a record that was not fitted, by the ``fitted`` ones."""
     of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
-    criteria = case.criteria
-    comparison = compare_with_record(setup, values, of_record=of_record, criteria=criteria)
-    if criteria.given:
+    comparison = compare_with_record(setup, values, of_record=of_record, criteria=case.criteria)
+    if case.criteria.given:
         return replace(comparison, validation=True)
-    return judged(comparison, fitted, setup.channels)
+    driven = comparison.is_event and comparison.judged.describes
+    by_noise = parts("INPUT_NOISE")["errors by noise"].load()(setup, values) if driven else None
+    return judged(comparison, fitted, setup.channels, by_noise)
 
 
 class LiveResponse(NamedTuple):

@@ -66,6 +66,15 @@ def test_of_a_grid_event_p_and_q_must_match_both(bad):
     assert (f"on trip the error of {bad} is 10.0 times" in validation.reason) is (bad != "efd")
 
 
+@pytest.mark.parametrize("times", [0.9 * MUCH_WORSE, 1.1 * MUCH_WORSE])
+def test_noise_that_drives_a_simulation_does_not_condemn_a_right_model(times):
+    """A regulator sums up noise of the voltage: q drifts by far more than its samples scatter."""
+    match = comparison("trip", times * 2e-3, signal="q")
+    record = [channel(signal="q")]
+    found = judged(match, [comparison("fit", 1e-4, signal="q")], record, {"q": 2e-3})
+    assert found.accepted is (times < MUCH_WORSE)
+
+
 @pytest.mark.parametrize("fit_percent", [0.0, -206.0, nan])
 def test_without_accept_what_a_constant_matches_as_well_is_not_accepted(fit_percent):
     """However bad the fit is itself: nan is that of a record that does not move."""

@@ -5,7 +5,8 @@ the units, their .dyr and .raw, twelve events and what PMUs show of them. Three 
 `import --all`, `batch`, `export --all`. A third of the units have an exciter of other data than the
 planner's file says, which a fit is to find; some have another inertia, which no import frees, and
 must not be changed. Counted are cases, verdicts, written values and how many of them their 95 %
-intervals hold the truth of, in all and by the verdict.
+intervals hold the truth of, in all and by the verdict. With ``--given drawn`` every value of the
+files is off by its default error, as a planner's are: the intervals allow for these.
 """
 
 import argparse
@@ -27,9 +28,9 @@ from planner_fleet import run
 from exfit.features.fleet.folder import read_fleet
 
 
-def study(folder, units, seed, batch_options):
+def study(folder, units, seed, batch_options, given_drawn):
     """Run the three commands and print what they came to."""
-    made = event_fleet(folder, units, seed)
+    made = event_fleet(folder, units, seed, given_drawn)
     cases, fleet, fitted = folder / "cases", folder / "fleet", folder / "fitted.dyr"
     times = {
         "import --all": run("import", "--all", made.dyr, "-o", cases, "--records", made.table,
@@ -80,15 +81,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--units", type=int, default=40)
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--given", choices=("exact", "drawn"), default="exact")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="a new folder for the files, which stays")
     given = parser.parse_args()
-    options = ("--workers", given.workers)
+    more = given.units, given.seed, ("--workers", given.workers), given.given == "drawn"
     if given.keep:
         given.keep.mkdir(parents=True)
-        return study(given.keep, given.units, given.seed, options)
+        return study(given.keep, *more)
     with TemporaryDirectory() as folder:
-        return study(Path(folder), given.units, given.seed, options)
+        return study(Path(folder), *more)
 
 
 if __name__ == "__main__":

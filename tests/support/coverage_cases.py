@@ -188,6 +188,15 @@ def with_noise(setup, hard, rng):
     return replace(setup, experiment=replace(setup.experiment, channels=channels))
 
 
+def about_given(case, rng):
+    """Return a true value for each given one of a case that has an error, about it by that."""
+    values = case.values()
+    return {
+        given: values[given] * max(1.0 + rng.standard_normal() * error / abs(values[given]), LEAST)
+        for given, error in given_std_errors(case).items()
+    }
+
+
 def drawn(name, rng):
     """Return a case whose given values are as wrong as their default errors say, and the truth.
 
@@ -199,12 +208,7 @@ def drawn(name, rng):
     del content["record"]["file"]
     blank = {signal: np.ones_like(hard.time) for signal in hard.noise}
     case = Case.from_dict(content, Record.from_arrays(hard.time, blank))
-    values, errors = case.values(), given_std_errors(case)
-    truth = {
-        given: values[given] * max(1.0 + rng.standard_normal() * error / abs(values[given]), LEAST)
-        for given, error in errors.items()
-    }
-    truth |= hard.truth
+    values, truth = case.values(), about_given(case, rng) | hard.truth
     (setup,) = build_experiments(case)
     setup = setup.with_enough_substeps({**values, **truth})
     samples = setup.experiment.samples({**values, **truth})[0]

@@ -10,12 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from coverage_cases import about_given
 from pmu_records import degrees, stamps, write_table
 from power_flow_files import HIGH_KV, power_flow
 
+from exfit.case.case import Case
+from exfit.case.given_errors import TRANSFORMER
 from exfit.case.load import load_case
 from exfit.case.other_model import free_of
-from exfit.errors import SimulationError
+from exfit.errors import ExfitError, SimulationError
 from exfit.features.planner.import_case import imported_case
 from exfit.features.planner.psse import record_text
 from exfit.features.planner.records import contradictions, definition_of
@@ -113,8 +116,11 @@ def drawn_events(random, count=EVENTS):
     return events
 
 
-def event_fleet(folder, units=40, seed=SEED):
-    """Write .dyr, .raw, records and their table; return them with the truth."""
+def event_fleet(folder, units=40, seed=SEED, given_drawn=False):
+    """Write .dyr, .raw, records and their table; return them with the truth.
+
+    With ``given_drawn`` every true value lies about that of the files by its default error.
+    """
     random = np.random.default_rng(seed)
     events = drawn_events(random)
     buses = [FIRST_BUS + number for number in range(units)]
@@ -122,10 +128,10 @@ def event_fleet(folder, units=40, seed=SEED):
     off, inertia = set(), set()
     (folder / "records").mkdir()
     for number, bus in enumerate(buses):
-        unit = drawn_unit(number, bus, events, random, folder)
+        unit = drawn_unit(number, bus, events, random, folder, given_drawn)
         truth[bus] = {
             (part.record.name, symbol): values[symbol]
-            for part, values in unit.parts
+            for part, values in unit.true
             for symbol in part.symbols
         }
         wrong = {}
@@ -133,7 +139,7 @@ def event_fleet(folder, units=40, seed=SEED):
             off.add(bus)
             exciter, values = unit.parts[1]
             wrong[exciter] = wrong_values(exciter.model, values, random)
-        elif number % FIXED_OFF_EVERY == 1:
+        elif number % FIXED_OFF_EVERY == 1 and not given_drawn:
             inertia.add(bus)
             machine, values = unit.parts[0]
             wrong[machine] = {"H": float(f"{1.25 * values['H']:.4g}")}
@@ -153,9 +159,13 @@ def event_fleet(folder, units=40, seed=SEED):
 
 @dataclass(frozen=True)
 class DrawnUnit:
-    """A unit with its records in the planner's order, its ratings, and its files of events."""
+    """A unit with its records in the planner's order, its ratings, and its files of events.
+
+    ``true`` are the records that its events are of, x is as the planner has it.
+    """
 
     parts: tuple
+    true: tuple
     kv: float
     mva: float
     x: float
@@ -171,6 +181,9 @@ def drawn_values(part, random, spread, symbols):
     """Return typical data with some values drawn about them, none of which contradict."""
     values = {row.symbol: row.typical for row in part.model.sheet}
     values |= dict(part.record.held)
+    if values.get("E1", 0.0) > values.get("E2", 0.0):  # a file has the lower voltage first
+        order = {"E1": "E2", "E2": "E1", "SE1": "SE2", "SE2": "SE1"}
+        values |= {symbol: values[other] for symbol, other in order.items()}
     while True:
         drawn = {symbol: near(values[symbol], random, spread) for symbol in symbols}
         if not [*contradictions(part.model, {**values, **drawn})]:
@@ -212,10 +225,33 @@ def drawn_parts(number, random):
     return tuple(parts)
 
 
-def drawn_unit(number, bus, events, random, folder):
+def true_parts(parts, random):
+    """Return records whose values lie about these by their default errors; none contradicts."""
+    case = Case.from_dict(content_of(parts))
+    while True:
+        drawn, true = about_given(case, random), []
+        for part, values in parts:
+            names = {symbol: part.prefix + symbol for symbol in part.symbols}
+            own = {symbol: drawn[name] for symbol, name in names.items() if name in drawn}
+            true.append((part, {**values, **own}))
+        if not any([*contradictions(part.model, values)] for part, values in true):
+            return tuple(true)
+
+
+def content_of(parts):
+    """Return the content of the case of a unit with these records."""
+    text = "\n".join(record_text(part, values, 1, "1") for part, values in parts)
+    given = yaml.safe_load(imported_case(read_unit(text, "true.dyr"), "true.dyr").text)
+    del given["as_found"]
+    return given
+
+
+def drawn_unit(number, bus, events, random, folder, given_drawn=False):
     """Draw a unit that settles after its events, and write their records."""
     kv, mva = float(random.choice(KV)), float(round(random.uniform(*MVA)))
-    x = round(random.uniform(0.08, 0.14), 4)  # of the transformer, on the machine's base
+    x = stated_x = round(random.uniform(0.08, 0.14), 4)  # of the transformer, on the machine's base
+    if given_drawn:
+        x = stated_x * (1.0 + TRANSFORMER.other * random.standard_normal())
     seen = sorted(random.choice(len(events), 2 + (number % 4 == 0), replace=False).tolist())
     pmu = Pmu(
         rate=(30.0, 30.0, 60.0, 30.0)[number % 4], kind=number % 3, high=number % 5 == 4,
@@ -223,7 +259,8 @@ def drawn_unit(number, bus, events, random, folder):
     )  # fmt: skip
     for _ in range(50):
         parts = drawn_parts(number, random)
-        courses = [response(parts, events[k], x, random, folder) for k in seen]
+        true = true_parts(parts, random) if given_drawn else parts
+        courses = [response(true, events[k], x, random, folder) for k in seen]
         if all(course is not None for course in courses):
             break
     else:
@@ -232,7 +269,7 @@ def drawn_unit(number, bus, events, random, folder):
     for k, course in zip(seen, courses, strict=True):
         files.append(f"event-{k + 1:02d}-{bus}.csv")
         pmu.record(folder / "records" / files[-1], *course, random)
-    return DrawnUnit(parts, kv, mva, x, tuple(files))
+    return DrawnUnit(parts, true, kv, mva, stated_x, tuple(files))
 
 
 def response(parts, event, x, random, folder):
@@ -243,9 +280,7 @@ def response(parts, event, x, random, folder):
     share = random.uniform(0.6, 1.2)
     p0, q0, vt0 = random.uniform(0.5, 0.9), random.uniform(-0.05, 0.25), random.uniform(0.98, 1.03)
     line = {"f0": F0, "R": 0.01, "X": x + random.uniform(0.1, 0.35), "P": p0, "Q": q0}
-    text = "\n".join(record_text(part, values, 1, "1") for part, values in parts)
-    given = yaml.safe_load(imported_case(read_unit(text, "true.dyr"), "true.dyr").text)
-    del given["as_found"]
+    given = content_of(parts)
     given["plant"] |= {"type": "infinite-bus", "network": line}
     given["test"] = {
         "vt0": vt0, "duration": event.seconds + 1.0,
@@ -254,7 +289,10 @@ def response(parts, event, x, random, folder):
     given["simulation"] = {"output_step": 1.0 / FINE, "step": STEP}
     path = folder / "truth.yaml"
     path.write_text(yaml.safe_dump(given))
-    case = load_case(path)
+    try:
+        case = load_case(path)
+    except ExfitError:  # it cannot give this power
+        return None
     values = case.values()
     simulator, levels = plain_simulator(case, values)
     time = simulator.times
@@ -263,7 +301,7 @@ def response(parts, event, x, random, folder):
     simulator = simulator.remade(inputs=replace(simulator.inputs, steps=(), recorded=inputs))
     try:
         simulator = with_enough_substeps(simulator, {**values, **levels}, path)
-    except SimulationError:  # it cannot give this power
+    except SimulationError:
         return None
     shown = simulator.response({**values, **levels}).signals
     vt, p, q = shown["vt"], shown["p"], shown["q"]

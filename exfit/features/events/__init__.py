@@ -5,6 +5,7 @@ PLANTS = {"grid-playback": "grid_playback:GRID_PLAYBACK"}
 INPUT_NOISE = {
     "weighted search": "input_noise:weighted_search",
     "without bias": "input_noise:without_bias",
+    "errors by noise": "input_noise:errors_by_noise",
 }
 CAUSES_BEFORE_FIT = {"records of events": "record_causes:event_causes"}
 CAUSES_AT_REST = {"record of the event": "record_causes:wrong_event"}

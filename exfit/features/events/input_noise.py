@@ -341,7 +341,7 @@ def weighted_search(
     response.
     """
     own, theta = problem.residuals, found.best.x
-    reason = why_not_weighted(own, setups)
+    reason = why_not_weighted(setups, robust=own.robust is not None)
     if reason is not None:
         return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHTED} {reason}"))
     try:
@@ -381,9 +381,9 @@ def _far(there: Array, here: Array) -> bool:
     return bool(np.max(np.abs(there - here)) >= FAR)
 
 
-def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) -> str | None:
+def why_not_weighted(setups: Sequence[ExperimentSetup], robust: bool = False) -> str | None:
     """Reason why errors cannot be weighted by the noise of driving signals; None if they can."""
-    if residuals.robust is not None:
+    if robust:
         return "with a robust loss"
     for setup in setups:
         if setup.test.steady is None:
@@ -396,6 +396,19 @@ def why_not_weighted(residuals: Residuals, setups: Sequence[ExperimentSetup]) ->
         if sum(setup.experiment.sizes) > MOST_ERRORS:
             return f"in a record with more than {MOST_ERRORS} samples of all signals compared"
     return None
+
+
+def errors_by_noise(setup: ExperimentSetup, values: Values) -> dict[str, float]:
+    """Return the rms of the errors of each signal by noise alone, per unit; none is known: {}."""
+    if why_not_weighted([setup]) is not None:
+        return {}
+    channels = setup.experiment.channels
+    ends = np.cumsum([channel.size for channel in channels])[:-1]
+    each = np.split(propagated_noise(setup, values, rough=True).variance, ends)
+    return {
+        channel.signal: float(np.sqrt(np.mean(variance))) / channel.weight
+        for channel, variance in zip(channels, each, strict=True)
+    }
 
 
 def whitened(
