@@ -47,12 +47,14 @@ def _substeps_at_rest(system: System, step: float, sets: bytes) -> NDArray[np.in
     rest = linear_kernel(system).at_rest(p)
     lag_rate = _lag_rates(system, p)
     with np.errstate(all="ignore"):
-        parts = _parts(step, lag_rate)
-        enough = step * _radius_bounds(rest.jacobian) - ON_GRID <= parts
+        needed = _needed(step, lag_rate)
+        enough = step * _radius_bounds(rest.jacobian) - ON_GRID <= needed
         # at rest whatever the spectral radius, where that is finite; a sum is finite where all
         # numbers are, or at most too large: then eigenvalues decide
         finite = np.isfinite(rest.x.sum(axis=1))
-        sure = enough & finite & (np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE)
+        still = np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE
+        sure = enough & finite & still & (needed <= MOST_SUBSTEPS)
+        parts = needed.astype(np.int64)
     if not sure.all():
         unsure = AtRest(*(part[~sure] for part in rest))
         radius = spectral_radii(unsure.jacobian)
@@ -178,12 +180,12 @@ def _moving(rest: AtRest, radius: Array) -> Mask:
 def _radius_bounds(jacobians: Array) -> Array:
     """Return bounds above the spectral radii of Jacobians (K, nx, nx), without eigenvalues.
 
-    A power's norm is a bound of the radius' power (Gelfand): the 32nd is near enough.
+    A power's norm is a bound of the radius' power (Gelfand): the 32nd is near enough. It may
+    overflow, and then bounds nothing.
     """
-    size = np.abs(jacobians).max(axis=(1, 2))
-    power = jacobians / size[:, None, None]
+    power = jacobians
     for _ in range(SQUARINGS):
         power = power @ power
     norm = np.abs(power).sum(axis=2).max(axis=1)
-    bound = size * norm ** (0.5**SQUARINGS)
+    bound = norm ** (0.5**SQUARINGS)
     return np.where(norm > UNDERFLOW, bound, np.inf)

@@ -1,7 +1,7 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from exfit.case.case import Case
 from exfit.engine.system import time_constants
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
-from exfit.fitting.experiment import ExperimentSetup
+from exfit.fitting.experiment import Experiment, ExperimentSetup
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
@@ -28,6 +28,7 @@ from exfit.verdict.run_quality import state_of_rest_notes, typical_notes
 Values = Mapping[str, float]
 
 STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
+COARSEST = 1e-2  # s: with longer steps derivatives err by more than the differences
 AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
 COLUMN_ROUNDING = 1e-12  # of the largest column
 SMALLEST_COLUMN = float(np.finfo(float).tiny)
@@ -89,7 +90,7 @@ def check(case: Case, program: Program | None = None) -> Check:
     if program is not None:
         own_values = [*program.own_value_notes()]
         from_program = program.deviations(setups, values)
-    residuals = Residuals(experiments, free, fixed, case.ties)
+    residuals = Residuals([*map(_in_fine_steps, experiments)], free, fixed, case.ties)
     first = experiments[0].simulator
     at = experiments[0].parameters(values)
     return Check(
@@ -126,6 +127,13 @@ def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
         if not warnings:
             raise
         raise ExfitError("\n".join([*warnings, str(fault)])) from fault
+
+
+def _in_fine_steps(experiment: Experiment) -> Experiment:
+    simulator = experiment.simulator
+    if not simulator.located or simulator.step <= COARSEST:
+        return experiment
+    return replace(experiment, simulator=simulator.remade(step=COARSEST))
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

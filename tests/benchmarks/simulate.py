@@ -32,7 +32,7 @@ from exfit.simulation.simulator import Simulator
 
 HERE = Path(__file__).parent
 STEP, STEPS, AT, RISE = 1e-3, 10_000, 1_000, 0.05
-LOCATED = 1e-2  # s, steps whose crossings of limits are located
+LOCATED = 2e-2  # s, steps whose crossings of limits are located
 FINE = 2e-5  # s, of the grid with which these are compared
 FREE = ("KA", "KF", "TE", "TF", "TA", "KC", "KD")
 THESIS = {"KA": 364.1523, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542}
@@ -148,11 +148,13 @@ def lsoda():
 def timed(ways, rounds):
     """Return the times (rounds, ways) in ms of functions that take turns.
 
-    A turn is of several calls, one behind the other as a search makes them.
+    A turn is of several calls, one behind the other as a search makes them, and one before them
+    that is not counted: behind 32 sets it would find no memory of its own in the cache.
     """
     times = np.empty((rounds, len(ways)))
     for row in times:
         for column, way in enumerate(ways):
+            way()
             begin = time.perf_counter()
             for _ in range(CALLS):
                 way()
@@ -191,7 +193,7 @@ def main():
     times = timed(list(ways.values()), ROUNDS) / sets
     several = timed([slow], 5)
     found = f"{errors[0]:.0e} and, with a limit hit, {errors[1]:.0e}"
-    table = Table(title=f"AC1A, 10 s, ms ({ROUNDS} rounds; errors of vt at 10 ms {found})")
+    table = Table(title=f"AC1A, 10 s, ms ({ROUNDS} rounds; errors of vt at 20 ms {found})")
     table.add_column("way")
     for heading in ("median", "best", "median : C", "best : C"):
         table.add_column(heading, justify="right")
