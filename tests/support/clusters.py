@@ -16,6 +16,11 @@ import exfit
 HERE = Path(exfit.__file__).parents[1]
 HIDING = "raise ModuleNotFoundError(\"No module named 'exfit'\", name='exfit')\n"
 STARTED_WITHIN = 60.0  # s
+# as docs/fleets.md sets them: without Dask's own diagnostics
+SETTINGS = {
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "false",
+    "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
+}
 TIMES = re.compile(r"\"seconds\": [^,}\n]+")
 
 
@@ -65,7 +70,7 @@ class Cluster:
                 stderr=log,
                 stdin=subprocess.DEVNULL,
                 cwd=place or self.folder,
-                env={**os.environ, "PYTHONPATH": str(path)},
+                env={**os.environ, **SETTINGS, "PYTHONPATH": str(path)},
                 start_new_session=True,
             )
 

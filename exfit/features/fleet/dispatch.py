@@ -1,9 +1,9 @@
 """The cases of a batch on a Dask cluster that somebody else has started.
 
-They are sent to its workers as these come to need them. Each case is bound to a worker, so that a
-worker stays with a model, and a worker that is lost gives back what it had. The scheduler holds no
-more cases than are under way. What distributed, which only this module and `remote` import, logs
-and warns of stays silent: what matters becomes an error of exfit's.
+They are sent to its workers as these come to need them, short ones together. Each case is bound to
+a worker, so that a worker stays with a model, and a worker that is lost gives back what it had. The
+scheduler holds no more cases than are under way. What distributed, which only this module and
+`remote` import, logs and warns of stays silent: what matters becomes an error of exfit's.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ from exfit.features.fleet import remote
 from exfit.features.fleet.folder import CaseOutcome, Failure, FailureKind
 from exfit.features.fleet.local import Begin, Compute, End, Waiting
 from exfit.features.fleet.plan import PlannedCase
-from exfit.features.fleet.remote import BundledTask, RemoteCase, Reply, unpacked
+from exfit.features.fleet.remote import BundledTask, RemoteCases, Reply
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -46,7 +46,8 @@ SETTINGS = {
 
 MOST_DEATHS = 3  # of the process of a case, after which the case is to blame
 MOST_LOSSES = 10  # of its worker: mostly that is ended from outside, so there are more tries
-AHEAD = 2  # cases for each thread of a worker: one that it fits, one that it need not wait for
+AHEAD = 2  # for each thread of a worker: cases that it fits, and some that it need not wait for
+TOGETHER, SHORTEST = 1.0, 0.05  # s: so many cases as take no longer travel together
 MOST_BYTES = 256_000_000  # of the cases that are under way; one alone may have more
 LOOK = 1.0  # s between two looks at which workers there are
 AT_FIRST = 0.1  # s, before the first case
@@ -214,9 +215,9 @@ def cluster_workers(address: str, time_limit: float) -> Compute:
 
 @dataclass(frozen=True, eq=False)
 class Sent:
-    """A case that is under way: to which worker, and in how many bytes."""
+    """Cases that are under way together: to which worker, and in how many bytes."""
 
-    case: PlannedCase
+    cases: tuple[PlannedCase, ...]
     worker: str
     size: int
     future: "DaskFuture"
@@ -229,7 +230,7 @@ class Dispatch:
     ``threads`` are those of the workers in use, ``groups`` what they had last; ``checks`` are the
     answers of new workers, ``refused`` the reasons why others may not be used; ``begun`` are the
     cases that were announced. ``deaths`` and ``losses`` count how often the process and the worker
-    of a case ended in its middle, by its name.
+    of a case ended in its middle, by its name; ``lasted`` is what the last case of a group took, s.
     """
 
     client: "Client"
@@ -246,6 +247,7 @@ class Dispatch:
     refused: dict[str, str] = field(default_factory=dict)
     deaths: Counter[str] = field(default_factory=Counter)
     losses: Counter[str] = field(default_factory=Counter)
+    lasted: dict[str, float] = field(default_factory=dict)
     arrived: "SimpleQueue[str]" = field(default_factory=SimpleQueue)
     looked: float = -inf
     had_workers: float = field(default_factory=monotonic)
@@ -324,17 +326,18 @@ class Dispatch:
             self._take_back(key, begun=place < threads)
 
     def _take_back(self, key: str, begun: bool = True) -> None:
-        """Let a case wait again, unless it was lost too often."""
+        """Let cases wait again, unless one was lost too often."""
         sent = self.sent.pop(key)
         with suppress(Exception):  # the scheduler may have forgotten it
             self.client.cancel(sent.future, force=True)
-        name = sent.case.entry.case
-        self.losses[name] += begun
-        if self.losses[name] < MOST_LOSSES:
-            self.waiting.add(sent.case)
-        else:
-            reason = f"its worker was lost {MOST_LOSSES} times while fitting it"
-            self._fail(sent.case, "crashed", reason)
+        for case in sent.cases:
+            name = case.entry.case
+            self.losses[name] += begun
+            if self.losses[name] < MOST_LOSSES:
+                self.waiting.add(case)
+            else:
+                reason = f"its worker was lost {MOST_LOSSES} times while fitting it"
+                self._fail(case, "crashed", reason)
 
     def _fail(self, case: PlannedCase, kind: FailureKind, reason: str) -> None:
         self.end(case, CaseOutcome(failure=Failure(kind, reason)))
@@ -352,25 +355,43 @@ class Dispatch:
         for places in range(1, AHEAD + 1):
             for worker, threads in self.threads.items():
                 while self.waiting and self._has_room(worker, places * threads):
-                    at_work = Counter(sent.case.task.group for sent in self.sent.values())
-                    case = self.waiting.next_for(self.groups.get(worker, ""), at_work)
-                    self.groups[worker] = case.task.group
-                    if case.entry.case in self.begun or self.begin(case):
-                        self.begun.add(case.entry.case)
-                        self._submit(case, worker)
+                    self._submit(self._next_cases(worker), worker)
+
+    def _next_cases(self, worker: str) -> tuple[PlannedCase, ...]:
+        """Take the next cases for a worker, short ones of its group together, and begin them."""
+        at_work = Counter(sent.cases[0].task.group for sent in self.sent.values())
+        first = self.waiting.next_for(self.groups.get(worker, ""), at_work)
+        group = self.groups[worker] = first.task.group
+        others = min(self._together(group) - 1, self.waiting.of_group(group))
+        cases = [first, *(self.waiting.next_for(group, at_work) for _ in range(others))]
+        begun = [case for case in cases if case.entry.case in self.begun or self.begin(case)]
+        self.begun.update(case.entry.case for case in begun)
+        return tuple(begun)
+
+    def _together(self, group: str) -> int:
+        """So many cases of a group travel together; after a loss or a death each is alone again."""
+        if group not in self.lasted or self.losses.total() or self.deaths:
+            return 1
+        threads = sum(self.threads.values())
+        share = len(self.waiting) // (AHEAD * threads)  # of each, so that all end together
+        return max(1, min(share, int(TOGETHER / max(self.lasted[group], SHORTEST))))
 
     def _has_room(self, worker: str, places: int) -> bool:
         under_way = sum(sent.size for sent in self.sent.values())
         cases = sum(sent.worker == worker for sent in self.sent.values())
         return cases < places and (under_way < MOST_BYTES or not self.sent)
 
-    def _submit(self, case: PlannedCase, worker: str) -> None:
-        try:
-            bundled = case._replace(task=BundledTask.of(case.task))
-        except ExfitError as fault:
-            self._fail(case, "failed", str(fault))
+    def _submit(self, cases: tuple[PlannedCase, ...], worker: str) -> None:
+        sent, bundled = list[PlannedCase](), list[PlannedCase]()
+        for case in cases:
+            try:
+                bundled.append(case._replace(task=BundledTask.of(case.task)))
+                sent.append(case)
+            except ExfitError as fault:
+                self._fail(case, "failed", str(fault))
+        if not sent:
             return
-        payload = pickle.dumps(RemoteCase(bundled, self.batch, self.time_limit))
+        payload = pickle.dumps(RemoteCases(tuple(bundled), self.batch, self.time_limit))
         key = f"exfit-{uuid4().hex}"
 
         # inside, so that it is pickled with its code: the scheduler unpacks it without exfit
@@ -383,7 +404,7 @@ class Dispatch:
             future = self.client.submit(run, payload, key=key, workers=[worker], pure=False)
         except Exception as fault:  # of many kinds, by where it has noticed
             raise lost(self.client, fault) from None
-        self.sent[future.key] = Sent(case, worker, len(payload), future)
+        self.sent[future.key] = Sent(tuple(sent), worker, len(payload), future)
         future.add_done_callback(lambda done: self.arrived.put(done.key))
 
     def _fetch(self) -> None:
@@ -400,7 +421,7 @@ class Dispatch:
         except (Empty, KeyError):  # taken back before
             return
         try:
-            reply = sent.future.result(timeout=FETCHED_WITHIN)
+            replies: tuple[Reply, ...] = sent.future.result(timeout=FETCHED_WITHIN)
         except TimeoutError:
             self.arrived.put(key)  # or its worker is gone with it, as the next look shows
         except (FutureCancelledError, KilledWorker, OSError):
@@ -411,15 +432,20 @@ class Dispatch:
         else:
             del self.sent[key]
             sent.future.release()
-            self._finish(sent.case, reply)
+            try:
+                self._send()  # before outcomes are written
+            finally:
+                for case, reply in zip(sent.cases, replies, strict=False):
+                    self._finish(case, reply)
+            for case in sent.cases[len(replies) :]:  # that it did not come to
+                self.waiting.add(case)
 
     def _finish(self, case: PlannedCase, reply: Reply) -> None:
         """Take the outcome of a case; one whose process died is tried again, elsewhere perhaps."""
         if not reply.death:
-            try:
-                self._send()  # before the outcome is written
-            finally:
-                self.end(case, unpacked(reply.packed))
+            if known := reply.outcome.summary or reply.outcome.failure:
+                self.lasted[case.task.group] = known.seconds
+            self.end(case, reply.outcome)
             return
         self.deaths[case.entry.case] += 1
         if self.deaths[case.entry.case] < MOST_DEATHS:

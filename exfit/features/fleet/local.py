@@ -173,6 +173,10 @@ class Waiting:
         """Add a case behind the others of its group."""
         self._groups[case.task.group].append(case)
 
+    def of_group(self, group: str) -> int:
+        """Count the cases of a group."""
+        return len(self._groups.get(group, ()))
+
     def next_for(self, group: str, at_work: Counter[str]) -> PlannedCase:
         """Return the next case for a worker that has had one of a group: of the same if possible.
 

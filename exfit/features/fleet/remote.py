@@ -21,7 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
-from threading import Lock, Timer
+from threading import Lock, Semaphore, Timer
 from typing import TYPE_CHECKING, NamedTuple
 
 from exfit import __version__
@@ -170,18 +170,18 @@ class BundledTask(CaseTask):
             return CaseOutcome(failure=Failure("failed", str(fault)))
 
 
-class RemoteCase(NamedTuple):
-    """A case as it travels: with its files, of which batch, and how long it may take (s)."""
+class RemoteCases(NamedTuple):
+    """Cases as they travel: with their files, of which batch, and how long one may take (s)."""
 
-    case: PlannedCase
+    cases: tuple[PlannedCase, ...]
     batch: str
     limit: float
 
 
 class Reply(NamedTuple):
-    """The reply of a worker: the packed outcome of a case, or how the process that had it died."""
+    """The reply of a worker: the outcome of a case, or how the process that had it died."""
 
-    packed: bytes = b""
+    outcome: CaseOutcome = CaseOutcome()
     death: str = ""
 
 
@@ -240,11 +240,11 @@ class Seat:
             if content is None:
                 return Reply(death=self.gone())
             if content != BEGUN:
-                return Reply(_packed(content))
+                return Reply(content)
         self.process.dismiss()
         self.gone()
         failure = Failure("timed out", f"not finished after {limit:g} s", limit)
-        return Reply(_packed(CaseOutcome(failure=failure)))
+        return Reply(CaseOutcome(failure=failure))
 
     def gone(self) -> str:
         """Wait for the end of the process; return how it ended."""
@@ -256,28 +256,45 @@ class Seat:
 class Seats:
     """The processes of a batch beside a worker: one for each of its threads that has a case.
 
-    The threads of the worker share it; ``stopped`` once the batch has ended.
+    The threads of the worker share it; of those with a case so many are ``free`` to have it fitted,
+    the others wait. ``stopped`` once the batch has ended.
     """
 
     folder: Path
+    free: Semaphore
     lock: Lock = field(default_factory=Lock)
     idle: list[Seat] = field(default_factory=list)
     busy: set[Seat] = field(default_factory=set)
     stopped: bool = False
     leaving: Timer | None = None
 
-    def reply(self, remote: RemoteCase, is_wanted: Callable[[], bool]) -> Reply:
-        """Have a case fitted; raises NoProcess where no process can be started for it."""
-        case = remote.case
+    def replies(self, remote: RemoteCases, is_wanted: Callable[[], bool]) -> tuple[Reply, ...]:
+        """Have cases fitted one by one, as long as they are wanted.
+
+        Raises NoProcess where no process can be started for one.
+        """
+        while not self.free.acquire(timeout=LISTENING):
+            if not is_wanted():
+                return ()
+        try:
+            return tuple(
+                self._reply(case, remote.limit, is_wanted) for case in remote.cases if is_wanted()
+            )
+        finally:
+            self.free.release()
+
+    def _reply(self, case: PlannedCase, limit: float, is_wanted: Callable[[], bool]) -> Reply:
         if isinstance(case.task, BundledTask):
             case = case._replace(task=replace(case.task, temporary=self.folder))
         with self._seat() as seat:
-            return seat.reply(case, remote.limit, is_wanted)
+            return seat.reply(case, limit, is_wanted)
 
     @contextmanager
     def _seat(self) -> Iterator[Seat]:
         """Give a process, idle or new; one that has ended is not used again."""
         with self.lock:
+            if self.stopped:
+                raise NoProcess("the batch has ended")
             seat = self.idle.pop() if self.idle else None
             if self.leaving is not None:
                 self.leaving.cancel()
@@ -316,11 +333,14 @@ class Seats:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def run_packed(payload: bytes) -> Reply:
-    """Have a packed case fitted, in a worker of the cluster."""
-    from distributed import get_worker
+def run_packed(payload: bytes) -> tuple[Reply, ...]:
+    """Have packed cases fitted, in a worker of the cluster.
 
-    remote: RemoteCase = pickle.loads(payload)
+    The worker's next ones wait beside them, so that its process need not wait for the cluster.
+    """
+    from distributed import get_worker, secede
+
+    remote: RemoteCases = pickle.loads(payload)
     worker = get_worker()
     key = worker.get_current_task()
 
@@ -328,7 +348,8 @@ def run_packed(payload: bytes) -> Reply:
         state = worker.state.tasks.get(key)
         return state is not None and state.state != "cancelled"
 
-    return _seats(worker, remote.batch).reply(remote, is_wanted)
+    secede()
+    return _seats(worker, remote.batch).replies(remote, is_wanted)
 
 
 def stop_batch(batch: str, dask_worker: "Worker | None" = None) -> None:
@@ -341,14 +362,5 @@ def _seats(worker: "Worker", batch: str) -> Seats:
     """Return the processes of a batch beside a worker, which has them as long as it runs."""
     batches: dict[str, Seats] = vars(worker).setdefault("exfit_batches", {})
     folder = Path(worker.local_directory) / f"exfit-{batch}"
-    return batches.setdefault(batch, Seats(folder))  # in one step: its threads share them
-
-
-def _packed(outcome: CaseOutcome) -> bytes:
-    return zlib.compress(pickle.dumps(outcome, pickle.HIGHEST_PROTOCOL), QUICKLY)
-
-
-def unpacked(packed: bytes) -> CaseOutcome:
-    """Return the outcome that has travelled."""
-    outcome: CaseOutcome = pickle.loads(zlib.decompress(packed))
-    return outcome
+    seats = Seats(folder, Semaphore(worker.state.nthreads))
+    return batches.setdefault(batch, seats)  # in one step: its threads share them

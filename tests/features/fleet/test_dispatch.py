@@ -13,7 +13,14 @@ from types import SimpleNamespace
 import pytest
 
 from exfit.features.fleet import dispatch, remote
-from exfit.features.fleet.dispatch import AHEAD, MOST_DEATHS, MOST_LOSSES, ClusterError, Dispatch
+from exfit.features.fleet.dispatch import (
+    AHEAD,
+    MOST_DEATHS,
+    MOST_LOSSES,
+    TOGETHER,
+    ClusterError,
+    Dispatch,
+)
 from exfit.features.fleet.folder import CaseOutcome, Failure, IndexEntry
 from exfit.features.fleet.local import Waiting
 from exfit.features.fleet.plan import PlannedCase
@@ -24,8 +31,8 @@ from exfit.features.fleet.task import CaseTask
 class Futures:
     """What a client gives for a task: here a case that a worker of words has, or has done."""
 
-    def __init__(self, key, worker, case):
-        self.key, self.worker, self.case = key, worker, case
+    def __init__(self, key, worker, cases):
+        self.key, self.worker, self.cases = key, worker, cases
         self.answer, self.callbacks = Future(), []
 
     def add_done_callback(self, call):
@@ -52,7 +59,7 @@ class WordyClient:
 
     def __init__(self, **threads):
         self.threads, self.under_way, self.most, self.status = threads, [], 0, "running"
-        self.versions = {}
+        self.versions, self.seconds = {}, 10.0
         self.scheduler = SimpleNamespace(address="tcp://words:1", ncores=lambda: None)
         self.stopped = []
 
@@ -69,8 +76,7 @@ class WordyClient:
 
     def submit(self, run, payload, key, workers, pure):
         assert run.__closure__ is None  # pickled with its code alone
-        case = pickle.loads(payload).case
-        future = Futures(key, workers[0], case)
+        future = Futures(key, workers[0], pickle.loads(payload).cases)
         self.under_way.append(future)
         self.most = max(self.most, len(self.under_way))
         return future
@@ -82,8 +88,9 @@ class WordyClient:
 
     def finish(self, future, reply=None):
         self.under_way.remove(future)
-        done = Reply(remote._packed(CaseOutcome(failure=Failure("failed", "of words"))))
-        future.finish(reply or done)
+        done = Reply(CaseOutcome(failure=Failure("failed", "of words", self.seconds)))
+        refused = isinstance(reply, Exception)
+        future.finish(reply if refused else (reply or done,) * len(future.cases))
 
 
 @pytest.fixture(autouse=True)
@@ -147,6 +154,68 @@ def test_no_more_cases_are_under_way_than_the_workers_need(tmp_path):
     assert client.most == AHEAD * 4
 
 
+def test_short_cases_travel_together_and_long_ones_alone(tmp_path):
+    cases = planned([f"{kind}{number}" for kind in "ls" for number in range(100)], tmp_path)
+    client, sizes = WordyClient(a=2, b=1), {"s": [], "l": []}
+
+    def reply(client):
+        future = client.under_way[0]
+        (group,) = {case.task.group for case in future.cases}
+        client.seconds = {"s": 0.2, "l": 2.0}[group]
+        sizes[group].append(len(future.cases))
+        client.finish(future)
+
+    assert len(Run(client, cases).until_done(reply)) == 200
+    assert max(sizes["s"]) == TOGETHER / 0.2
+    assert set(sizes["l"]) == {1}
+
+
+def test_the_last_short_cases_travel_alone_so_that_all_workers_end_together(tmp_path):
+    client, sizes = WordyClient(a=2, b=1), []
+    client.seconds = 0.2
+
+    def reply(client):
+        sizes.append(len(client.under_way[0].cases))
+        client.finish(client.under_way[0])
+
+    Run(client, planned([f"m{number}" for number in range(200)], tmp_path)).until_done(reply)
+    assert max(sizes) == TOGETHER / 0.2
+    assert sizes[-1] == 1
+
+
+def test_of_cases_that_travel_together_one_that_dies_is_tried_again_alone(tmp_path):
+    client, tries = WordyClient(a=1), []
+    client.seconds = 0.2
+
+    def reply(client):
+        future = client.under_way[0]
+        names = [case.entry.case for case in future.cases]
+        if "m9" in names:
+            tries.append(names)
+            client.under_way.remove(future)
+            death = Reply(death="the worker was ended by SIGSEGV")
+            future.finish(tuple(death if name == "m9" else Reply() for name in names))
+        else:
+            client.finish(future)
+
+    ended = Run(client, planned([f"m{number}" for number in range(40)], tmp_path)).until_done(reply)
+    assert len(ended) == 40
+    assert len(tries[0]) > 1
+    assert tries[1:] == [["m9"]] * (MOST_DEATHS - 1)
+    assert ended["m9"].failure.kind == "crashed"
+
+
+def test_what_a_worker_did_not_come_to_is_sent_again(tmp_path):
+    client = WordyClient(a=1)
+    client.seconds = 0.2
+
+    def reply(client):
+        future = client.under_way.pop(0)
+        future.finish((Reply(CaseOutcome(failure=Failure("failed", "of words", 0.2))),))
+
+    assert len(Run(client, planned([f"m{n}" for n in range(30)], tmp_path)).until_done(reply)) == 30
+
+
 def test_large_cases_travel_one_after_the_other(tmp_path, monkeypatch):
     monkeypatch.setattr(dispatch, "MOST_BYTES", 1)
     client = WordyClient(a=4, b=4)
@@ -162,7 +231,7 @@ def test_a_worker_stays_with_a_model_as_long_as_there_are_cases_of_it(tmp_path):
     def reply(client):
         for worker in had:
             future = next(sent for sent in client.under_way if sent.worker == worker)
-            had[worker].append(future.case.task.group)
+            had[worker].append(future.cases[0].task.group)
             client.finish(future)
             if not client.under_way:
                 break
@@ -204,7 +273,7 @@ def test_what_comes_late_from_a_worker_that_was_lost_is_not_counted(tmp_path):
     run._look()
     run._send()
     assert [future.worker for future in client.under_way] == ["b"]
-    late.finish(Reply(remote._packed(CaseOutcome())))
+    late.finish((Reply(),))
     run._fetch()
     assert [*run.sent] == [client.under_way[0].key]
 
@@ -214,7 +283,7 @@ def test_a_case_whose_process_dies_is_tried_again_and_then_has_crashed(tmp_path)
 
     def reply(client):
         future = client.under_way[0]
-        if future.case.entry.case == "m3":
+        if future.cases[0].entry.case == "m3":
             tries.append(future.worker)
             client.finish(future, Reply(death="the worker was ended by SIGSEGV"))
         else:
@@ -232,7 +301,7 @@ def test_a_case_in_whose_middle_all_workers_are_lost_is_not_sent_for_ever(tmp_pa
     client, number, losses = WordyClient(w0=1), count(1), []
 
     def reply(client):
-        if client.under_way and client.under_way[0].case.entry.case == "m1":
+        if client.under_way and client.under_way[0].cases[0].entry.case == "m1":
             losses.append(client.threads)
             client.threads = {f"w{next(number)}": 1}
         elif client.under_way:
@@ -248,7 +317,7 @@ def test_what_waits_behind_a_long_case_goes_to_a_worker_that_has_nothing_to_do(t
     client, begun = WordyClient(a=1, b=1), []
 
     def reply(client):
-        long = [future for future in client.under_way if future.case.entry.case == "m0"]
+        long = [future for future in client.under_way if future.cases[0].entry.case == "m0"]
         others = [future for future in client.under_way if future.worker != long[0].worker]
         client.finish((others or long)[0])
 
