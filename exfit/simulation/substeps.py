@@ -51,16 +51,14 @@ def _substeps_at_rest(system: System, step: float, sets: bytes) -> NDArray[np.in
         enough = step * _radius_bounds(rest.jacobian) - ON_GRID <= needed
         # at rest whatever the spectral radius, where that is finite; a sum is finite where all
         # numbers are, or at most too large: then eigenvalues decide
-        finite = np.isfinite(rest.x.sum(axis=1))
-        still = np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE
-        sure = enough & finite & still & (needed <= MOST_SUBSTEPS)
+        sure = enough & np.isfinite(rest.x.sum(axis=1)) & (needed <= MOST_SUBSTEPS)
+        sure &= np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE
         parts = needed.astype(np.int64)
     if not sure.all():
         unsure = AtRest(*(part[~sure] for part in rest))
         radius = spectral_radii(unsure.jacobian)
         moves = np.any(_moving(unsure, radius), axis=1)
-        required = _parts(step, np.maximum(lag_rate[~sure], radius))
-        parts[~sure] = np.where(moves, NO_SUBSTEPS, required)
+        parts[~sure] = _parts(step, np.where(moves, np.inf, np.maximum(lag_rate[~sure], radius)))
     parts.flags.writeable = False
     return parts
 
@@ -180,8 +178,7 @@ def _moving(rest: AtRest, radius: Array) -> Mask:
 def _radius_bounds(jacobians: Array) -> Array:
     """Return bounds above the spectral radii of Jacobians (K, nx, nx), without eigenvalues.
 
-    A power's norm is a bound of the radius' power (Gelfand): the 32nd is near enough. It may
-    overflow, and then bounds nothing.
+    A power's norm is a bound of the radius' power (Gelfand): the 32nd is near, or overflows.
     """
     power = jacobians
     for _ in range(SQUARINGS):
