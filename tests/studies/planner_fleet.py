@@ -5,7 +5,7 @@ Run it as ``python tests/studies/planner_fleet.py --units 200 --records 40``. Th
 odd layouts, with governors and others between them that it does not know; 40 have a record of a
 step whose true values the file has up to 1.5 times off. Checked is that every byte outside the
 fields that `fitted.csv` names is as it was; counted is how near the written values are to the
-truth, and how often their intervals hold it.
+truth, and how often their intervals hold it; with ``--given drawn`` all other values are off, too.
 """
 
 import argparse
@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from dyr_words import changed_words
-from planner_files import planner_file
+from planner_files import SEED, planner_file
 
 from exfit.cli import main as command
 from exfit.features.fleet.folder import read_fleet
@@ -40,9 +40,8 @@ def run(*arguments):
     return 0, time.monotonic() - began
 
 
-def study(folder, units, records, batch_options):
+def study(folder, made, batch_options):
     """Run the three commands, print what they came to; return 1 where a byte is not as it was."""
-    made = planner_file(folder, units, records)
     cases, fleet, fitted = folder / "cases", folder / "fleet", folder / "fitted.dyr"
     times = {
         "import --all": run("import", "--all", made.dyr, "-o", cases, "--records", made.records,
@@ -94,10 +93,14 @@ def main():
     parser.add_argument("--records", type=int, default=40)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--search", choices=("global", "local"), default="global")
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--given", choices=("exact", "drawn"), default="exact")
     given = parser.parse_args()
     options = ("--workers", given.workers, "--search", given.search)
-    with TemporaryDirectory() as folder:
-        return study(Path(folder), given.units, given.records, options)
+    with TemporaryDirectory() as name:
+        folder, drawn = Path(name), given.given == "drawn"
+        made = planner_file(folder, given.units, given.records, given.seed, drawn)
+        return study(folder, made, options)
 
 
 if __name__ == "__main__":

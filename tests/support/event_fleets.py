@@ -177,13 +177,18 @@ def near(value, random, spread):
     return float(f"{value * spread ** random.uniform(-1.0, 1.0):.4g}")
 
 
-def drawn_values(part, random, spread, symbols):
-    """Return typical data with some values drawn about them, none of which contradict."""
-    values = {row.symbol: row.typical for row in part.model.sheet}
-    values |= dict(part.record.held)
-    if values.get("E1", 0.0) > values.get("E2", 0.0):  # a file has the lower voltage first
+def typical_values(part):
+    """Return typical data of a record; of a saturation the lower voltage first, as in a file."""
+    values = {row.symbol: row.typical for row in part.model.sheet} | dict(part.record.held)
+    if values.get("E1", 0.0) > values.get("E2", 0.0):
         order = {"E1": "E2", "E2": "E1", "SE1": "SE2", "SE2": "SE1"}
         values |= {symbol: values[other] for symbol, other in order.items()}
+    return values
+
+
+def drawn_values(part, random, spread, symbols):
+    """Return typical data with some values drawn about them, none of which contradict."""
+    values = typical_values(part)
     while True:
         drawn = {symbol: near(values[symbol], random, spread) for symbol in symbols}
         if not [*contradictions(part.model, {**values, **drawn})]:

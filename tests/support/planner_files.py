@@ -5,6 +5,7 @@ from math import exp, log
 from pathlib import Path
 
 import numpy as np
+from event_fleets import true_parts, typical_values
 from loose_records import loose, sound
 from programme_files import FREE
 
@@ -14,7 +15,6 @@ from exfit.features.planner.records import alternatives, contradictions, definit
 from exfit.features.planner.units import read_unit
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
-from exfit.models.sheet import typical
 from exfit.workflows import simulate
 
 SEED = 1601
@@ -35,7 +35,7 @@ OTHERS = (
 
 @dataclass(frozen=True)
 class PlannerFile:
-    """A planner's file and a folder of records; ``truth`` are the values off in the file, by bus.
+    """A planner's file and a folder of records; ``truth`` are the true values of units, by bus.
 
     ``pieces`` is the text of each unit by its bus.
     """
@@ -46,8 +46,10 @@ class PlannerFile:
     pieces: dict[int, str]
 
 
-def planner_file(folder, units=200, recorded=40, seed=SEED):
+def planner_file(folder, units=200, recorded=40, seed=SEED, given_drawn=False):
     """Write a planner's file of so many units and records of some; return what they are.
+
+    With ``given_drawn`` every true value lies about that of the file by its default error.
 
     Units that are recorded are of six models with values near to typical ones; the others are of
     every kind of record that exfit knows, with any values. All are in an odd layout.
@@ -60,9 +62,10 @@ def planner_file(folder, units=200, recorded=40, seed=SEED):
     (folder / "records").mkdir()
     for number, bus in enumerate(buses):
         if bus in tested:
-            own, truth[bus] = recorded_unit(models[len(truth) % len(models)], random)
-            write_record(folder / "records", bus, own, random)
-            own = [(part, {**values, **file}) for part, values, file in own]
+            model = models[len(truth) % len(models)]
+            own, true = recorded_unit(model, random, given_drawn)
+            truth[bus] = {symbol: value for _, values in true for symbol, value in values.items()}
+            write_record(folder / "records", bus, true, random)
         else:
             own = any_unit(number, random)
         other = OTHERS[number % len(OTHERS)].format(bus=bus)
@@ -82,17 +85,18 @@ def any_unit(number, random):
     return [(definition, sound(definition, random)) for definition in chosen]
 
 
-def recorded_unit(model, random):
-    """Return the records of a unit (definition, true values, those that are off), and its truth."""
+def recorded_unit(model, random, given_drawn):
+    """Return the records of a unit (definition, values) as the file has them, and the true ones."""
     exciter = alternatives(MODELS[model])[0]
     machine = alternatives(MACHINES["GENROU"])[0]
     rows = {row.symbol: row for row in exciter.model.sheet}
-    values = typical(exciter.model.sheet)
-    true = {symbol: drawn(values[symbol], rows[symbol], random, 1.3) for symbol in FREE[model]}
-    values |= true
-    off = {symbol: drawn(true[symbol], rows[symbol], random, SPREAD) for symbol in true}
+    values = typical_values(exciter)
+    values |= {symbol: drawn(values[symbol], rows[symbol], random, 1.3) for symbol in FREE[model]}
+    off = {symbol: drawn(values[symbol], rows[symbol], random, SPREAD) for symbol in FREE[model]}
     assert not [*contradictions(exciter.model, {**values, **off})]
-    return [(machine, typical(machine.model.sheet), {}), (exciter, values, off)], true
+    true = ((machine, typical_values(machine)), (exciter, values))
+    stated = (true[0], (exciter, {**values, **off}))
+    return stated, true_parts(true, random) if given_drawn else true
 
 
 def drawn(value, row, random, spread):
@@ -103,7 +107,7 @@ def drawn(value, row, random, spread):
 
 def write_record(folder, bus, unit, random):
     """Write the record of a step of a unit with its true values."""
-    text = "".join(loose(part, values, random, bus=bus) for part, values, _ in unit)
+    text = "".join(loose(*part, random, bus=bus) for part in unit)
     case = imported_case(read_unit(text, "true.dyr"), "true.dyr").text
     case = case.replace("{at: 1.0, step: 0.05}", f"{{at: {AT}, step: {STEP}}}")
     case = case.replace("duration: 10.0", f"duration: {LENGTH}")

@@ -96,8 +96,9 @@ def errors_of_values(
         if np.any(np.abs(column) > NEGLIGIBLE * together)
     }
     sides = None
-    if case.external is None and not case.kind.finds_rest:
-        starts = [*starts_of_values(residuals, theta, std_errors, setups)]
+    if case.external is None:
+        acting = () if case.kind.finds_rest else setups  # limits: of an event that takes too long
+        starts = [*starts_of_values(residuals, theta, std_errors, acting)]
         share = np.diag(known.T @ known @ covariance)  # of each value that the record knows
         chance = float(np.sum(share))
         surprising = -float(pull @ mean) > chance + 2.0 * sqrt(2.0 * chance)

@@ -8,7 +8,7 @@ from unittest import mock
 import numpy as np
 import pytest
 import yaml
-from grid_events import TRUTH, event_case, recorded
+from grid_events import TRUTH, UNIT, event_case, recorded
 
 from exfit.case.load import load_case
 from exfit.estimate import Stop
@@ -24,6 +24,7 @@ from exfit.features.events.input_noise import (
     with_noise,
 )
 from exfit.fitting.build import build_experiments
+from exfit.results.intervals import value_errors
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.workflows import fit
 
@@ -362,3 +363,21 @@ def test_ctrl_c_as_the_weighing_begins_keeps_the_search():
         own, kept = input_noise.weighted_search(problem, (), found, mock.Mock())
     assert own is problem
     assert kept.best is Stop.INTERRUPTED
+
+
+def test_intervals_reach_as_far_as_given_values_allow_that_the_record_contradicts(folder, event):
+    """Seven values are off by one or two of their errors, more than are fitted."""
+    off = {"Tpd0": 1.2, "Tppd0": 0.6, "Tppq0": 1.4, "H": 0.9, "Xl": 1.15, "S10": 0.7, "S12": 1.3}
+    path = event_case(folder, "event")
+    content = yaml.safe_load(path.read_text())
+    del content["given"]
+    content["plant"]["parameters"] = {name: UNIT[name] * times for name, times in off.items()}
+    path.write_text(yaml.safe_dump(content))
+    with mock.patch.object(
+        value_errors, "sides_with_values", wraps=value_errors.sides_with_values
+    ) as reached:
+        found = fit(path).parameters
+    assert reached.called
+    for name, true in TRUTH.items():
+        interval = found[name].interval
+        assert interval is None or (interval[0] or 0.0) <= true <= (interval[1] or np.inf), name
