@@ -20,6 +20,7 @@ from exfit.plants import REFERENCES, SPEED, VT0
 from exfit.registry import parts
 from exfit.results.cause import Cause, Remedy
 from exfit.results.intervals.averages import averaged_residuals, unstated
+from exfit.results.intervals.value_errors import influence_of_values
 from exfit.results.verdict import REJECTED
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
@@ -188,7 +189,7 @@ def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
     """Return the given value whose fit with its standard error would explain most, if any.
 
     It is tested against what it would leave of the errors, which may be far from white before.
-    None, too, where what a test or a record holds would explain more.
+    None, too, where what a test or a record holds would explain more, beyond what all values do.
     """
     try:
         linear, directions, shift = _linearised(evidence)
@@ -202,12 +203,19 @@ def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
         return [(score, each) for score, each in pairs if score is not None]
 
     scores = scored(spread_of_errors(residuals, linear.beyond(linear.errors), white=True))
-    if not scores:
+    scores.sort(key=lambda each: -each[0].gain)
+    rivals = list[tuple[Contradiction, Array]]()
+    for best, direction in scores:
+        left = spread_of_errors(residuals, linear.beyond(linear.errors + best.change * direction))
+        best = _score(best.held, direction, linear, left, shift) or best
+        if best.held.names and _is_significant(best.gain, len(scores)):
+            break
+        if not best.held.names:
+            rivals.append((best, direction))
+    else:
         return None
-    best, direction = max(scores, key=lambda each: each[0].gain)
-    left = spread_of_errors(residuals, linear.beyond(linear.errors + best.change * direction))
-    best = _score(best.held, direction, linear, left, shift) or best
-    if not (best.held.names and _is_significant(best.gain, len(scores))):
+    beyond = _beyond_values(evidence, linear, rivals)
+    if any(_is_significant(gain, len(scores)) for gain in beyond):
         return None
     tested += _of_speed(evidence)
     alike = sorted((each for each, _ in scored(left)), key=lambda each: -each.explains)
@@ -218,6 +226,35 @@ def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
     ]
     others += _averages(evidence, linear, left, best.gain)
     return Refinement(best.held.names, tuple(others))
+
+
+def _beyond_values(
+    evidence: Evidence, linear: LinearFit, rivals: Sequence[tuple[Contradiction, Array]]
+) -> Iterator[float]:
+    """Yield by how much chi-square falls with each rival beyond all values within their errors.
+
+    The values are as uncertain as these, all at once: with G their effects in standard errors the
+    covariance of the errors is 1 + G G', and the rival's score is taken of that.
+    """
+    residuals, std_errors = evidence.residuals, given_std_errors(evidence.case)
+    of_values = {name: std_errors[name] for name in std_errors if name in residuals.fixed}
+    influence = influence_of_values(residuals, evidence.solution.x, of_values) if rivals else None
+    whole = linear.beyond(linear.errors)
+    columns = np.empty((len(whole), 0))
+    if influence is not None:
+        columns = linear.beyond(influence.beyond[: len(whole)])
+    for rival, direction in rivals:
+        own, left = linear.beyond(direction), whole
+        for white in (True, False):  # then against what it would leave
+            spread = spread_of_errors(residuals, left, white)
+            known, moved = columns / spread[:, None], own / spread
+            posterior = np.linalg.inv(np.eye(known.shape[1]) + known.T @ known) @ known.T
+            score = moved - known @ (posterior @ moved)
+            square = float(score @ moved)
+            change = -float(score @ (whole / spread)) / square
+            left = whole + change * own
+            left = left - columns @ (posterior @ (left / spread))
+        yield change**2 * square - 2.0 * rival.held.rare
 
 
 def _of_speed(evidence: Evidence) -> Iterator[tuple[Held, Array]]:

@@ -18,7 +18,7 @@ from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.score_tests import value_that_the_record_refines
 from exfit.workflows.search_state import SearchState, ignore
 
-MOST_VALUES = 4  # each the one that explains most of what is left
+MOST_VALUES = 8  # each the one that explains most of what is left
 
 
 def with_refined_values(state: SearchState) -> SearchState:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from cases import FIRST_ORDER, TIME
-from records import config, found_in
+from channel_records import three_channels
+from records import UNIT, config, found_in
 
 from exfit import Record
 from exfit.case.case import Case
@@ -75,6 +76,23 @@ def test_what_the_test_explains_better_moves_no_value():
     assert [*result.parameters] == ["a"]
     assert "k = 4" not in result.verdict.reason
     assert result.verdict.causes[0].cause.startswith(("the size of the step", "the base of vt"))
+
+
+def test_values_that_explain_a_record_together_are_fitted_in_place_of_a_base():
+    """Another base of efd would explain more than each of them, but not more than all."""
+    case = three_channels(weights="balanced", noise={"vt": 1e-4, "efd": 2e-2})
+    data = {f"machine.{name}": case.values()[f"machine.{name}"] for name in ("S10", "S12", "Tpd0")}
+    off = dict(zip(data, (0.75, 1.3, 0.85), strict=True))  # each by one of its errors
+    values = {name: value / off[name] for name, value in data.items()}
+    result = fit(case, given="uncertain", values=values)
+    assert result.verdict.verdict == GOOD
+    truth = UNIT | data
+    for name, parameter in result.parameters.items():
+        low, high = parameter.interval
+        assert low < truth[name] < high, name
+    assert data.keys() <= result.parameters.keys()
+    named = [cause.cause for cause in result.verdict.causes]
+    assert any("or as likely the base of efd" in cause for cause in named)
 
 
 @pytest.mark.long
