@@ -4,13 +4,18 @@ The tests are those of configs/programmes/hydro_unit.yaml: a step of the voltage
 isolated load, and of the governor's reference.
 """
 
+from functools import cached_property
+
 import numpy as np
 import yaml
 from event_sets import bounds
 from places import CONFIGS
 from scipy.signal import lfilter
 from typed_governors import GOVERNORS, TYPICAL, TypedUnit
-from whole_unit import EXCITER, MACHINE, SAMPLES, TESTS, record, save
+from whole_unit import EXCITER, MACHINE, SAMPLES, TESTS, noisy, response, save
+
+from exfit.case.given_errors import given_std_errors
+from exfit.features.programme.run import load_programme
 
 FREE = {
     "TGOV1": ("R", "T1", "T2", "T3"),
@@ -30,6 +35,7 @@ SPREAD, START = 1.25, 1.6  # of true data to typical ones, of the start of a fit
 BOUNDS = 6.0  # times the start
 BAND = 0.001  # pu: dead band of a planted fault
 LAG = 1.0  # s: of a planted transducer
+LEAST = 0.3  # of a given value: what is left of it by a large error
 
 
 def another_governor(content, columns):
@@ -82,6 +88,23 @@ def clock(content, columns):
     columns["load"]["t"] = 1.05 * columns["load"]["t"]
 
 
+def given_off(content, path, rng):
+    """Give values as far from the truth as it lies about them: by their errors, if stated."""
+    case = load_programme(path).shared_case()
+    plant, fixed, values = content["plant"], content["parameters"]["fixed"], case.values()
+    sections = {
+        "machine": plant["parameters"],
+        "network": plant["network"],
+        "governor": content["governor"]["parameters"],
+    }
+    for name, error in given_std_errors(case).items():
+        *part, symbol = name.split(".")
+        section, true = sections[part[0]] if part else fixed, values[name]
+        if symbol in section:
+            share = 1.0 + error / abs(true) * float(rng.standard_normal())
+            section[symbol] = true / max(share, LEAST)
+
+
 FAULTS = {
     "another governor": another_governor,
     "size of the reference": reference_size,
@@ -91,6 +114,16 @@ FAULTS = {
     "lag of the power": power_lag,
     "clock": clock,
     "dead band": None,  # of the unit itself
+}
+WORDS = {  # of a cause that names the fault
+    "another governor": r"the model",
+    "size of the reference": r"size of the step.* of reference",
+    "size of the load": r"size of the step.* of load",
+    "inertia": r"^machine\.H\b",
+    "scale of the gate": r"the base of gate",
+    "lag of the power": r"averages|filters",
+    "clock": r"clock",
+    "dead band": r"dead band|DB[HL]",
 }
 
 
@@ -129,8 +162,12 @@ class DrawnUnit:
         if self.kind == "IEEEG1":  # whose shares make 1
             self.governor["K5"] = 1.0 - self.governor["K1"] - self.governor["K3"]
         known = {f"governor.{name}": self.governor[name] for name in FREE[self.kind]}
-        self.truth = self.exciter | known
-        self.start = drawn(self.truth, START)
+        known = self.exciter | known
+        self.start = drawn(known, START)
+        own = {f"governor.{name}": value for name, value in self.governor.items()}
+        machine = {f"machine.{name}": value for name, value in self.machine.items()}
+        network = {"network.X": self.tests["reference"][2][3]}
+        self.truth = own | machine | network | known
 
     @property
     def tests(self):
@@ -166,18 +203,37 @@ class DrawnUnit:
             {"at": 2.03, "step": self.tests["reference"][-1]["pref"][0][1]}]}  # fmt: skip
         return content
 
-    def write(self, folder, draw=0, fault=None):
-        """Write the records and the programme, with a fault if one is named; return its path."""
-        rng = np.random.default_rng([35, self.number, draw])
+    def responses(self, dead_band=False):
+        """Return the samples of each test, without noise."""
         unit = TypedUnit("GENSAL", self.machine, self.exciter, self.kind, self.governor)
-        if fault == "dead band":
+        if dead_band:
             unit.governor = Banded(unit.governor)
+        return {name: response(test, unit) for name, test in self.tests.items()}
+
+    @cached_property
+    def sound(self):
+        """The samples of each test of the unit without a fault, without noise."""
+        return self.responses()
+
+    def write(self, folder, draw=0, fault=None, given="stated"):
+        """Write the records and the programme, with a fault if one is named; return its path.
+
+        Given values are true; ``given`` is "exact", where the case says so, or "drawn", where they
+        are as wrong as their default errors say.
+        """
+        rng = np.random.default_rng([35, self.number, draw])
         content = self.content()
-        columns = {name: record(test, unit, rng) for name, test in self.tests.items()}
+        clean = self.responses(dead_band=True) if fault == "dead band" else self.sound
+        columns = {name: noisy(each, rng) for name, each in clean.items()}
         if fault is not None and FAULTS[fault] is not None:
             FAULTS[fault](content, columns)
         for name, each in columns.items():
             save(folder / f"{name}.csv", each)
         path = folder / "programme.yaml"
+        if given == "exact":
+            content["given"] = given
+        if given == "drawn":
+            path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+            given_off(content, path, rng)
         path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
         return path

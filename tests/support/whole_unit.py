@@ -33,8 +33,8 @@ TESTS = {  # seconds, channels, start (vt, E, R, X, P), changes of vref, pref, f
 }  # fmt: skip
 
 
-def record(test, unit, rng):
-    """Return the samples of a test by channel, with time."""
+def response(test, unit):
+    """Return the samples of a test by channel, with time, without noise."""
     seconds, channels, start, moves = test
     time = np.arange(0.0, seconds + 1e-9, 1.0 / SAMPLES)
     x0, vref, pref = unit.start(*start)
@@ -59,9 +59,15 @@ def record(test, unit, rng):
     seen = [unit.signals(x, *network(t)) for t, x in zip(time, states.T, strict=True)]
     columns = {"t": time}
     for channel in channels.split():
-        clean = np.array([each[channel] for each in seen])
-        columns[channel] = clean + NOISE[channel] * rng.standard_normal(len(time))
+        columns[channel] = np.array([each[channel] for each in seen])
     return columns
+
+
+def noisy(columns, rng):
+    """Return samples of channels with the noise of a recorder."""
+    noise = {name: NOISE[name] * rng.standard_normal(len(columns["t"]))
+             for name in columns if name != "t"}  # fmt: skip
+    return {name: samples + noise.get(name, 0.0) for name, samples in columns.items()}
 
 
 def save(path, columns):
@@ -76,7 +82,7 @@ def write(folder):
     rng = np.random.default_rng(2026)
     unit = TypedUnit("GENSAL", MACHINE, EXCITER, "HYGOV", GOVERNOR)
     for name, test in TESTS.items():
-        save(folder / f"hydro_unit_{name}.csv", record(test, unit, rng))
+        save(folder / f"hydro_unit_{name}.csv", noisy(response(test, unit), rng))
 
 
 if __name__ == "__main__":
