@@ -91,7 +91,7 @@ def test_the_values_of_a_planners_file_are_its_own_and_what_is_filled_in_is_typi
     comments = words(out.replace("//", " "))
     assert "typical" not in comments
     assert "GENROU: planner: Tpd0 Tppd0 Tpq0 Tppq0 H D Xd" in comments
-    assert "ESAC1A: fitted: KA." in comments
+    assert "ESAC1A: fitted: KA " in comments  # and others, which the record contradicts
 
 
 @pytest.mark.long
