@@ -34,6 +34,7 @@ ALONG = ("p", "r", "x", "u", "slopes", "jacobian", "dp", "dr", "units")
 CACHE_LINE = 8  # numbers: what a vector is read from begins at a multiple
 MOST_KEPT = 1 << 23  # numbers (64 MB) of a scratch buffer that is used again
 KINDS = {"p": ctypes.c_void_p, "i": ctypes.c_int64, "d": ctypes.c_double}
+NO_BYTES = ctypes.c_char * 0
 
 _scratch = threading.local()  # new pages for every run would cost a fifth of it
 
@@ -44,7 +45,7 @@ def address(array: NDArray[Any], kind: type = np.float64) -> int:
     if array.dtype != kind or not flags.c_contiguous:
         raise TypeError(f"the kernel takes C-contiguous arrays of {kind.__name__}")
     if flags.writeable:  # takes a third of the time
-        return ctypes.addressof((ctypes.c_char * 0).from_buffer(array.data))
+        return ctypes.addressof(NO_BYTES.from_buffer(array))  # type: ignore[arg-type]
     return int(array.__array_interface__["data"][0])
 
 
@@ -186,8 +187,7 @@ class Sampler:
         shape = (courses.samples, sizes.outputs)
         outputs = np.empty((count, *shape))
         slopes = None if dp is None else np.empty((count, blocks, *shape, sizes.directions))
-        changing = dp is not None and courses.readings[0, 2] != 0
-        changes = np.empty((count, *shape)) if changing else None
+        changes = np.empty((count, *shape)) if dp is not None and courses.readings[0, 2] else None
         table = np.zeros((jobs, blocks, len(JOB)), np.int64)
         table[:, :, 0] = places(p, jobs)[:, None]
         for column, array in ((1, dp), (2, rates)):

@@ -275,7 +275,7 @@ class Simulator:
         names = self.system.parameters
         p = np.array([[values[name] for name in names] for values in sets], dtype=np.float64)
         parts = substeps_at_rest(self.system, self._reach, p)
-        return p, np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
+        return p, parts if self.least == 1 else np.maximum(parts, self.least * (parts > 0))
 
     @property
     def jump(self) -> float:

@@ -150,7 +150,7 @@ def _places_of_lags(system: System) -> NDArray[np.intp]:
 def _lag_rates(system: System, p: Array) -> Array:
     """Return 1/T of the shortest time constant of each set that is not bypassed."""
     lags = p.take(_places_of_lags(system), axis=1)
-    shortest = np.where(lags >= SHORTEST, lags, np.inf).min(axis=1, initial=np.inf)
+    shortest = lags.min(axis=1, initial=np.inf, where=lags >= SHORTEST)
     return np.asarray(1.0 / shortest)
 
 
