@@ -47,7 +47,7 @@ def free_and_record(content, names, rng, record):
 
     The truth is drawn near the values, which are the starts.
     """
-    fixed, machine = content["parameters"]["fixed"], content["plant"]["parameters"]
+    fixed, machine = content["parameters"]["fixed"], content["plant"].get("parameters", {})
     values = {**fixed, **{f"machine.{name}": value for name, value in machine.items()}}
     starts = {name: float(values[name]) for name in names}
     truth = {name: start * rng.lognormal(0.0, SPREAD) for name, start in starts.items()}
