@@ -159,7 +159,8 @@ class Difference:
     @property
     def error(self) -> Array:
         """The difference itself."""
-        return np.asarray(self.values[1] - self.values[0])
+        with np.errstate(invalid="ignore"):  # where both are infinite
+            return np.asarray(self.values[1] - self.values[0])
 
     @property
     def count(self) -> int:
