@@ -85,6 +85,8 @@ def read_curve(name: str, source: Path, choice: ColumnChoice) -> Curve:
     for column, samples in columns.items():
         check_finite(np.nan_to_num(samples), column, table.place)
     signals = {signal: columns[column][last] for signal, column in places.items()}
+    # an infinite sample is none, as in the counts of a comparison
+    signals = {signal: np.where(np.isfinite(own), own, np.nan) for signal, own in signals.items()}
     return Curve(name, path, table.sha256, time[last], signals, table.names, int(np.sum(~last)))
 
 
@@ -159,8 +161,7 @@ class Difference:
     @property
     def error(self) -> Array:
         """The difference itself."""
-        with np.errstate(invalid="ignore"):  # where both are infinite
-            return np.asarray(self.values[1] - self.values[0])
+        return np.asarray(self.values[1] - self.values[0])
 
     @property
     def count(self) -> int:
