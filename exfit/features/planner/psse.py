@@ -2,7 +2,7 @@
 
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from exfit.case.case_draft import in_comment
@@ -123,6 +123,8 @@ def heads(text: str, buses: Buses = NO_BUSES) -> Heads:
         if not wrong:
             label = in_comment(name).upper()
             known = buses[int(bus)].name.strip() if int(bus) in buses else ""
+            if definition is None:
+                faults += _swallowed(label, data[1:])
             head = Head(int(bus), label, machine_id, line, data, definition)
             found.append(head._replace(bus_name=known))
         elif definition is not None:
@@ -140,6 +142,14 @@ def _of_user(
     if user and tuple(field.text for field in data[1:behind]) == user:
         return data[0].text, known, data[behind:]
     return f"{name} {data[0].text}", None, data
+
+
+def _swallowed(name: str, data: tuple[Field, ...]) -> Iterator[DynamicsFault]:
+    """Find a record within another, whose '/' is missing; it may stand on the same line."""
+    for field in data:
+        if field.text[:1].isalpha() and definition_of(field.text):
+            what = f"{name}: {show_value(field.text)} among its values: is a '/' missing before?"
+            yield DynamicsFault(field.line, what)
 
 
 def _by_number(field: Field, buses: Buses) -> Field:

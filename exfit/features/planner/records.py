@@ -26,6 +26,7 @@ SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
 FLAGS = ("OEL", "UEL")  # of the places where limiters act
 ID_OF_ANOTHER = "M"  # machine, the second one of IEEEG1, which may be quoted
 LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
+CEILING, FLOOR = ("MAX", "LIM"), "MIN"  # of a sheet
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the usual code of an input
 OF_SATURATION = ("E1", "SE1", "E2", "SE2")
 LEAST_DIGITS = 4  # of a fitted value: with fewer, values that depend on each other miss the record
@@ -241,7 +242,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     given = with_exchanged(record, given)
     of_sheet = {row.symbol: given[row.symbol] for row in rows if row.symbol in given}
     idle = idle_lags(rows, of_sheet)
-    of_sheet |= {row.symbol: row.typical for row in idle}
+    endless = limits_beyond(rows, of_sheet)
+    of_sheet |= {row.symbol: row.typical for row in idle} | endless
     unused = unused_of(record, of_sheet)
     values = {**typical(rows), **dict(record.held), **of_sheet, **dict.fromkeys(unused, 0.0)}
     wrong = [*unreadable, *outside(rows, of_sheet)]
@@ -250,6 +252,10 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         *_unmodelled(definition, given),
         *_unusual(definition.model, values),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
+        *(
+            (name, f"{show(given[name])} is no limit; {show(endless[name])} is taken")
+            for name in endless
+        ),
         *(
             (
                 row.symbol,
@@ -463,6 +469,18 @@ def idle_lags(rows: Sheet, given: Mapping[str, float]) -> list[Parameter]:
         # above EFDN, KN takes the place of KF
         and given.get(row.search.needs) == 0.0 == given.get("KN", 0.0)
     ]
+
+
+def limits_beyond(rows: Sheet, given: Mapping[str, float]) -> dict[str, float]:
+    """The ends of the sheet for limits beyond them that never act, as 99999: by symbol."""
+    ends = dict[str, float]()
+    for symbol, _, _, low, high, *_ in rows:
+        value = given.get(symbol, 0.0)
+        if symbol.endswith(CEILING) and value > high and value >= OUT_OF_REACH:
+            ends[symbol] = high
+        elif symbol.endswith(FLOOR) and value < low and value <= -OUT_OF_REACH:
+            ends[symbol] = low
+    return ends
 
 
 def in_digits_borne(value: float, error: float | None) -> float:

@@ -167,6 +167,9 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
             continue
         missing, first = _missing_kinds(own), own[0]
         wrong += _lacking(own, missing)
+        if faults and missing == ["exciter"]:
+            why = "a record that cannot be read may be its exciter"
+            wrong.append(DynamicsFault(first.line, why))
         refused.append(
             RefusedUnit(
                 first.bus,

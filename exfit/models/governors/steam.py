@@ -10,7 +10,16 @@ from exfit.models.governor_parts import (
     outside_band,
     with_band,
 )
-from exfit.models.sheet import DIVIDING_TIME, TIME, UP_TO_100, WITHIN_10, limits, record, sheet
+from exfit.models.sheet import (
+    DIVIDING_TIME,
+    TIME,
+    UP_TO_100,
+    UP_TO_1000,
+    WITHIN_10,
+    limits,
+    record,
+    sheet,
+)
 
 # a dead band and a valve's curve, which the model does not have
 NOT_MODELLED = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6"
@@ -145,7 +154,7 @@ IEESGO = governor(
         ("T4", 0.673, *TIME, "steam inlet lag"),
         ("T5", 3.0, *TIME, "reheater lag"),
         ("T6", 0.45, *TIME, "crossover lag"),
-        ("K1", 14.3, "pu", (0.01, 1000.0), "governor gain, 1 over the droop"),
+        ("K1", 14.3, *UP_TO_1000, "governor gain, 1 over the droop"),
         ("K2", 0.7, "1", (0.0, 10.0), "share behind the reheater"),
         ("K3", 1.0, "1", (-10.0, 10.0), "share of that behind the crossover"),
         *limits("PMAX", 1.0, 0.0, "the power demand", WITHIN_10),

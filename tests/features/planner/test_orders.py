@@ -15,6 +15,7 @@ from exfit.features.planner.records import (
 )
 from exfit.models import LIMITERS
 from exfit.models.sheet import typical
+from exfit.util.text import show
 
 # OPAL-RT's ePHASORSIM Modelica library (cba975b8): a model's parameters in the order of PSS/E's
 # constants, its integers apart, which are those of InterPSS
@@ -394,6 +395,25 @@ def test_a_feedback_without_a_gain_needs_no_lag(record_of_any_kind):
             assert [text.startswith(fault) for _, text in reading.faults] == [True] * refused
             if not refused:
                 assert reading.values[row.symbol] == row.typical
+
+
+def test_a_limit_far_beyond_its_sheet_is_none(record_of_any_kind):
+    """As 99999 in files that others converted; a ceiling as far below its sheet is a fault."""
+    definition, far = record_of_any_kind, {"MAX": 1e7, "LIM": 1e7, "MIN": -1e7}
+    values, name = typical(definition.model.sheet), definition.record.name
+    rows = [row for row in definition.model.sheet if row.symbol[-3:] in far]
+    for row in rows:
+        if row.symbol not in definition.names:
+            continue
+        limit = far[row.symbol[-3:]]
+        reading = read(definition, record_fields(definition, {**values, row.symbol: limit}))
+        end = row.high if limit > 0.0 else row.low
+        assert (reading.faults, reading.values[row.symbol]) == ([], end)
+        assert [text for _, text in reading.warnings].count(
+            f"{name}: {row.symbol}: {show(limit)} is no limit; {show(end)} is taken"
+        ) == 1
+        other = read(definition, record_fields(definition, {**values, row.symbol: -limit}))
+        assert any(f"{row.symbol}: {show(-limit)} lies outside" in text for _, text in other.faults)
 
 
 def test_pss4c_with_two_bus_numbers_and_without_its_last_limits_is_refused():

@@ -68,6 +68,27 @@ def test_a_record_without_an_end_leaves_the_other_units(damaged):
     assert "has no '/' before the next one" in units.faults[0].text
 
 
+def test_a_record_that_another_holds_is_named_and_may_be_what_a_machine_lacks():
+    """A converter left out '/' and end of line: the machine of 104 is data of the device."""
+    machine = "{} 'GENROU' 1 6 .03 .5 .08 6.4 0 .9 .86 .12 .2 .09 .05 0 0 /\n"
+    sound = at_bus(102) + machine.format(105)
+    whole, damaged = (
+        read_units(
+            f"{sound}103 'GFORM' 1 .1 2 {end}{machine.format(104)}104 SEXS 1 .1 10 100 .1 0 5 /",
+            "f",
+        )
+        for end in ("/\n", "")
+    )
+    assert ([unit.bus for unit in whole.units], whole.faults) == ([102, 104], ())
+    assert whole.refused[0].alone is not None
+    (fault,) = damaged.faults
+    assert fault.text == "GFORM: 'GENROU' among its values: is a '/' missing before?"
+    assert [unit.bus for unit in damaged.units] == [102]
+    alone, without_machine = damaged.refused
+    assert (alone.alone, without_machine.bus) == (None, 104)
+    assert alone.faults[-1].text == "a record that cannot be read may be its exciter"
+
+
 FOREIGN = (
     "{bus} 'WEHGOV' 1 0 0 0.05 /\n", "{bus} 'USRMDL' 1 'HYG3' 5 0 0 1 2*3.5 /\n",
     "{bus} TGOV1 1 x y /\n", "{bus} 'PSS1A' 1 1 /\n", "{bus} 'UEL1' 1 -9E9 /\n",
