@@ -351,7 +351,7 @@ def _written(result: FitResult, content: Content, definition: Definition, prefix
     }
     # what the planner's file has and the case does without
     of_file = content.get("as_found", {}).get("unused", {})
-    symbols = [*dict(record.unused), *dict(record.absent), "SE1", "SE2"]
+    symbols = [*dict(record.unused), *dict(record.absent), "SE1", "SE2", "S10", "S12"]
     if prefix + SHARE not in result.parameters:
         symbols.append(RATING)
     unused = {

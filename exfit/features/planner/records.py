@@ -29,6 +29,7 @@ LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 CEILING, FLOOR = ("MAX", "LIM"), "MIN"  # of a sheet
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the usual code of an input
 OF_SATURATION = ("E1", "SE1", "E2", "SE2")
+LEAST_SATURATION = 1e-3  # pu at 1.0 pu: with less, and no more at 1.2 pu, a file means none
 LEAST_DIGITS = 4  # of a fitted value: with fewer, values that depend on each other miss the record
 WIDTH = 80  # columns of a file
 LONGEST_ID = 2
@@ -380,6 +381,8 @@ def _without_effect(
         if name in unused:
             why = f", since {other} is 0" if other else ""
             yield name, f"{definition.program} ignores {show(unused[name])}{why}; 0 is taken"
+    if "S10" in unused:
+        yield "S10", f"{show(given['S10'])}, and S12 {show(given['S12'])}: no saturation is taken"
     knee = _knee_above(given)
     if knee is not None:
         text = (
@@ -421,6 +424,8 @@ def unused_of(record: DynamicsRecord, values: Mapping[str, float]) -> dict[str, 
     }
     if _knee_above(values) is not None:
         unused |= {name: values[name] for name in ("SE1", "SE2")}
+    if values.get("S12", 1.0) <= values.get("S10", 0.0) < LEAST_SATURATION:
+        unused |= {name: values[name] for name in ("S10", "S12") if values[name] != 0.0}
     return unused
 
 

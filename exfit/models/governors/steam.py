@@ -200,7 +200,7 @@ TGOV1 = governor(
         ("R", 0.05, "pu", (0.001, 10.0), "permanent droop"),
         ("T1", 0.5, *TIME, "valve lag"),
         *limits("VMAX", 1.0, 0.0, "the valve", ("pu", (-1e6, 1e6))),
-        ("T2", 3.0, *TIME, "reheater lead"),
+        ("T2", 3.0, "s", (-100.0, 100.0), "reheater lead"),
         ("T3", 10.0, *TIME, "reheater lag"),
         ("Dt", 0.0, *UP_TO_100, "turbine damping"),
         *BAND,

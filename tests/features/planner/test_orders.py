@@ -416,6 +416,20 @@ def test_a_limit_far_beyond_its_sheet_is_none(record_of_any_kind):
         assert any(f"{row.symbol}: {show(-limit)} lies outside" in text for _, text in other.faults)
 
 
+def test_a_saturation_of_next_to_nothing_is_none(record_of_any_kind):
+    """As 1e-6 at 1.0 pu and 0 at 1.2 pu in a public file; one that falls from more is a fault."""
+    definition = record_of_any_kind
+    if definition.kind != "machine":
+        return
+    values = typical(definition.model.sheet)
+    words = record_fields(definition, {**values, "S10": 1e-6, "S12": 0.0})
+    reading = read(definition, words)
+    assert (reading.faults, reading.unused[-1]) == ([], ("S10", 1e-6))
+    assert reading.values["S10"] == reading.values["S12"] == 0.0
+    falling = read(definition, record_fields(definition, {**values, "S10": 0.05, "S12": 0.01}))
+    assert any("0.01 at 1.2 pu is not above" in text for _, text in falling.faults)
+
+
 def test_pss4c_with_two_bus_numbers_and_without_its_last_limits_is_refused():
     """InterPSS has such a file: its 94 values are as many as the record's."""
     definition = RECORDS["PSS4C as PSS4C"]

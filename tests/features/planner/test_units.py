@@ -59,6 +59,12 @@ def test_a_machine_that_the_governor_of_another_drives_is_known_to_have_constant
     assert not any("drives" in each.text for each in read_units(governed, "f").units[1].warnings)
 
 
+def test_tgov1_may_stand_for_a_water_turbine():
+    """Its lead is then below 0, as in a public reduction of the western grid of America."""
+    (unit,) = read_units(at_bus(102) + "102 TGOV1 1 .05 .2 1 0 -1 15 0 /\n", "f").units
+    assert (unit.governor.values["T2"], unit.warnings) == (-1.0, ())
+
+
 @pytest.mark.parametrize("damaged", ["-14.5 /", ".4 /"])
 def test_a_record_without_an_end_leaves_the_other_units(damaged):
     whole = at_bus(103)
