@@ -189,24 +189,28 @@ def continued(
 
 
 def extended(
-    searches: "CaseSearches", found: SearchResult, more: Array, announce: Announce, phase: str
+    searches: "CaseSearches",
+    found: SearchResult,
+    point_of: Callable[[Array], Array],
+    announce: Announce,
+    phase: str,
 ) -> SearchResult:
-    """Return a search among more parameters, from the ends of one that held them at ``more`` (K,).
+    """Return a search among more or fewer parameters, from the ends of another.
 
-    Each minimum is descended from anew.
+    ``point_of`` gives its points of those of the other one. Each minimum is descended from anew.
     """
 
-    def wider(end: Result) -> Result:
-        return end._replace(x=np.append(end.x, more))
+    def own(end: Result) -> Result:
+        return end._replace(x=point_of(end.x))
 
-    history = [line._replace(x=np.append(line.x, more)) for line in found.history]
-    path, last = _refined(searches, history, wider(found.best), announce, phase)
+    history = [line._replace(x=point_of(line.x)) for line in found.history]
+    path, last = _refined(searches, history, own(found.best), announce, phase)
     if found.minima is None:
         return found._replace(best=last, own=last, history=path)
     minima = [
         local._replace(x=end.x, cost=end.cost, result=end)
         for k, local in enumerate(found.minima.minima)
-        for end in [last if k == found.place else searches.refined(wider(local.result), _unseen)]
+        for end in [last if k == found.place else searches.refined(own(local.result), _unseen)]
     ]
     minima.sort(key=lambda local: local.cost)
     place = next((k for k, local in enumerate(minima) if local.result is last), None)

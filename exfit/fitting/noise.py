@@ -12,6 +12,7 @@ from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.util.arrays import Array
 
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
+MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 WHITE_NOISE_SEED = 0
 INDEPENDENT = 2.0  # times the length over which filtered noise is correlated
 SEED = 0

@@ -282,6 +282,21 @@ def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None
     return Rounding(step * channel.weight, waves * channel.weight, variance)
 
 
+def free_values(residuals: Residuals, theta: Array) -> dict[str, float]:
+    """Return the values of the free parameters by name."""
+    values = residuals.values(theta)
+    return {free.name: values[free.name] for free in residuals.free}
+
+
+def variance_of(
+    residuals: Residuals, cost: float, uncertainty: UncertaintyAnalysis | None
+) -> float:
+    """Return the variance of the residuals at a minimum: no less than that of any recorder."""
+    freedom = max(1, residuals.count - len(residuals.free))
+    own = 2.0 * cost / freedom if uncertainty is None else uncertainty.confidence.variance
+    return max(own, LEAST_NOISE**2)
+
+
 def spread_of(residuals: Residuals, noises: Sequence[Noise]) -> Array:
     """Standard deviation (M,) of the weighted errors, widened where they are not white."""
     spreads = [

@@ -232,8 +232,8 @@ def _found(result: FitResult, name: str) -> tuple[str, str, str, str]:
     if parameter.noise_interval is not None:
         error = half_width(parameter)
     elif result.knowledge is not None and parameter.linear_error is not None:
-        confidence = result.knowledge.confidence.parameters[name]
-        error = error_of(confidence, parameter.of_record)
+        known = result.knowledge.confidence.parameters.get(name)  # of no value moved with all
+        error = "-" if known is None else error_of(known, parameter.of_record)
     limits = result.verdict.in_place_of_interval or interval(parameter.interval, parameter.rounded)
     return parameter.rounded(parameter.value), limits, error, parameter.unit
 
@@ -256,7 +256,7 @@ def remarks_on(parameter: FittedParameter) -> Iterator[str]:
     if not parameter.physical:
         yield "not physical"
     if parameter.moved is not None:
-        yield f"given, {parameter.moved:+.1f} errors"
+        yield f"{parameter.moved:+.1f} σ"
     if parameter.interval_note:
         yield parameter.interval_note
 

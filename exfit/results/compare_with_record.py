@@ -43,13 +43,13 @@ def compare_with_record(
     moves: Sequence[Values] | None = None,
     measured: Features | None = None,
     criteria: Criteria | None = None,
+    described: bool = True,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
     The setup has sub-steps enough for both; ``of_record`` is what was found about the record
-    itself. ``moves`` are what was found by the record: which values each moves, and how fast; by
-    default what was found about it. ``measured`` are the features of the record, where they have
-    been read already. The comparison is judged by ``criteria`` alone, if given.
+    itself, ``moves`` which values each thing found by the record moves, and how fast. ``measured``
+    are its features, if known; none are read unless ``described``. ``criteria`` alone judge it.
     """
     at = setup.with_start_values(values)
     samples, substeps = setup.experiment.samples(at)
@@ -69,7 +69,7 @@ def compare_with_record(
         cost=0.5 * float(errors @ errors),
         accepted=True,
         channels=channels,
-        features=step_of("vt", None) if stepped else StepFeatures(None, None),
+        features=step_of("vt", None) if stepped and described else StepFeatures(None, None),
         notes=setup.record.notes,
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,

@@ -1,6 +1,6 @@
 """Whether the parts of a result that is read fit together: lengths of samples, names."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -20,25 +20,32 @@ def contradictions(result: FitResult) -> Iterator[str]:
     for end in result.phase_ends:
         yield from _of_comparisons(f"phase_ends: {end.phase}", end.comparisons)
     yield from _of_both(result)
-    points = [line.values for line in result.history]
-    if result.minima is not None:
-        points += [minimum.values for minimum in result.minima.minima]
-    if any(values.keys() != result.parameters.keys() for values in points):
+    every = {*result.parameters, *result.refined}
+    if any(values.keys() != every for values in _points(result)):
         yield "history: its parameters are not those of the fit"
     given = {} if result.knowledge is None else result.knowledge.given_errors
     if any(not error.shifts.keys() <= result.parameters.keys() for error in given.values()):
         yield "knowledge: given_errors: what they move are not the parameters of the fit"
     if result.knowledge is not None:
         known = result.knowledge.confidence.parameters.keys()
-        if known != result.parameters.keys():
+        asked = {n for n, each in result.parameters.items() if each.given_error is None}
+        if not asked <= known <= result.parameters.keys():
             yield "knowledge: confidence: its parameters are not those of the fit"
         yield from (f"knowledge: {text}" for text in _of_knowledge(result.knowledge))
+
+
+def _points(result: FitResult) -> Iterator[Mapping[str, float]]:
+    yield from (line.values for line in result.history)
+    if result.minima is not None:
+        yield from (minimum.values for minimum in result.minima.minima)
 
 
 def _of_knowledge(knowledge: UncertaintyAnalysis) -> Iterator[str]:
     count = len(knowledge.confidence.names)
     if knowledge.confidence.correlation.matrix.shape != (count, count):
         yield "confidence.correlation: not one row and column for each parameter"
+    if len({(*effect.rms,) for effect in knowledge.effects}) > 1:
+        yield "sensitivities: rms: not of the same signals for each parameter"
     for channel in knowledge.sensitivity:
         if any(line.shape != channel.time.shape for line in channel.moved.values()):
             yield f"sensitivity: {channel.label}: {UNEVEN}"

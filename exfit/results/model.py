@@ -38,6 +38,7 @@ OF_PROGRAMME = "test"  # the label among the inputs of a fit that a programme ma
 
 
 NEAR = 2.0  # times a cost: below it another one is given to a thousandth
+KNOWN = 0.5  # of the standard error that a value was given with: the records know it better
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
 
 
@@ -108,6 +109,14 @@ class FittedParameter:
     def moved(self) -> float | None:
         """By how many of its standard errors a given value has moved; None of any other."""
         return None if self.given_error is None else (self.value - self.start) / self.given_error
+
+    @property
+    def as_given(self) -> bool:
+        """Whether the records say little more of a given value than its standard error does."""
+        if self.moved is None or self.given_error is None:
+            return False
+        is_known = self.std_error is not None and self.std_error <= KNOWN * self.given_error
+        return abs(self.moved) < 1.0 and not is_known
 
     @property
     def stderr(self) -> float | None:
@@ -254,7 +263,8 @@ class FitResult:
     and intervals of the parameters, None where these are not known; ``about`` identifies unit
     and test. ``inputs`` is the SHA-256 of every file by its label,
     ``files`` its name. ``given_values`` are those in place of the case's, ``freed`` those of its
-    given values that were fitted, too. ``as_found`` is the model before the test, ``criteria`` are
+    given values that were fitted, too, ``refined`` those that lie elsewhere within their errors, as
+    they were given. ``as_found`` is the model before the test, ``criteria`` are
     those by which a report judges; ``other_program`` is what simulated the records where exfit did
     not; ``windows`` is T'd0 over windows of its records, None unless it is fitted to several steps
     by playback.
@@ -308,6 +318,7 @@ class FitResult:
     units: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     unit_models: Mapping[str, str] = field(default_factory=dict)
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
+    refined: Mapping[str, float] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
@@ -377,7 +388,8 @@ class FitResult:
 
         The others, of machine, network, stabiliser and governor, are as the case has them.
         """
-        own = {**self.parameters, **self.values_of("")}.keys() - self.of_records.keys()
+        taken = {**self.parameters, **self.refined, **self.values_of("")}
+        own = taken.keys() - self.of_records.keys()
         return {name: value for name, value in self.values.items() if name in own}
 
     @property

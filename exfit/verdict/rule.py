@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,17 +78,22 @@ def verdict_of(evidence: Evidence) -> Verdict:
 
 def _either(evidence: Evidence) -> Iterator[Cause]:
     """Name given values that were fitted where others explain the record as well."""
-    for refined in evidence.refined:
-        if refined.others:
-            others, more = refined.others[:MOST_OTHERS], len(refined.others) - MOST_OTHERS
-            listing = ", or ".join([*others, *([f"{more} more"] if more > 0 else [])])
-            words = f"not as given: {listed([*refined.names])}, now fitted, or as likely {listing}"
+    refined = evidence.refined
+    found = [(listed(step.names), (*step.others, *step.rivals)) for step in refined.steps]
+    if refined.given:
+        rivals = dict.fromkeys(chain.from_iterable(step.rivals for step in refined.steps))
+        found = [("values of the case", (*rivals,))]
+    for names, others in found:
+        if others:
+            more = len(others) - MOST_OTHERS
+            listing = ", or ".join([*others[:MOST_OTHERS], *([f"{more} more"] if more > 0 else [])])
+            words = f"not as given: {names}, now fitted, or as likely {listing}"
             yield Cause(words, "measure what you can: the record does not tell which")
 
 
 def _refuted(evidence: Evidence) -> "Sequence[Refuted]":
     """List the given values that the record contradicts; most fits need not load the test."""
-    if all(free.prior is None for free in evidence.residuals.free):
+    if not evidence.refined.steps:
         return ()
     from exfit.verdict.score_tests import refuted
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from math import erfc, exp, hypot, log, sqrt
+from math import erfc, exp, hypot, inf, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from exfit.plants import REFERENCES, SPEED, VT0
 from exfit.registry import parts
 from exfit.results.cause import Cause, Remedy
 from exfit.results.intervals.averages import averaged_residuals, unstated
-from exfit.results.intervals.value_errors import influence_of_values
+from exfit.results.intervals.value_errors import Refinement, influence_of_values
 from exfit.results.verdict import REJECTED
 from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
@@ -149,13 +149,14 @@ class Refuted(NamedTuple):
 
 def refuted(evidence: Evidence) -> Iterator[Refuted]:
     """Yield the given values that the fit moved by more than their errors allow."""
-    asked = evidence.case.free()
-    for free in evidence.residuals.free:
-        if free.prior is not None and free.name not in asked:
-            value = evidence.values[free.name]
-            moved = (value - free.prior.mean) / free.prior.std
-            if _is_significant(moved**2, 1):
-                yield Refuted(free.name, free.prior.mean, value, moved, evidence.case)
+    std_errors, asked = given_std_errors(evidence.case), evidence.case.free()
+    alone = [free for free in evidence.residuals.free if free.name not in asked]
+    given = {free.name: free.prior.mean for free in alone if free.prior}
+    for name, value in {**given, **evidence.refined.given}.items():
+        found = evidence.values[name]
+        moved = (found - value) / std_errors[name]
+        if _is_significant(moved**2, max(len(evidence.refined.given), 1)):
+            yield Refuted(name, value, found, moved, evidence.case)
 
 
 def contradictions(evidence: Evidence) -> list[Contradiction]:
@@ -178,14 +179,7 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
     return sorted(rejected, key=lambda each: -each.likelihood)
 
 
-class Refinement(NamedTuple):
-    """Given values that the record knows better; what explains it as well, in words."""
-
-    names: tuple[str, ...]
-    others: tuple[str, ...] = ()
-
-
-def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
+def value_that_the_record_refines(evidence: Evidence) -> Refinement:
     """Return the given value whose fit with its standard error would explain most, if any.
 
     It is tested against what it would leave of the errors, which may be far from white before.
@@ -194,7 +188,7 @@ def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
     try:
         linear, directions, shift = _linearised(evidence)
     except SimulationError:
-        return None
+        return Refinement(by_rival=inf)
     tested = [*directions]
     residuals = evidence.residuals
 
@@ -204,28 +198,34 @@ def value_that_the_record_refines(evidence: Evidence) -> Refinement | None:
 
     scores = scored(spread_of_errors(residuals, linear.beyond(linear.errors), white=True))
     scores.sort(key=lambda each: -each[0].gain)
-    rivals = list[tuple[Contradiction, Array]]()
+    rivals, value = list[tuple[Contradiction, Array]](), None
     for best, direction in scores:
         left = spread_of_errors(residuals, linear.beyond(linear.errors + best.change * direction))
         best = _score(best.held, direction, linear, left, shift) or best
         if best.held.names and _is_significant(best.gain, len(scores)):
+            value = best
             break
         if not best.held.names:
             rivals.append((best, direction))
-    else:
-        return None
-    beyond = _beyond_values(evidence, linear, rivals)
-    if any(_is_significant(gain, len(scores)) for gain in beyond):
-        return None
+    beyond = () if value is None else _beyond_values(evidence, linear, rivals)
+    if value is None or any(_is_significant(gain, len(scores)) for gain in beyond):
+        return Refinement(by_rival=max((rival.gain for rival, _ in rivals), default=0.0))
     tested += _of_speed(evidence)
-    alike = sorted((each for each, _ in scored(left)), key=lambda each: -each.explains)
-    others = [
-        listed([*each.held.names]) or each.held.words
-        for each in alike
-        if each.explains > best.gain - ALIKE and each.held.names != best.held.names
-    ]
-    others += _averages(evidence, linear, left, best.gain)
-    return Refinement(best.held.names, tuple(others))
+    alike = [each for each, _ in scored(left) if each.explains > value.gain - ALIKE]
+    rest = [*_averages(evidence, linear, left, value.gain)]
+    return _refinement(value.held.names, sorted(alike, key=lambda each: -each.explains), rest)
+
+
+def _refinement(
+    names: tuple[str, ...], alike: Sequence[Contradiction], rest: Sequence[str]
+) -> Refinement:
+    """Return the refinement of a value beside what explains the record ``alike``."""
+    held = [each.held for each in alike if each.held.names != names]
+    return Refinement(
+        names,
+        others=tuple(listed(each.names) for each in held if each.names),
+        rivals=(*(each.words for each in held if not each.names), *rest),
+    )
 
 
 def _beyond_values(
@@ -344,13 +344,15 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Arr
         for held, each in zip(of_test, slopes[:, count:].T, strict=True)
         if np.isfinite(each).all()
     ]
+    place = {free.name: k for k, free in enumerate(extended.free)}
     from_record = [direction for held, direction in directions if not held.words]
+    if refined := [*evidence.refined.given]:  # as likely as the free parameters to be elsewhere
+        from_record += [*extended.errors(theta, [place[name] for name in refined])[1].T]
     known = np.column_stack([slopes[:, :count][:, moving(evidence)], *from_record])
     influence, _ = evidence.residuals.influence(errors)
 
     def tested() -> Iterator[tuple[Held, Array]]:
         yield from (each for each in directions if each[0].words)
-        place = {free.name: k for k, free in enumerate(extended.free)}
         for several in _at_once(_together([*fixed]), MOST_NUMBERS_AT_ONCE // len(errors)):
             names = [name for each in several for name in each]
             _, own = extended.errors(theta, [place[name] for name in names])
@@ -391,7 +393,8 @@ def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, flo
         if value and name in rows and name in used
     }
     freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
-    return with_freed(extended, freed), of_test, fixed
+    tested = {name: value for name, value in fixed.items() if name not in evidence.refined.given}
+    return with_freed(extended, freed), of_test, tested
 
 
 def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:

@@ -1,6 +1,6 @@
 """A case in words and tables, as its report shows it: its models, its tests, its files."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from exfit.case.case import Case
 from exfit.case.schema import (
@@ -120,10 +120,12 @@ def text_of(case: Case) -> str:
     return on_disk(case.path).read_text(encoding="utf-8-sig") if case.from_file else ""
 
 
-def fixed_values(case: Case, values: Mapping[str, float]) -> dict[str, float]:
-    """Return the values of the exciter, and of helpers of ties, that are not free."""
+def fixed_values(
+    case: Case, values: Mapping[str, float], fitted: Collection[str] = ()
+) -> dict[str, float]:
+    """Return the values of the exciter, and of helpers of ties, that are not free or fitted."""
     others = tuple(part.prefix for part in case.parts.all if part.prefix)
-    free = case.free()
+    free = {*case.free(), *fitted}
     return {
         name: values[name]
         for name in case.values()

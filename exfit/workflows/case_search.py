@@ -24,7 +24,7 @@ from exfit.fitting.compression import compressed, is_as_all
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.global_search import Judge, SearchResult
 from exfit.fitting.memory import check_memory
-from exfit.fitting.noise import LEAST_NOISE, noise_of
+from exfit.fitting.noise import LEAST_NOISE, MISFIT, noise_of
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of, with_setups
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
@@ -54,7 +54,6 @@ from exfit.workflows.search_state import SearchState, Stage, ignore, in_turn
 
 Values = Mapping[str, float]
 
-MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
 
 
@@ -156,7 +155,7 @@ def judge_of(
     def fitted(end: estimate.Result) -> tuple[Values, list[Comparison]]:
         values = residuals.values(end.x)
         fine = (setup.with_enough_substeps(values) for setup in setups)
-        return values, [compare_with_record(setup, values) for setup in fine]
+        return values, [compare_with_record(setup, values, described=False) for setup in fine]
 
     def refusals(values: Values, matches: Sequence[Comparison]) -> Iterator[str]:
         for setup in unseen:

@@ -1,44 +1,45 @@
 """A fit from its case to its result: what `exfit.fit` and the command do."""
 
 import time as clock
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 from exfit import estimate
 from exfit.case.case import Case
+from exfit.case.given_errors import given_std_errors
 from exfit.case.parts import MEANINGS
 from exfit.case.schema import SINGLE, Estimate
 from exfit.fitting.build import build_unseen
 from exfit.fitting.channel_weights import weight_notes
 from exfit.fitting.experiment import ExperimentSetup
-from exfit.fitting.parameters import scaled_values
+from exfit.fitting.parameters import LARGEST_FACTOR, freed_within, scaled_values
 from exfit.fitting.program import Program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records
-from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.inference.confidence import Uncertainty
+from exfit.fitting.uncertainty import UncertaintyAnalysis, free_values
+from exfit.inference.confidence import NORMAL, Uncertainty
 from exfit.plants import FURTHER, GOVERNOR
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import AsFound, Comparison, PhaseEnd
 from exfit.results.description import Behaviour, values_of_part, versions
-from exfit.results.influences import RecorderAverages, WindowSpread
+from exfit.results.influences import RecorderAverages, WindowSpread, first_of
 from exfit.results.intervals.averages import (
     allowing_for_averages,
     holding,
     recorder_averages,
 )
-from exfit.results.intervals.minima import minima_notes, minima_of
 from exfit.results.intervals.value_errors import (
+    ErrorsOfValues,
     allowing_for,
     allowing_for_bias,
     errors_of_values,
     given_error_notes,
 )
-from exfit.results.model import FitResult, FittedParameter, Iteration
+from exfit.results.model import FitResult, FittedParameter, Iteration, Minima
 from exfit.results.verdict import Verdict
-from exfit.util.vocabulary import Criteria
+from exfit.util.vocabulary import REFINING_VALUES, Criteria
 from exfit.verdict.causes import Evidence, FittedRecord, Pace
 from exfit.verdict.causes.evidence import time_for_causes
 from exfit.verdict.diagnostics import notes, outlier_notes, reference_notes, tolerance_notes
@@ -103,13 +104,13 @@ def fit_result(
     state = in_turn(STAGES, SearchState(*began_with, announce, search_progress))
     problem, found, best = state.problem, state.found, state.found.best
     residuals, values = problem.residuals, problem.residuals.values(best.x)
-    history = [_iteration(line, residuals) for line in found.history]
+    given = state.refined.given
     fine = [setup.with_enough_substeps(values) for setup in state.fitted]
-    comparisons = _comparisons(fine, residuals, values, history, case.criteria)
+    history = [*_iterations(found.history, residuals, given)]
+    comparisons = _comparisons(fine, residuals, values, history, case.criteria, given)
     analysis = _analysed(state, values, fine, comparisons, history)
     uncertainty = analysis.uncertainty
-    walked = problem.compressed if program is None else None
-    minima = minima_of(residuals, found, uncertainty, walked)
+    minima = _minima(state, values, uncertainty)
     interrupted = analysis.interrupted or found.interrupted
     pace = Pace(time_for_causes(options.causes, timer() - search_began), search_progress, timer)
     tests = zip(case.recordings, fine, comparisons, strict=True)
@@ -127,11 +128,14 @@ def fit_result(
     )
     verdict = verdict_of(evidence)
     uncertainty = analysis.uncertainty = _holding_causes(uncertainty, residuals, values, verdict)
-    noted = [*minima_notes(residuals, found, minima, uncertainty)]
+    noted = _minima_notes(state, minima, uncertainty)
     if uncertainty is not None and verdict.no_interval:
         uncertainty = analysis.uncertainty = uncertainty.without_intervals(verdict.no_interval)
     own_values, models, limiters = _of_parts(case, values)
     parameters = _parameters(case, residuals, values, uncertainty, analysis.why)
+    of_given = dict(_refined(case, given, values, analysis.errors, verdict.no_interval))
+    refined = _within_errors(of_given)
+    parameters |= {name: of_given[name] for name in given if name not in refined}
     identified = identified_values(parameters, analysis.validation)
     simulated = [*state.fitted, *state.unseen]
     return FitResult(
@@ -142,7 +146,7 @@ def fit_result(
         saturation=case.saturation,
         parameters=parameters,
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
-        fixed=fixed_values(case, values),
+        fixed=fixed_values(case, values, parameters),
         machine=own_values.get("machine", {}),
         machine_model=models.get("machine"),
         network=own_values.get("network", {}),
@@ -175,6 +179,7 @@ def fit_result(
             *state.line_notes,
             *noted,
             *_notes(state, comparisons, analysis),
+            *_refined_notes(refined),
             *filter(None, [pace.sentence]),
         ),
         validation=tuple(analysis.validation),
@@ -183,8 +188,9 @@ def fit_result(
         verdict=verdict,
         freed=case.freed,
         given_values=given_values(case),
+        refined=refined,
         windows=analysis.windows,
-        sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
+        sources=case.sources(fitted=parameters),
         strategy_given=method != case.estimate.strategy,
         search_given=options.search * (options is not case.estimate),
         parts=tuple(parts_of(case)),
@@ -196,6 +202,28 @@ def fit_result(
         criteria=case.criteria,
         other_program=other_program_of(case, program, simulated),
     )
+
+
+def _minima(
+    state: SearchState, values: Values, uncertainty: UncertaintyAnalysis | None
+) -> Minima | None:
+    if state.found.minima is None:
+        return None
+    from exfit.results.intervals.minima import minima_of
+
+    walked = state.problem.compressed if state.program is None else None
+    refined = {name: values[name] for name in state.refined.given}
+    return minima_of(state.problem.residuals, state.found, uncertainty, walked, refined)
+
+
+def _minima_notes(
+    state: SearchState, minima: Minima | None, uncertainty: UncertaintyAnalysis | None
+) -> Sequence[str]:
+    if state.found.minima is None:
+        return ()
+    from exfit.results.intervals.minima import minima_notes
+
+    return (*minima_notes(state.problem.residuals, state.found, minima, uncertainty),)
 
 
 def _holding_causes(
@@ -226,6 +254,7 @@ class Analysis:
     as_found: AsFound | None = None
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
+    errors: ErrorsOfValues | None = None
 
     @property
     def why(self) -> str:
@@ -244,7 +273,7 @@ def _announce(
         response = live_response(state.setups[0], residuals, line.x)
         if response is not None:
             live(response)
-    progress(_iteration(line, residuals))
+    progress(_iteration(line, free_values(residuals, line.x)))
 
 
 def _unseen(
@@ -260,9 +289,10 @@ def _comparisons(
     values: Values,
     history: Sequence[Iteration],
     criteria: Criteria,
+    given: Values,
 ) -> tuple[Comparison, ...]:
     """Return the fitted response beside each record, with the iterations that led to it."""
-    start = residuals.values(residuals.start)
+    start = residuals.completed({**residuals.values(residuals.start), **given})
     moves = residuals.moves(scaled_values(residuals.free, values))
     return tuple(
         with_iteration_responses(
@@ -317,7 +347,8 @@ def _analysed(
             at = problem, best.x, names_of_records(fine)
             uncertainty = allowing_for_bias(uncertainty, *at)
             noises = uncertainty.confidence.noise
-            errors = errors_of_values(case, problem, best.x, noises, fine)
+            errors = errors_of_values(case, problem, best.x, noises, fine, state.refined.given)
+            analysis.errors = errors
             if case.kind.plays_back and not case.kind.has_exciter:
                 from exfit.results.intervals.windows import spread_over_windows, with_spread
 
@@ -371,12 +402,64 @@ def _parameters(
     return fitted
 
 
-def _iteration(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
+def _refined(
+    case: Case, given: Values, values: Values, errors: ErrorsOfValues | None, why: str
+) -> Iterator[tuple[str, FittedParameter]]:
+    """Yield the given values that were moved, with what the records leave of their errors.
+
+    ``why`` they have no interval, if none of the fit has one.
+    """
+    rows, std_errors = case.rows(), given_std_errors(case)
+    for name, start in given.items():
+        free = freed_within(name, start, LARGEST_FACTOR)
+        left = None if why or errors is None else errors.left.get(name)
+        own = dict[str, Any](why=why or "the search was interrupted")
+        if left is not None:
+            low, high = values[name] - NORMAL * left, values[name] + NORMAL * left
+            within = max(low, free.low), min(high, free.high)
+            own = {"std_error": left, "interval": within, "interval_method": "linear"}
+        yield (
+            name,
+            FittedParameter(
+                value=values[name],
+                start=start,
+                min=free.low,
+                max=free.high,
+                at_bound=free.bound(values[name]),
+                unit=rows[name].unit,
+                meaning=rows[name].meaning,
+                physical=rows[name].is_physical(values[name]),
+                given_error=std_errors[name],
+                **own,
+            ),
+        )
+
+
+def _within_errors(of_given: Mapping[str, FittedParameter]) -> dict[str, float]:
+    """Return given values that were moved no farther than their errors, and are not listed."""
+    return {name: each.start for name, each in of_given.items() if each.as_given}
+
+
+def _refined_notes(refined: Values) -> Iterator[str]:
+    if refined:
+        yield f"moved within their errors, as is likeliest: {first_of([*refined])}"
+
+
+def _iterations(
+    lines: Iterable[estimate.SolverIteration], residuals: Residuals, given: Values
+) -> Iterator[Iteration]:
+    """Yield the lines of the log with values; given ones are as ``given`` until they are moved."""
+    at = given
+    for line in lines:
+        if line.phase == REFINING_VALUES:
+            at = {name: residuals.fixed[name] for name in given}
+        yield _iteration(line, {**free_values(residuals, line.x), **at})
+
+
+def _iteration(line: estimate.SolverIteration, values: Values) -> Iteration:
     """Return a line of the log with the parameters' own values for the scaled ones."""
-    values = residuals.values(line.x)
     figures = {name: value for name, value in line._asdict().items() if name != "x"}
-    free = {parameter.name: values[parameter.name] for parameter in residuals.free}
-    return Iteration(**figures, values=free)
+    return Iteration(**figures, values=values)
 
 
 def _notes(

@@ -1,45 +1,94 @@
 """Given values that the records refine: they are fitted, with their standard errors as priors."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from exfit.case.given_errors import given_std_errors
+from exfit.estimate import half_square
 from exfit.fitting.channel_weights import balanced, residual_deviations
 from exfit.fitting.compression import compressed
 from exfit.fitting.global_search import extended
-from exfit.fitting.parameters import LARGEST_FACTOR, FreeParameter, freed_within
+from exfit.fitting.noise import MISFIT, noise_of
+from exfit.fitting.parameters import LARGEST_FACTOR, freed_within
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import with_freed
 from exfit.fitting.search import CaseSearches
+from exfit.fitting.system import parameters_of
 from exfit.results.compare_with_record import compare_with_record
+from exfit.results.intervals.value_errors import RefinedValues, Refinement
+from exfit.util.arrays import Array
 from exfit.util.vocabulary import REFINING_VALUES
 from exfit.verdict.causes import Evidence, FittedRecord
 from exfit.verdict.score_tests import value_that_the_record_refines
+from exfit.workflows.case_search import driving_noise
 from exfit.workflows.search_state import SearchState, ignore
 
+Values = Mapping[str, float]
+
+NEGLIGIBLE = 1e-2  # of its error: a value that moves less stays as it was given
 MOST_VALUES = 8  # each the one that explains most of what is left
+MOST_OF_EVENT = 2  # an event shows so many values that all are off where it asks for more
 
 
 def with_refined_values(state: SearchState) -> SearchState:
     """Fit those given values, too, of which the records say more than that they are as given.
 
     One after the other, each with its standard error: the one that would explain most of the
-    residuals beyond their noise. None where a test or a record would explain more.
+    residuals beyond their noise. Where an event asks for more than a few, or is missed, all at
+    once, if that explains it, and better than what a test or a record holds: these stay where they
+    then are most likely.
     """
-    std_errors = given_std_errors(state.case)
-    for _ in range(MOST_VALUES):
-        refined = None if state.interrupted else value_that_the_record_refines(_evidence(state))
-        if refined is None:
-            break
-        fixed = state.problem.residuals.fixed
-        added = [
-            freed_within(name, fixed[name], LARGEST_FACTOR, std_errors[name])
-            for name in refined.names
-            if name in std_errors
-        ]
-        state = _with_freed(replace(state, refined=(*state.refined, refined)), added)
-    return state
+    event, given = state.case.kind.finds_rest, _given(state)
+    steps = list[Refinement]()
+    found = value_that_the_record_refines(_evidence(state))
+    most = MOST_OF_EVENT if event else MOST_VALUES
+    while found.names and len(steps) < most and not state.interrupted:
+        steps.append(found)
+        state = _with_freed(state, {name: given[name] for name in found.names if name in given})
+        found = value_that_the_record_refines(_evidence(state))
+    if event and (found.names or _misses(state)):
+        together = _together(state, _given(state), found.by_rival)
+        if together is not None:
+            before = state.found
+            whole = together.found._replace(minima=before.minima, place=before.place)
+            together = replace(together, searched=whole)
+            return _held(together, RefinedValues(given, (*steps, found)))
+    return replace(state, refined=RefinedValues(steps=(*steps,)))
+
+
+def _given(state: SearchState) -> dict[str, float]:
+    """Return the given values that have a standard error and do something, but for fitted ones."""
+    fixed, used = state.problem.residuals.fixed, parameters_of(state.case)
+    names = [name for name in given_std_errors(state.case) if name in used]
+    return {name: fixed[name] for name in names if fixed.get(name)}
+
+
+def _together(state: SearchState, values: Values, by_rival: float) -> SearchState | None:
+    """Fit values at once; None where that leaves a misfit, or explains no more than a rival."""
+    if state.interrupted:
+        return None
+    best_alone = replace(state, searched=state.found._replace(minima=None))
+    after = _with_freed(best_alone, values)
+    if after.interrupted or _misses(after):
+        return None
+    residuals, x = after.problem.residuals, state.found.best.x
+    as_given = [free.scaled(values[free.name]) for free in residuals.free[len(x) :]]
+    cost = half_square(residuals(np.append(x, as_given)))
+    fall = residuals.count * (cost / after.found.best.cost - 1.0)  # of chi-square
+    return after if fall > by_rival else None
+
+
+def _misses(state: SearchState) -> bool:
+    """Test whether the errors of a signal are far above the noise of its record."""
+    evidence = _evidence(state)
+    if evidence.weighted_by_noise:
+        return evidence.cost > MISFIT**2 * evidence.noise_cost
+    return any(
+        record.comparison.overlays[channel.signal].rmse > MISFIT * noise_of(channel)
+        for _, record, _, channel in evidence.channels
+    )
 
 
 def _evidence(state: SearchState) -> Evidence:
@@ -47,14 +96,19 @@ def _evidence(state: SearchState) -> Evidence:
     values = residuals.values(best.x)
     tests = zip(state.case.recordings, state.fitted, strict=True)
     records = tuple(
-        FittedRecord(each.test, setup, compare_with_record(setup, values)) for each, setup in tests
+        FittedRecord(each.test, setup, compare_with_record(setup, values, described=False))
+        for each, setup in tests
     )
     return Evidence(state.case, residuals, best, records, uncertainty=None)
 
 
-def _with_freed(state: SearchState, added: list[FreeParameter]) -> SearchState:
-    """Search on with more parameters, from where the search has come to."""
-    counter = state.problem.residuals.counter
+def _with_freed(state: SearchState, values: Values) -> SearchState:
+    """Search on with values as parameters, from where the search has come to."""
+    counter, std_errors = state.problem.residuals.counter, given_std_errors(state.case)
+    added = [
+        freed_within(name, value, LARGEST_FACTOR, std_errors[name])
+        for name, value in values.items()
+    ]
     residuals = with_freed(state.problem.residuals, added).counted_by(counter)
     more = np.array([free.scaled(free.start) for free in added])
     point = np.append(state.found.best.x, more)
@@ -63,8 +117,33 @@ def _with_freed(state: SearchState, added: list[FreeParameter]) -> SearchState:
     if state.options.weights == "balanced" and not by_noise:  # until now by what a value explains
         deviations = residual_deviations(problem.compressed, point)
         problem = balanced(problem, point, counter, deviations)
+    wider = _searched(state, problem, lambda x: np.append(x, more))
+    return driving_noise(wider)  # whose bias is that of all parameters
+
+
+def _held(state: SearchState, refined: RefinedValues) -> SearchState:
+    """Hold the given values where they are most likely: what follows is of the other parameters."""
+    residuals, x, given = state.problem.residuals, state.found.best.x, refined.given
+    values, std_errors = residuals.values(x), given_std_errors(state.case)
+    moved = {
+        name: value
+        for name, value in given.items()
+        if abs(values[name] - value) > NEGLIGIBLE * std_errors[name]
+    }
+    own = [free for free in residuals.free if free.name not in given]
+    fixed = {**residuals.fixed, **given, **{name: values[name] for name in moved}}
+    held = replace(residuals, free=own, fixed=fixed)
+    problem = FitProblem(held, compressed(held, x[: len(own)]))
+    state = replace(state, refined=refined._replace(given=moved))
+    return _searched(state, problem, lambda x: x[: len(own)])
+
+
+def _searched(
+    state: SearchState,
+    problem: FitProblem,
+    point_of: Callable[[Array], Array],
+) -> SearchState:
+    state = replace(state, problem=problem)
     searches = CaseSearches(problem, state.options, ignore, state.counter)
-    searched = extended(
-        searches, state.found, more, replace(state, problem=problem).on_line, REFINING_VALUES
-    )
-    return replace(state, problem=problem, searched=searched)
+    own = point_of, state.on_line, REFINING_VALUES
+    return replace(state, searched=extended(searches, state.found, *own))

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -17,11 +16,9 @@ from exfit.fitting.program import Program
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import CaseSearches
 from exfit.results.intervals.determination import Determination
+from exfit.results.intervals.value_errors import NONE_REFINED, RefinedValues
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS
-
-if TYPE_CHECKING:
-    from exfit.verdict.score_tests import Refinement
 
 UNKNOWN = Determination(None)
 
@@ -54,7 +51,7 @@ class SearchState:
     searched: SearchResult | None = None
     determined: Determination = UNKNOWN
     line_notes: tuple[str, ...] = ()
-    refined: "tuple[Refinement, ...]" = ()
+    refined: RefinedValues = NONE_REFINED
 
     @property
     def found(self) -> SearchResult:

@@ -225,6 +225,7 @@ def _somewhere(content, draw):
         (("history", 1, "values"), "history: its parameters are not those of the fit"),
         (("knowledge", "sensitivity", 0, "time"), "sensitivity: vt: not one sample"),
         (("knowledge", "confidence", "correlation", "names"), "not one row and column for each"),
+        (("knowledge", "sensitivities", 0, "rms"), "rms: not of the same signals"),
         (("behaviour", "small_signal", 0, "view", "closed", "frequency"), "not one response for"),
     ],
 )

@@ -64,8 +64,9 @@ UNSEEN = 1e-9  # of the largest singular value: rounding
 REFUTED = 4.0  # times the least cost: such a minimum stays rejected with any weights
 NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
 TURN = 2.0 * np.pi  # rad
+NOISE, BIAS = "the noise of the driving signals", "the bias by that noise"
 NOT_WEIGHTED = (
-    "the noise of the driving signals biases the parameters, and the intervals do not include all "
+    f"{NOISE} biases the parameters, and the intervals do not include all "
     "of it: it cannot be weighted"
 )
 
@@ -373,7 +374,8 @@ def weighted_search(
         return problem, found._replace(best=stopped(found.best, Stop.INTERRUPTED))
     weighted = FitProblem(unbiased, unbiased)
     found = proceed(weighted, found, theta)
-    return weighted, found._replace(notes=(*found.notes, *notes))
+    others = [note for note in found.notes if not note.startswith((NOISE, BIAS))]  # weighted anew
+    return weighted, found._replace(notes=(*others, *notes))
 
 
 def _far(there: Array, here: Array) -> bool:
@@ -515,10 +517,10 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
         name = f" of {experiment.name}" if len(residuals.experiments) > 1 else ""
         levels = listed(_levels(experiment.with_inputs(values)))
         yield (
-            f"the noise of the driving signals{name}, {levels}, is in the errors of all compared "
+            f"{NOISE}{name}, {levels}, is in the errors of all compared "
             "signals: these are weighted by its covariance, and the intervals include it"
         )
-    yield f"the bias by that noise is removed: it was at most {share}{large}"
+    yield f"{BIAS} is removed: it was at most {share}{large}"
 
 
 def _levels(simulator: Simulator) -> list[str]:

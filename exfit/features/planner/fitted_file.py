@@ -270,7 +270,7 @@ def _edits(
     """Yield the fields of a record that change; raises ExfitError where values cannot be written.
 
     Typical values are not of the unit: their fields stay, and what no field holds is not missed. So
-    do those that are ``kept``.
+    do those that are ``kept``, or that the records know little better than the file.
     """
     definition, values = part.definition, values_in_digits(result, prefix)
     _refuse_lost(result, part, prefix, values)
@@ -306,6 +306,7 @@ def _changed(
         symbol
         for symbol in definition.symbols
         if symbol not in kept
+        and prefix + symbol not in result.refined
         and result.sources.get(prefix + symbol) != TYPICAL
         and not isclose(values[symbol], part.values[symbol], rel_tol=SAME)
     }

@@ -253,23 +253,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         *_unmodelled(definition, given),
         *_unusual(definition.model, values),
         *_without_effect(definition, of_sheet, unused, given.get(RATING, 0.0)),
-        *(
-            (name, f"{show(given[name])} is no limit; {show(endless[name])} is taken")
-            for name in endless
-        ),
-        *(
-            (
-                row.symbol,
-                f"0 has no effect, since {row.search and row.search.needs} is 0; the typical value "
-                f"{show(row.typical)} is taken",
-            )
-            for row in idle
-        ),
-        *(
-            (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
-            for row in rows
-            if row.symbol in definition.absent
-        ),
+        *_replaced(definition, given, endless, idle),
     ]
     codes = [(given.get(name, icons[name]), icons[name]) for name in definition.codes]
     signals = definition.signals
@@ -289,6 +273,25 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         times_speed,
         tuple(unused.items()),
     )
+
+
+def _replaced(
+    definition: Definition,
+    given: Mapping[str, float],
+    endless: Mapping[str, float],
+    idle: Iterable[Parameter],
+) -> Texts:
+    """Yield (symbol, remark) for each value that another one takes the place of."""
+    for name, limit in endless.items():
+        yield name, f"{show(given[name])} is no limit; {show(limit)} is taken"
+    for row in idle:
+        needs, typical = row.search and row.search.needs, show(row.typical)
+        why = f"0 has no effect, since {needs} is 0"
+        yield row.symbol, f"{why}; the typical value {typical} is taken"
+    for row in definition.model.sheet:
+        if row.symbol in definition.absent:
+            why = "not in the record"
+            yield row.symbol, f"{why}; the typical value {show(row.typical)} is taken"
 
 
 def _numbers(

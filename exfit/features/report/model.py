@@ -177,11 +177,12 @@ def _given_values(result: FitResult) -> Iterator[Block]:
     own = {name: each for name, each in result.parameters.items() if each.std_error}
     rows = []
     for name, error in given.items():
-        shares = {n: abs(error.shifts[n]) / (each.std_error or inf) for n, each in own.items()}
+        shifts = error.shifts
+        shares = {n: abs(shifts[n]) / (own[n].std_error or inf) for n in own if n in shifts}
         most = max(shares, key=lambda n: shares[n], default=None)
         if most is None:
             continue
-        moved = f"{most} by {number(error.shifts[most], 2)} {own[most].unit}".rstrip()
+        moved = f"{most} by {number(shifts[most], 2)} {own[most].unit}".rstrip()
         source = result.sources.get(name, "the record at rest")
         mark: Mark = "doubt" if source in UNSTATED else ""
         rows.append((Cell(name, mark), Cell(number(error.std_error, 2)), Cell(source), Cell(moved)))
@@ -197,6 +198,8 @@ def _not_fitted(result: Reported) -> Iterator[tuple[str, Iterable[Row]]]:
 
     def given(name: str, symbol: str, value: float, sheet: SheetRow) -> Row:
         source = result.source_of(name)
+        if isinstance(result, FitResult) and name in result.refined:
+            source = f"{source}: {number(result.refined[name], 6)}, moved within its error"
         return row(symbol, number(value, 6), sheet.unit, source, sheet.meaning)
 
     for part in result.parts:

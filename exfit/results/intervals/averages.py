@@ -22,10 +22,9 @@ from exfit.fitting.descents import descent_near
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.fitting.uncertainty import UncertaintyAnalysis, free_values, variance_of
 from exfit.inference.confidence import Interval, IntervalMethod
 from exfit.results.influences import STRONG, RecorderAverages
-from exfit.results.intervals.minima import own_values, variance_of
 from exfit.util.arrays import Array, median_step
 
 USUAL = (0.02, 0.05, 0.1, 0.2, 0.5)  # s: windows of recorders, beside the time between samples
@@ -54,7 +53,7 @@ def recorder_averages(
         variance = variance_of(residuals, cost, uncertainty)
         for window, averaged in _likeliest(residuals, theta, numbers, errors, slopes, variance):
             end, without = descent_near(averaged, theta), residuals(theta)
-            values = own_values(averaged, end.x)
+            values = free_values(averaged, end.x)
             beyond = [
                 name
                 for name, own in uncertainty.confidence.parameters.items()
@@ -64,7 +63,7 @@ def recorder_averages(
                 RecorderAverages(
                     window=window,
                     chi_square=2.0 * (0.5 * float(without @ without) - end.cost) / variance,
-                    given=own_values(residuals, theta),
+                    given=free_values(residuals, theta),
                     values=values,
                     beyond=tuple(beyond),
                     changes=_changes(case, residuals, numbers, window),

@@ -5,6 +5,7 @@ likely, or where the record asks for more of the values at once than chance does
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from math import inf, isfinite, sqrt
 
@@ -54,19 +55,24 @@ def sides_with_values(
     std_errors: Mapping[str, float],
     spread: Array,
     starts: Sequence[Mapping[str, float]],
-) -> Array:
+    given: Mapping[str, float],
+) -> Array | None:
     """Return how far down and up (N, 2) from theta (N,) each parameter may lie at 95 %.
 
     The values are fitted with their errors as priors, from each start; about each minimum that is
     likely enough these are the ends of the profiles of the linear model there, in which the
-    ``spread`` (M,) is the standard deviation of the errors.
+    ``spread`` (M,) is the standard deviation of the errors. ``given`` are values that were moved.
+    None without a start.
 
     Source: Raue et al. 2009, Bioinformatics 25, 1923-1929 (profiles with nuisances and priors).
     """
+    if not starts:
+        return None
+    fixed = residuals.fixed
     added = [
-        freed_within(name, value, LARGEST_FACTOR, std_errors[name])
-        for name, value in residuals.fixed.items()
-        if value and name in std_errors
+        replace(freed_within(name, given.get(name, value), LARGEST_FACTOR, error), start=value)
+        for name, error in std_errors.items()
+        if (value := fixed.get(name))
     ]
     whole = with_freed(residuals, added)
     points = [

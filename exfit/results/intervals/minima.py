@@ -2,17 +2,16 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exfit.estimate import LocalMinimum, half_square
 from exfit.fitting.descents import short_descent
 from exfit.fitting.global_search import SearchResult, is_same, taken_for_validation
-from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
-from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.fitting.uncertainty import UncertaintyAnalysis, free_values, variance_of
 from exfit.results.model import Minima, Minimum, multiple
 from exfit.util.arrays import Array
 from exfit.util.text import rounded_value
@@ -33,13 +32,15 @@ def minima_of(
     search: SearchResult,
     uncertainty: UncertaintyAnalysis | None,
     walked: Residuals | None,
+    refined: Values = MappingProxyType({}),
 ) -> Minima | None:
     """Return the minima of a search from several starts, in the parameters' own values.
 
     Half the likelihood ratio of two of them is the difference of their costs over the variance of
     the residuals, which the ``uncertainty`` of the result widens where they are not white. Ways
-    from one to another are looked for with the residuals ``walked``, unless that is None. None
-    where the search came to no minimum, or there were no further starts.
+    from one to another are looked for with the residuals ``walked``, unless that is None. All have
+    the same values of what was ``refined``. None where the search came to no minimum, or there were
+    no further starts.
     """
     if search.minima is None or not search.minima.minima:
         return None
@@ -57,27 +58,19 @@ def minima_of(
         allowed = lowest + 0.5 * REFUTED * variance
         places = valleys(walked, [x for x, _ in ends], search.place, allowed)
     minima = tuple(
-        Minimum(own_values(residuals, x), cost, each.starts, above, above > REFUTED, valley)
+        Minimum(
+            {**free_values(residuals, x), **refined},
+            cost,
+            each.starts,
+            above,
+            above > REFUTED,
+            valley,
+        )
         for each, (x, cost), above, valley in zip(
             found.minima, ends, chi_squares, places, strict=True
         )
     )
     return Minima(minima, found.start_costs, found.end_costs, search.ways)
-
-
-def variance_of(
-    residuals: Residuals, cost: float, uncertainty: UncertaintyAnalysis | None
-) -> float:
-    """Return the variance of the residuals at a minimum: no less than that of any recorder."""
-    freedom = max(1, residuals.count - len(residuals.free))
-    own = 2.0 * cost / freedom if uncertainty is None else uncertainty.confidence.variance
-    return max(own, LEAST_NOISE**2)
-
-
-def own_values(residuals: Residuals, x: NDArray[np.float64]) -> dict[str, float]:
-    """Return the values of the free parameters."""
-    values = residuals.values(x)
-    return {parameter.name: values[parameter.name] for parameter in residuals.free}
 
 
 def minima_notes(
@@ -119,7 +112,8 @@ def _of_others(
     std_errors: Values,
 ) -> Iterator[str]:
     """Note the end of the descent from the start, if elsewhere, and minima not refuted."""
-    here, cost = own_values(residuals, search.best.x), search.best.cost
+    values, cost = residuals.values(search.best.x), search.best.cost
+    here = {name: values[name] for name in minima[0].values}
     by_valley: dict[object, list[tuple[bool, Minimum]]] = {}
     for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
         from_start = search.goes_on and search.own.success and is_same(end.result, search.own)

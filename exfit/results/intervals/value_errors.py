@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import hypot, inf, sqrt
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +34,34 @@ from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
 NEGLIGIBLE = 1e-3  # of what all values move: one that moves less, as a limit that does not act
+OF_ALL = 1.5  # times the errors where all values of an event are fitted: as measured, 1.4 are right
 UNSEEN = 1e-9  # of the largest singular value: rounding
+
+
+class Refinement(NamedTuple):
+    """Given values that the record knows better, none perhaps; what explains it as well, in words.
+
+    ``others`` are given values, ``rivals`` what belongs to a test or a record. Where one of these
+    explains more ``by_rival`` is the fall of chi-square with it.
+    """
+
+    names: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    by_rival: float = 0.0
+
+
+class RefinedValues(NamedTuple):
+    """Given values that are fitted: in ``steps``, one after the other, each with its error.
+
+    Where all were fitted at once and moved to where they are most likely, they are as ``given``.
+    """
+
+    given: Mapping[str, float] = MappingProxyType({})
+    steps: tuple[Refinement, ...] = ()
+
+
+NONE_REFINED = RefinedValues()
 
 
 class ErrorsOfValues(NamedTuple):
@@ -41,12 +69,14 @@ class ErrorsOfValues(NamedTuple):
 
     ``together`` is by how much they move each parameter in all, a standard error in its unit;
     ``sides`` (N, 2) is how far down and up it may lie where the first order does not serve.
+    ``left`` are the standard errors that the records leave of the values.
     """
 
     given: Mapping[str, GivenError]
     together: Mapping[str, float]
     without: tuple[str, ...] = ()
     sides: Array | None = None
+    left: Mapping[str, float] = MappingProxyType({})
 
 
 def errors_of_values(
@@ -55,6 +85,7 @@ def errors_of_values(
     theta: Array,
     noises: Sequence[Noise],
     setups: Sequence[ExperimentSetup] = (),
+    given: Mapping[str, float] = MappingProxyType({}),
 ) -> ErrorsOfValues:
     """Estimate what standard errors of given values move at the minimum theta (N,).
 
@@ -64,8 +95,9 @@ def errors_of_values(
     The values are known beforehand to their standard errors S, and by the records, whose errors
     have the standard deviation of the ``noises`` of the channels. To first order the residuals r of
     the minimum, with the derivatives G by the values that the parameters cannot reproduce, give
-    them a posterior mean v = -C G'r and covariance C = (S^-2 + G'G)^-1. The parameters, which were
-    fitted with the given values, are off by what v moves, and uncertain by what C does.
+    them a posterior mean v = -C (G'r + S^-2 m) and covariance C = (S^-2 + G'G)^-1, in which m is
+    by how much a value was moved from what was ``given``. The parameters, which were fitted with
+    these values, are off by what v moves, and uncertain by what C does.
 
     Source: Gelman et al. 2013, section 14.8 (a prior as further data of a regression).
     """
@@ -83,30 +115,60 @@ def errors_of_values(
     spread = np.append(spread_of(residuals, noises), of_priors)
     known = influence.beyond / spread[:, None]
     precision = np.eye(len(std_errors)) + known.T @ known
-    pull = known.T @ (residuals(theta) / spread)
+    pull = known.T @ (residuals(theta) / spread) + _moved(residuals, given, std_errors)
     mean = -np.linalg.solve(precision, pull)
     covariance = np.linalg.inv(precision)
     variance = np.sum(influence.shifts @ covariance * influence.shifts, axis=1)
-    together = np.sqrt(variance + (influence.shifts @ mean) ** 2)
+    bias = _uncertain_bias(residuals, known / spread[:, None], precision)
+    moves = influence.shifts @ np.column_stack([mean, bias])
+    wider = OF_ALL if given else 1.0
+    together = wider * np.sqrt(variance + np.sum(moves**2, axis=1))
     left = influence.shifts * np.sqrt(np.diag(covariance))
     names = [free.name for free in residuals.free]
-    given = {
+    effects = {
         name: GivenError(std_error, dict(zip(names, column.tolist(), strict=True)))
         for (name, std_error), column in zip(std_errors.items(), left.T, strict=True)
         if np.any(np.abs(column) > NEGLIGIBLE * together)
     }
+    share = np.diag(known.T @ known @ covariance)  # of each value that the record knows
+    chance = float(np.sum(share))
+    surprising = -float(pull @ mean) > chance + 2.0 * sqrt(2.0 * chance)
     sides = None
     if case.external is None:
         acting = () if case.kind.finds_rest else setups  # limits: of an event that takes too long
         starts = [*starts_of_values(residuals, theta, std_errors, acting)]
-        share = np.diag(known.T @ known @ covariance)  # of each value that the record knows
-        chance = float(np.sum(share))
-        surprising = -float(pull @ mean) > chance + 2.0 * sqrt(2.0 * chance)
-        if surprising or not influence.moving.all():
-            starts.append({})
-        if starts:
-            sides = sides_with_values(residuals, theta, std_errors, spread, starts)
-    return ErrorsOfValues(given, dict(zip(names, together.tolist(), strict=True)), sides=sides)
+        starts += [{}] * (surprising or not influence.moving.all())
+        sides = sides_with_values(residuals, theta, std_errors, spread, starts, given)
+    known_to = wider * np.sqrt(np.diag(covariance) + bias**2)
+    by_record = dict(zip(std_errors, known_to.tolist(), strict=True))
+    return ErrorsOfValues(
+        effects,
+        dict(zip(names, together.tolist(), strict=True)),
+        sides=sides,
+        left={name: by_record[name] * std_errors[name] for name in std_errors},
+    )
+
+
+def _moved(
+    residuals: Residuals, given: Mapping[str, float], std_errors: Mapping[str, float]
+) -> list[float]:
+    """Return by how many of its errors each value was moved from what was given."""
+    at = residuals.fixed
+    pairs = std_errors.items()
+    return [(at[name] - given[name]) / error if name in given else 0.0 for name, error in pairs]
+
+
+def _uncertain_bias(residuals: Residuals, slopes: Array, precision: Array) -> Array:
+    """Return what of the bias by the noise of driving signals is uncertain in K values, (K,).
+
+    In their standard errors; ``slopes`` (M, K) are over the variance of the residuals.
+    """
+    if all(experiment.whitening is None for experiment in residuals.experiments):
+        return np.zeros(len(precision))
+    from exfit.inference.whitening import BIAS_KNOWN_TO
+
+    moved = slopes[: residuals.count].T @ residuals.shift
+    return BIAS_KNOWN_TO * np.asarray(np.linalg.solve(precision, moved))
 
 
 def allowing_for(

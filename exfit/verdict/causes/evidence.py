@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite, log
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -21,10 +21,8 @@ from exfit.results.cause import Cause
 from exfit.results.comparisons import Comparison
 from exfit.results.influences import RecorderAverages
 from exfit.results.intervals.determination import NEEDS_PROFILE
+from exfit.results.intervals.value_errors import NONE_REFINED, RefinedValues
 from exfit.util.arrays import Array
-
-if TYPE_CHECKING:
-    from exfit.verdict.score_tests import Refinement
 
 LEAST_TIME = 30.0  # s
 LEAST_GAIN = 10.0  # of the log-likelihood: chi-square 20, beyond what any of twenty trials gains
@@ -137,7 +135,7 @@ class Evidence:
     uncertainty: UncertaintyAnalysis | None
     validation: Sequence[Comparison] = ()
     averages: RecorderAverages | None = None
-    refined: "Sequence[Refinement]" = ()
+    refined: RefinedValues = NONE_REFINED
     interrupted: bool = False
     pace: Pace = field(default_factory=Pace)
 
