@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from exfit.case.given_errors import given_std_errors
-from exfit.estimate import half_square
+from exfit.estimate import Stop, half_square
 from exfit.fitting.channel_weights import balanced, residual_deviations
 from exfit.fitting.compression import compressed
+from exfit.fitting.descents import stopped
 from exfit.fitting.global_search import extended
 from exfit.fitting.noise import MISFIT, noise_of
 from exfit.fitting.parameters import LARGEST_FACTOR, freed_within
@@ -48,13 +49,17 @@ def with_refined_values(state: SearchState) -> SearchState:
         steps.append(found)
         state = _with_freed(state, {name: given[name] for name in found.names if name in given})
         found = value_that_the_record_refines(_evidence(state))
-    if event and (found.names or _misses(state)):
-        together = _together(state, _given(state), found.by_rival)
-        if together is not None:
-            before = state.found
-            whole = together.found._replace(minima=before.minima, place=before.place)
-            together = replace(together, searched=whole)
-            return _held(together, RefinedValues(given, (*steps, found)))
+    if event and not state.interrupted and (found.names or _misses(state)):
+        values, before = _given(state), state.found
+        best_alone = replace(state, searched=before._replace(minima=None))
+        after = _with_freed(best_alone, values)
+        if after.interrupted:
+            best = stopped(before.best, Stop.INTERRUPTED)
+            state = replace(state, searched=before._replace(best=best))
+        elif not _misses(after) and _fall(state, after, values) > found.by_rival:
+            whole = after.found._replace(minima=before.minima, place=before.place)
+            refined = RefinedValues(given, (*steps, found))
+            return _held(replace(after, searched=whole), refined)
     return replace(state, refined=RefinedValues(steps=(*steps,)))
 
 
@@ -65,19 +70,12 @@ def _given(state: SearchState) -> dict[str, float]:
     return {name: fixed[name] for name in names if fixed.get(name)}
 
 
-def _together(state: SearchState, values: Values, by_rival: float) -> SearchState | None:
-    """Fit values at once; None where that leaves a misfit, or explains no more than a rival."""
-    if state.interrupted:
-        return None
-    best_alone = replace(state, searched=state.found._replace(minima=None))
-    after = _with_freed(best_alone, values)
-    if after.interrupted or _misses(after):
-        return None
-    residuals, x = after.problem.residuals, state.found.best.x
+def _fall(before: SearchState, after: SearchState, values: Values) -> float:
+    """Return by how much chi-square falls where values are fitted, too."""
+    residuals, x = after.problem.residuals, before.found.best.x
     as_given = [free.scaled(values[free.name]) for free in residuals.free[len(x) :]]
     cost = half_square(residuals(np.append(x, as_given)))
-    fall = residuals.count * (cost / after.found.best.cost - 1.0)  # of chi-square
-    return after if fall > by_rival else None
+    return residuals.count * (cost / after.found.best.cost - 1.0)
 
 
 def _misses(state: SearchState) -> bool:

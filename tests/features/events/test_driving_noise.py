@@ -1,6 +1,7 @@
 """Noise of the recorded signals that drive a unit: its share of the errors, its bias."""
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from unittest import mock
@@ -25,8 +26,9 @@ from exfit.features.events.input_noise import (
 )
 from exfit.fitting.build import build_experiments
 from exfit.results.intervals import value_errors
+from exfit.results.intervals.value_errors import Refinement
 from exfit.results.verdict import GOOD, MATCHES
-from exfit.workflows import fit
+from exfit.workflows import fit, refined_values
 
 NOISE = 2e-4
 WRONG = 1.02  # of X''d: residuals show no such error by themselves
@@ -363,6 +365,28 @@ def test_ctrl_c_as_the_weighing_begins_keeps_the_search():
         own, kept = input_noise.weighted_search(problem, (), found, mock.Mock())
     assert own is problem
     assert kept.best is Stop.INTERRUPTED
+
+
+def test_an_interruption_while_all_given_values_are_fitted_is_kept(folder, event):
+    path = event_case(folder, "event")
+    content = yaml.safe_load(path.read_text())
+    del content["given"]
+    path.write_text(yaml.safe_dump(content))
+
+    def interrupted(state):
+        best = state.found.best._replace(stop=Stop.INTERRUPTED, success=False)
+        return replace(state, searched=state.found._replace(best=best))
+
+    with (
+        mock.patch.object(refined_values, "_misses", return_value=True),
+        mock.patch.object(
+            refined_values, "value_that_the_record_refines", return_value=Refinement()
+        ),
+        mock.patch.object(refined_values, "driving_noise", interrupted),
+    ):
+        result = fit(path)
+    assert result.interrupted
+    assert not result.refined
 
 
 def test_intervals_reach_as_far_as_given_values_allow_that_the_record_contradicts(folder, event):
