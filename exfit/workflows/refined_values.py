@@ -43,20 +43,22 @@ def with_refined_values(state: SearchState) -> SearchState:
     """
     event, given = state.case.kind.finds_rest, _given(state)
     steps = list[Refinement]()
-    found = value_that_the_record_refines(_evidence(state))
+    evidence = _evidence(state)
+    found = value_that_the_record_refines(evidence)
     most = MOST_OF_EVENT if event else MOST_VALUES
     while found.names and len(steps) < most and not state.interrupted:
         steps.append(found)
         state = _with_freed(state, {name: given[name] for name in found.names if name in given})
-        found = value_that_the_record_refines(_evidence(state))
-    if event and not state.interrupted and (found.names or _misses(state)):
+        evidence = _evidence(state)
+        found = value_that_the_record_refines(evidence)
+    if event and not state.interrupted and (found.names or _misses(evidence)):
         values, before = _given(state), state.found
         best_alone = replace(state, searched=before._replace(minima=None))
         after = _with_freed(best_alone, values)
         if after.interrupted:
             best = stopped(before.best, Stop.INTERRUPTED)
             state = replace(state, searched=before._replace(best=best))
-        elif not _misses(after) and _fall(state, after, values) > found.by_rival:
+        elif not _misses(_evidence(after)) and _fall(state, after, values) > found.by_rival:
             whole = after.found._replace(minima=before.minima, place=before.place)
             refined = RefinedValues(given, (*steps, found))
             return _held(replace(after, searched=whole), refined)
@@ -78,9 +80,8 @@ def _fall(before: SearchState, after: SearchState, values: Values) -> float:
     return residuals.count * (cost / after.found.best.cost - 1.0)
 
 
-def _misses(state: SearchState) -> bool:
+def _misses(evidence: Evidence) -> bool:
     """Test whether the errors of a signal are far above the noise of its record."""
-    evidence = _evidence(state)
     if evidence.weighted_by_noise:
         return evidence.cost > MISFIT**2 * evidence.noise_cost
     return any(

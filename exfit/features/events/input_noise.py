@@ -344,7 +344,7 @@ def weighted_search(
     own, theta = problem.residuals, found.best.x
     reason = why_not_weighted(setups, robust=own.robust is not None)
     if reason is not None:
-        return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHTED} {reason}"))
+        return problem, _noted(found, [f"{NOT_WEIGHTED} {reason}"])
     try:
         bias, cost = np.zeros_like(theta), float(own.costs([theta])[0])
         watch(Progress("weighing", 0, MOST_PASSES, cost))
@@ -374,8 +374,13 @@ def weighted_search(
         return problem, found._replace(best=stopped(found.best, Stop.INTERRUPTED))
     weighted = FitProblem(unbiased, unbiased)
     found = proceed(weighted, found, theta)
-    others = [note for note in found.notes if not note.startswith((NOISE, BIAS))]  # weighted anew
-    return weighted, found._replace(notes=(*others, *notes))
+    return weighted, _noted(found, notes)
+
+
+def _noted(found: SearchResult, notes: Sequence[str]) -> SearchResult:
+    """Return a search with notes on the noise in place of those of an earlier weighting."""
+    others = (note for note in found.notes if not note.startswith((NOISE, BIAS)))
+    return found._replace(notes=(*others, *notes))
 
 
 def _far(there: Array, here: Array) -> bool:

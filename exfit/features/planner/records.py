@@ -482,12 +482,12 @@ def idle_lags(rows: Sheet, given: Mapping[str, float]) -> list[Parameter]:
 def limits_beyond(rows: Sheet, given: Mapping[str, float]) -> dict[str, float]:
     """The ends of the sheet for limits beyond them that never act, as 99999: by symbol."""
     ends = dict[str, float]()
-    for symbol, _, _, low, high, *_ in rows:
-        value = given.get(symbol, 0.0)
-        if symbol.endswith(CEILING) and value > high and value >= OUT_OF_REACH:
-            ends[symbol] = high
-        elif symbol.endswith(FLOOR) and value < low and value <= -OUT_OF_REACH:
-            ends[symbol] = low
+    for row in rows:
+        value = given.get(row.symbol, 0.0)
+        if row.symbol.endswith(CEILING) and value > row.high and value >= OUT_OF_REACH:
+            ends[row.symbol] = row.high
+        elif row.symbol.endswith(FLOOR) and value < row.low and value <= -OUT_OF_REACH:
+            ends[row.symbol] = row.low
     return ends
 
 

@@ -56,18 +56,15 @@ def sides_with_values(
     spread: Array,
     starts: Sequence[Mapping[str, float]],
     given: Mapping[str, float],
-) -> Array | None:
+) -> Array:
     """Return how far down and up (N, 2) from theta (N,) each parameter may lie at 95 %.
 
     The values are fitted with their errors as priors, from each start; about each minimum that is
     likely enough these are the ends of the profiles of the linear model there, in which the
     ``spread`` (M,) is the standard deviation of the errors. ``given`` are values that were moved.
-    None without a start.
 
     Source: Raue et al. 2009, Bioinformatics 25, 1923-1929 (profiles with nuisances and priors).
     """
-    if not starts:
-        return None
     fixed = residuals.fixed
     added = [
         replace(freed_within(name, given.get(name, value), LARGEST_FACTOR, error), start=value)

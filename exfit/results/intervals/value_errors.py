@@ -138,7 +138,8 @@ def errors_of_values(
         acting = () if case.kind.finds_rest else setups  # limits: of an event that takes too long
         starts = [*starts_of_values(residuals, theta, std_errors, acting)]
         starts += [{}] * (surprising or not influence.moving.all())
-        sides = sides_with_values(residuals, theta, std_errors, spread, starts, given)
+        if starts:
+            sides = sides_with_values(residuals, theta, std_errors, spread, starts, given)
     known_to = wider * np.sqrt(np.diag(covariance) + bias**2)
     by_record = dict(zip(std_errors, known_to.tolist(), strict=True))
     return ErrorsOfValues(

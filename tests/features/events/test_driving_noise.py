@@ -367,6 +367,12 @@ def test_ctrl_c_as_the_weighing_begins_keeps_the_search():
     assert kept.best is Stop.INTERRUPTED
 
 
+def test_a_note_on_the_noise_takes_the_place_of_that_of_an_earlier_weighting():
+    found = SimpleNamespace(notes=("of the search", f"{input_noise.NOT_WEIGHTED} with gaps"))
+    found._replace = lambda **changes: SimpleNamespace(**changes)
+    assert input_noise._noted(found, ["again"]).notes == ("of the search", "again")
+
+
 def test_an_interruption_while_all_given_values_are_fitted_is_kept(folder, event):
     path = event_case(folder, "event")
     content = yaml.safe_load(path.read_text())
@@ -389,19 +395,44 @@ def test_an_interruption_while_all_given_values_are_fitted_is_kept(folder, event
     assert not result.refined
 
 
-def test_intervals_reach_as_far_as_given_values_allow_that_the_record_contradicts(folder, event):
-    """Seven values are off by one or two of their errors, more than are fitted."""
+@pytest.fixture(scope="module")
+def values_off(folder, event):
+    """Return a case of which seven values are off by one or two of their errors."""
     off = {"Tpd0": 1.2, "Tppd0": 0.6, "Tppq0": 1.4, "H": 0.9, "Xl": 1.15, "S10": 0.7, "S12": 1.3}
     path = event_case(folder, "event")
     content = yaml.safe_load(path.read_text())
     del content["given"]
     content["plant"]["parameters"] = {name: UNIT[name] * times for name, times in off.items()}
+    path = folder / "values_off.yaml"
     path.write_text(yaml.safe_dump(content))
-    with mock.patch.object(
-        value_errors, "sides_with_values", wraps=value_errors.sides_with_values
-    ) as reached:
-        found = fit(path).parameters
+    return path
+
+
+def test_intervals_reach_as_far_as_given_values_allow_that_the_record_contradicts(values_off):
+    """Where not all are fitted, as they explain no more than something else."""
+    with (
+        mock.patch.object(
+            value_errors, "sides_with_values", wraps=value_errors.sides_with_values
+        ) as reached,
+        mock.patch.object(refined_values, "_fall", return_value=0.0),
+    ):
+        found = fit(values_off).parameters
     assert reached.called
     for name, true in TRUTH.items():
         interval = found[name].interval
         assert interval is None or (interval[0] or 0.0) <= true <= (interval[1] or np.inf), name
+
+
+def test_values_of_an_event_that_are_all_off_are_fitted_at_once(values_off):
+    result = fit(values_off)
+    for name, true in TRUTH.items():
+        low, high = result.parameters[name].interval or (None, None)
+        assert (low or 0.0) <= true <= (high or np.inf), name
+    for name in ("H", "Tppq0"):  # by a tenth and more, and known by the record
+        fitted = result.parameters[f"machine.{name}"]
+        assert abs(fitted.value - UNIT[name]) < 0.1 * abs(fitted.start - UNIT[name])
+    assert result.refined.keys().isdisjoint(result.parameters)
+    for name, start in result.refined.items():  # within its error, elsewhere than given
+        assert result.values[name] != start
+        assert result.own_values[name] == result.values[name]
+        assert result.sources[name] != "fitted"
