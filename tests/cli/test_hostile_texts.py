@@ -99,6 +99,22 @@ def test_a_refusal_quotes_hostile_names_as_codes(run, hostile, change):
 
 
 @pytest.mark.parametrize(
+    "given",
+    [
+        ("batch", CASE, "--part", NAME),
+        ("fit", CASE, "--search", NAME),
+        (NAME,),
+        ("fit", f"--{NAME}"),
+    ],
+    ids=("value", "choice", "command", "option"),
+)
+def test_a_refused_option_is_quoted_as_codes(run, hostile, given):
+    ran = run(*given)
+    assert ran.code == 2
+    is_guarded(ran)
+
+
+@pytest.mark.parametrize(
     "name", few_of(["a\nmodel: x", NAME, "c\\ 'x' \"", "d: {#", "e\u2028\x85"], 3)
 )
 def test_a_case_made_of_files_with_hostile_names_names_them_as_they_are(run, empty_folder, name):

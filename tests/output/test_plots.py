@@ -21,7 +21,7 @@ from exfit.results.comparisons import (
 from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.results.verdict import GOOD, Verdict
 from exfit.simulation.simulator import Response
-from exfit.util.vocabulary import PHASES
+from exfit.util.vocabulary import HISTORY_PHASES, PHASES
 
 TIME = np.linspace(0.0, 2.0, 41)
 RISE = np.where(TIME < 1.0, 1.0, 1.05)
@@ -185,6 +185,14 @@ def test_convergence_shows_cost_gradient_and_damping_of_every_phase(phases, iter
     used = phases if iterations > 1 else phases[:1]
     labels = [text.get_text() for text in cost.get_legend().get_texts()]
     assert labels == [PHASES[phase] for phase in used]
+
+
+def test_every_phase_of_a_history_has_its_colour():
+    found = result(phases=tuple(HISTORY_PHASES), iterations=20)
+    for figure in (plots.convergence(found), plots.trajectories(found)):
+        assert draws(figure)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == [*HISTORY_PHASES.values()]
 
 
 def test_a_vanished_gradient_has_no_place_on_a_logarithmic_axis_but_breaks_nothing():

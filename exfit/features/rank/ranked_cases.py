@@ -1,7 +1,7 @@
 """The same records under several models, each from typical data, and what they say of these."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from exfit.case.case import Case
@@ -106,8 +106,16 @@ def planned_models(
         same = model.name == own.name
         cases[model.name] = case if same else with_exciter(case, given, model)
     return tuple(
-        PlannedFit(name, each, each.estimate.strategy, search, name) for name, each in cases.items()
+        PlannedFit(name, _without_causes(each), each.estimate.strategy, search, name)
+        for name, each in cases.items()
     )
+
+
+def _without_causes(case: Case) -> Case:
+    """Return a case whose fit tries no causes, unless it says how long: rank tries the models."""
+    if case.estimate.causes is not None:
+        return case
+    return replace(case, estimate=case.estimate.model_copy(update={"causes": 0.0}))
 
 
 def _names(own: str, given: Sequence[str]) -> Sequence[str]:

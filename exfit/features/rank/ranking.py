@@ -212,7 +212,7 @@ def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
         yield "none of these models matches the records"
     for model in models:
         if model.refuted_by is None:
-            yield f"{model.name} is not judged: its search ended {model.outcome}"
+            yield f"{model.name} is not judged: {model.outcome}"
     if len(judged) > 1 and judged[0].validation_rmse is None:
         yield "add a record under `validate`: it may distinguish models that the fitted ones do not"
 

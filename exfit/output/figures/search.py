@@ -31,14 +31,7 @@ from exfit.output.figures.style import (
 from exfit.output.iterations import COST, DAMPINGS, GRADIENT
 from exfit.signals import label_of
 from exfit.util.arrays import Array
-from exfit.util.vocabulary import (
-    COMPRESSED_ANEW,
-    FROM_FURTHER_STARTS,
-    HISTORY_PHASES,
-    ON_FINER_GRID,
-    PHASES,
-    WEIGHTED_BY_NOISE,
-)
+from exfit.util.vocabulary import HISTORY_PHASES, PHASES
 
 if TYPE_CHECKING:
     from exfit.fitting.uncertainty import UncertaintyAnalysis
@@ -48,11 +41,8 @@ if TYPE_CHECKING:
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
+    **dict.fromkeys(HISTORY_PHASES, LIMIT),
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
-    FROM_FURTHER_STARTS: LIMIT,
-    WEIGHTED_BY_NOISE: LIMIT,
-    COMPRESSED_ANEW: LIMIT,
-    ON_FINER_GRID: LIMIT,
 }
 WAYS = {
     "strategy": ("the case's start", "D"),

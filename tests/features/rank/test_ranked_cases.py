@@ -22,6 +22,12 @@ def names(plan):
     return [fit.name for fit in plan]
 
 
+def test_the_fits_try_no_causes_unless_the_case_says_how_long(case):
+    assert {fit.case.estimate.causes for fit in planned_models(case)} == {0.0}
+    stated = replace(case, estimate=case.estimate.model_copy(update={"causes": 60.0}))
+    assert {fit.case.estimate.causes for fit in planned_models(stated)} == {60.0}
+
+
 def test_without_names_the_models_are_those_of_the_same_type(case):
     own, *others = names(planned_models(case))
     assert own == "AC8B"
