@@ -127,8 +127,7 @@ class Commands(click.Group):
             with guarded(lambda code: LazyPart("exfit.cli.trusting:permit").load()(ctx, code)):
                 return super().invoke(ctx)
         except click.UsageError as fault:  # which quotes what was given
-            fault.message = printable(fault.message)
-            raise
+            raise click.UsageError(printable(fault.format_message()), fault.ctx) from None
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault
         except OSError as fault:

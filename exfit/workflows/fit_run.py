@@ -347,7 +347,7 @@ def _analysed(
             at = problem, best.x, names_of_records(fine)
             uncertainty = allowing_for_bias(uncertainty, *at)
             noises = uncertainty.confidence.noise
-            errors = errors_of_values(case, problem, best.x, noises, fine, state.refined.given)
+            errors = errors_of_values(case, problem, best.x, noises, fine, state.refined)
             analysis.errors = errors
             if case.kind.plays_back and not case.kind.has_exciter:
                 from exfit.results.intervals.windows import spread_over_windows, with_spread
@@ -414,9 +414,9 @@ def _refined(
         free = freed_within(name, start, LARGEST_FACTOR)
         left = None if why or errors is None else errors.left.get(name)
         own = dict[str, Any](why=why or "the search was interrupted")
-        if left is not None:
-            low, high = values[name] - NORMAL * left, values[name] + NORMAL * left
-            within = max(low, free.low), min(high, free.high)
+        if left is not None and errors is not None:
+            down, up = (max(NORMAL * left, side) for side in errors.sides.get(name, (0.0, 0.0)))
+            within = max(values[name] - down, free.low), min(values[name] + up, free.high)
             own = {"std_error": left, "interval": within, "interval_method": "linear"}
         yield (
             name,

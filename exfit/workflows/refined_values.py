@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from exfit.case.given_errors import given_std_errors
-from exfit.estimate import Stop, half_square
+from exfit.estimate import Progress, Stop, half_square
 from exfit.fitting.channel_weights import balanced, residual_deviations
 from exfit.fitting.compression import compressed
-from exfit.fitting.descents import stopped
+from exfit.fitting.descents import short_descent, stopped
 from exfit.fitting.global_search import extended
 from exfit.fitting.noise import MISFIT, noise_of
 from exfit.fitting.parameters import LARGEST_FACTOR, freed_within
@@ -17,6 +17,7 @@ from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import with_freed
 from exfit.fitting.search import CaseSearches
 from exfit.fitting.system import parameters_of
+from exfit.fitting.uncertainty import free_values
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.intervals.value_errors import RefinedValues, Refinement
 from exfit.util.arrays import Array
@@ -30,6 +31,11 @@ Values = Mapping[str, float]
 
 NEGLIGIBLE = 1e-2  # of its error: a value that moves less stays as it was given
 MOST_VALUES = 8  # each the one that explains most of what is left
+STARTS, SEED = 8, 0  # of all values of an event
+MOST_HALVINGS, MOST_ITERATIONS, TOLERANCE = 6, 30, 1e-3  # of a start, and of its descent
+AS_LIKELY = 5.0  # half of a chi-square: weights may yet change
+SAME = 1e-2  # of a scaled parameter: ends that are no further apart are one minimum
+BEYOND_NOISE = 1.3  # times the cost of the noise, whose variance is known to 12 %
 MOST_OF_EVENT = 2  # an event shows so many values that all are off where it asks for more
 
 
@@ -51,16 +57,17 @@ def with_refined_values(state: SearchState) -> SearchState:
         state = _with_freed(state, {name: given[name] for name in found.names if name in given})
         evidence = _evidence(state)
         found = value_that_the_record_refines(evidence)
-    if event and not state.interrupted and (found.names or _misses(evidence)):
+    asks_for_more = found.names or evidence.cost > BEYOND_NOISE * evidence.noise_cost
+    if event and not state.interrupted and (asks_for_more or _misses(evidence)):
         values, before = _given(state), state.found
         best_alone = replace(state, searched=before._replace(minima=None))
-        after = _with_freed(best_alone, values)
+        after, others = _from_other_starts(_with_freed(best_alone, values), values)
         if after.interrupted:
             best = stopped(before.best, Stop.INTERRUPTED)
             state = replace(state, searched=before._replace(best=best))
         elif not _misses(_evidence(after)) and _fall(state, after, values) > found.by_rival:
             whole = after.found._replace(minima=before.minima, place=before.place)
-            refined = RefinedValues(given, (*steps, found))
+            refined = RefinedValues(given, (*steps, found), others)
             return _held(replace(after, searched=whole), refined)
     return replace(state, refined=RefinedValues(steps=(*steps,)))
 
@@ -118,6 +125,46 @@ def _with_freed(state: SearchState, values: Values) -> SearchState:
         problem = balanced(problem, point, counter, deviations)
     wider = _searched(state, problem, lambda x: np.append(x, more))
     return driving_noise(wider)  # whose bias is that of all parameters
+
+
+def _from_other_starts(
+    state: SearchState, values: Values
+) -> tuple[SearchState, tuple[Values, ...]]:
+    """Search on from other values, drawn by their errors; return other minima that are as likely.
+
+    So many values may be likely in several places, and the first one found need not be the
+    likeliest. A start without a response is drawn nearer.
+    """
+    if state.interrupted:
+        return state, ()
+    residuals, best = state.problem.residuals, state.found.best
+    generator, std_errors = np.random.default_rng(SEED), given_std_errors(state.case)
+    ends = [best]
+    for number in range(STARTS):
+        state.watch(Progress("refining", number, STARTS, min(end.cost for end in ends)))
+        start = best.x.copy()
+        for k, free in enumerate(residuals.free):
+            if free.name in values:
+                drawn = values[free.name] + std_errors[free.name] * generator.standard_normal()
+                start[k] = free.scaled(min(max(drawn, free.low), free.high))
+        for _ in range(MOST_HALVINGS):
+            if np.isfinite(residuals.costs([start])[0]):
+                break
+            start = 0.5 * (start + best.x)
+        end = short_descent(residuals, start, MOST_ITERATIONS, tolerance=TOLERANCE)
+        if end is not None and end.stop is Stop.INTERRUPTED:
+            return replace(state, searched=state.found._replace(best=stopped(best, end.stop))), ()
+        if end is not None:
+            ends.append(end)
+    ends.sort(key=lambda end: end.cost)
+    if best.cost > ends[0].cost + NEGLIGIBLE * residuals.noise**2:
+        lower = state.continued(state.problem, state.found, ends[0].x)
+        state = driving_noise(replace(state, searched=lower))
+    likely = [end.x for end in ends if end.cost < ends[0].cost + AS_LIKELY * residuals.noise**2]
+    others = [
+        x for k, x in enumerate(likely) if not any(np.allclose(x, y, atol=SAME) for y in likely[:k])
+    ]
+    return state, tuple(free_values(residuals, x) for x in others[1:])
 
 
 def _held(state: SearchState, refined: RefinedValues) -> SearchState:

@@ -56,12 +56,13 @@ def sides_with_values(
     spread: Array,
     starts: Sequence[Mapping[str, float]],
     given: Mapping[str, float],
-) -> Array:
-    """Return how far down and up (N, 2) from theta (N,) each parameter may lie at 95 %.
+) -> dict[str, tuple[float, float]]:
+    """Return how far down and up from theta (N,) each parameter, and each value, may lie at 95 %.
 
-    The values are fitted with their errors as priors, from each start; about each minimum that is
-    likely enough these are the ends of the profiles of the linear model there, in which the
-    ``spread`` (M,) is the standard deviation of the errors. ``given`` are values that were moved.
+    The values are fitted with their errors as priors, from each start, which gives what differs
+    from theta and from the values; about each minimum that is likely enough these are the ends of
+    the profiles of the linear model there, in which the ``spread`` (M,) is the standard deviation
+    of the errors. ``given`` are values that were moved.
 
     Source: Raue et al. 2009, Bioinformatics 25, 1923-1929 (profiles with nuisances and priors).
     """
@@ -71,27 +72,28 @@ def sides_with_values(
         for name, error in std_errors.items()
         if (value := fixed.get(name))
     ]
-    whole = with_freed(residuals, added)
+    whole, at = with_freed(residuals, added), residuals.values(theta)
     points = [
-        np.append(theta, [each.scaled(start.get(each.name, each.start)) for each in added])
+        np.array([each.scaled(start.get(each.name, at[each.name])) for each in whole.free])
         for start in starts
     ]
     ends = [short_descent(whole, at, MOST_ITERATIONS, tolerance=TOLERANCE) for at in points]
     found = [(end.x, end.cost) for end in ends if end is not None]
-    count, least = len(theta), half_square(residuals(theta))  # of the values as given
-    least = min([least, *(cost for _, cost in found)])
+    here = np.array([each.scaled(at[each.name]) for each in whole.free])
+    least = min([half_square(whole(here)), *(cost for _, cost in found)])
     spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
-    sides, at = np.zeros((count, 2)), residuals.values(theta)
+    sides = np.zeros((len(whole.free), 2))
     for x, cost in found:
         rise = NORMAL**2 - 2.0 * (cost - least) / whole.noise**2
         if rise > 0.0:
             values = whole.values(x)
             slopes = whole.exact(x) / slopes_of(whole, x)  # in their own units
-            rows = np.column_stack([slopes[:, count:], slopes[:, :count], whole(x)])
-            own = sides_within(_room(residuals, values), rows / spread[:, None], count, rise)
-            moved = np.array([values[each.name] - at[each.name] for each in residuals.free])
+            rows = np.column_stack([slopes, whole(x)]) / spread[:, None]
+            own = sides_within(_room(residuals, values), rows, rise)
+            moved = np.array([values[each.name] - at[each.name] for each in whole.free])
             sides = np.maximum(sides, own + moved[:, None] * [-1.0, 1.0])
-    return sides
+    pairs = zip(whole.free, sides.tolist(), strict=True)
+    return {each.name: (down, up) for each, (down, up) in pairs}
 
 
 def _room(residuals: Residuals, values: Mapping[str, float]) -> dict[int, tuple[float, float]]:
@@ -103,20 +105,17 @@ def _room(residuals: Residuals, values: Mapping[str, float]) -> dict[int, tuple[
     }
 
 
-def sides_within(
-    room: Mapping[int, tuple[float, float]], rows: Array, count: int, rise: float
-) -> Array:
-    """Return how far down and up (N, 2) the profiles of ``count`` parameters reach.
+def sides_within(room: Mapping[int, tuple[float, float]], rows: Array, rise: float) -> Array:
+    """Return how far down and up (N, 2) the profiles of N parameters reach.
 
-    The ``rows`` (M, K + N + 1) are a linear model, in standard deviations: the derivatives by K
-    given values and by the parameters, and the errors; the sum of squares rises by ``rise``.
-    Parameters with ``room`` stay within it: each lies on one of its ends, or between them.
+    The ``rows`` (M, N + 1) are a linear model, in standard deviations: the derivatives by the
+    parameters, and the errors; the sum of squares rises by ``rise``. Parameters with ``room`` stay
+    within it: each lies on one of its ends, or between them.
 
     Source: Venzon & Moolgavkar 1988, of a quadratic form.
     """
-    values = rows.shape[1] - count - 1
-    triangle = np.asarray(np.linalg.qr(rows, mode="r"))
-    left = triangle[values:, values:]
+    count = rows.shape[1] - 1
+    left = np.asarray(np.linalg.qr(rows, mode="r"))
     size = np.linalg.norm(left[:, :count], axis=0)
     size[size == 0.0] = 1.0
     matrix, errors = left[:, :count] / size, left[:, count]

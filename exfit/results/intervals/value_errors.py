@@ -34,7 +34,6 @@ from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
 NEGLIGIBLE = 1e-3  # of what all values move: one that moves less, as a limit that does not act
-OF_ALL = 1.5  # times the errors where all values of an event are fitted: as measured, 1.4 are right
 UNSEEN = 1e-9  # of the largest singular value: rounding
 
 
@@ -54,11 +53,13 @@ class Refinement(NamedTuple):
 class RefinedValues(NamedTuple):
     """Given values that are fitted: in ``steps``, one after the other, each with its error.
 
-    Where all were fitted at once and moved to where they are most likely, they are as ``given``.
+    Where all were fitted at once and moved to where they are most likely, they are as ``given``;
+    the ``minima`` are as likely, of these values and of the parameters.
     """
 
     given: Mapping[str, float] = MappingProxyType({})
     steps: tuple[Refinement, ...] = ()
+    minima: tuple[Mapping[str, float], ...] = ()
 
 
 NONE_REFINED = RefinedValues()
@@ -68,14 +69,14 @@ class ErrorsOfValues(NamedTuple):
     """Standard errors of given values, with effects; ``without`` has those without derivatives.
 
     ``together`` is by how much they move each parameter in all, a standard error in its unit;
-    ``sides`` (N, 2) is how far down and up it may lie where the first order does not serve.
+    ``sides`` is how far down and up it, or a value, may lie where the first order does not serve.
     ``left`` are the standard errors that the records leave of the values.
     """
 
     given: Mapping[str, GivenError]
     together: Mapping[str, float]
     without: tuple[str, ...] = ()
-    sides: Array | None = None
+    sides: Mapping[str, tuple[float, float]] = MappingProxyType({})
     left: Mapping[str, float] = MappingProxyType({})
 
 
@@ -85,7 +86,7 @@ def errors_of_values(
     theta: Array,
     noises: Sequence[Noise],
     setups: Sequence[ExperimentSetup] = (),
-    given: Mapping[str, float] = MappingProxyType({}),
+    refined: RefinedValues = NONE_REFINED,
 ) -> ErrorsOfValues:
     """Estimate what standard errors of given values move at the minimum theta (N,).
 
@@ -96,8 +97,8 @@ def errors_of_values(
     have the standard deviation of the ``noises`` of the channels. To first order the residuals r of
     the minimum, with the derivatives G by the values that the parameters cannot reproduce, give
     them a posterior mean v = -C (G'r + S^-2 m) and covariance C = (S^-2 + G'G)^-1, in which m is
-    by how much a value was moved from what was ``given``. The parameters, which were fitted with
-    these values, are off by what v moves, and uncertain by what C does.
+    by how much a ``refined`` value was moved from what was given. The parameters, which were fitted
+    with these values, are off by what v moves, and uncertain by what C does.
 
     Source: Gelman et al. 2013, section 14.8 (a prior as further data of a regression).
     """
@@ -115,14 +116,13 @@ def errors_of_values(
     spread = np.append(spread_of(residuals, noises), of_priors)
     known = influence.beyond / spread[:, None]
     precision = np.eye(len(std_errors)) + known.T @ known
-    pull = known.T @ (residuals(theta) / spread) + _moved(residuals, given, std_errors)
+    pull = known.T @ (residuals(theta) / spread) + _moved(residuals, refined.given, std_errors)
     mean = -np.linalg.solve(precision, pull)
     covariance = np.linalg.inv(precision)
     variance = np.sum(influence.shifts @ covariance * influence.shifts, axis=1)
     bias = _uncertain_bias(residuals, known / spread[:, None], precision)
     moves = influence.shifts @ np.column_stack([mean, bias])
-    wider = OF_ALL if given else 1.0
-    together = wider * np.sqrt(variance + np.sum(moves**2, axis=1))
+    together = np.sqrt(variance + np.sum(moves**2, axis=1))
     left = influence.shifts * np.sqrt(np.diag(covariance))
     names = [free.name for free in residuals.free]
     effects = {
@@ -133,14 +133,17 @@ def errors_of_values(
     share = np.diag(known.T @ known @ covariance)  # of each value that the record knows
     chance = float(np.sum(share))
     surprising = -float(pull @ mean) > chance + 2.0 * sqrt(2.0 * chance)
-    sides = None
+    sides = dict[str, tuple[float, float]]()
     if case.external is None:
         acting = () if case.kind.finds_rest else setups  # limits: of an event that takes too long
-        starts = [*starts_of_values(residuals, theta, std_errors, acting)]
-        starts += [{}] * (surprising or not influence.moving.all())
+        starts: list[Mapping[str, float]] = [
+            *starts_of_values(residuals, theta, std_errors, acting)
+        ]
+        starts += refined.minima
+        starts += [{}] * (surprising or not influence.moving.all() or len(refined.minima) > 0)
         if starts:
-            sides = sides_with_values(residuals, theta, std_errors, spread, starts, given)
-    known_to = wider * np.sqrt(np.diag(covariance) + bias**2)
+            sides = sides_with_values(residuals, theta, std_errors, spread, starts, refined.given)
+    known_to = np.sqrt(np.diag(covariance) + bias**2)
     by_record = dict(zip(std_errors, known_to.tolist(), strict=True))
     return ErrorsOfValues(
         effects,
@@ -204,7 +207,7 @@ def allowing_for(
         of_name = {value: abs(error.shifts[name]) for value, error in given.items()}
         names = sorted(of_name, key=lambda value: -of_name[value])
         shift = errors.together[name]
-        sides = (0.0, 0.0) if errors.sides is None else errors.sides[len(widened)].tolist()
+        sides = errors.sides.get(name, (0.0, 0.0))
         at = float(x), float(size)
         widened[name] = widened_by(shift, own, parameter, *at, names, sides)
     return replace(uncertainty, given_errors=given).with_parameters(widened)

@@ -33,14 +33,14 @@ def profile_end(matrix, errors, low, high, k, sign):
 def test_profiles_within_bounds_are_those_of_bounded_least_squares(seed, bounded):
     """To the tolerances of these, where a parameter lies on its bound and may leave it."""
     rng = np.random.default_rng([seed, *bounded])
-    rows = rng.normal(size=(ROWS, VALUES + COUNT + 1))
-    rows = np.vstack([rows, np.eye(VALUES, VALUES + COUNT + 1)])
+    rows = rng.normal(size=(ROWS, COUNT + VALUES + 1))
+    rows = np.vstack([rows, np.eye(VALUES, COUNT + VALUES + 1, COUNT)])
     room = dict.fromkeys(bounded, (0.0, 0.4 if seed % 2 else np.inf))
-    low, high = np.full(VALUES + COUNT, -np.inf), np.full(VALUES + COUNT, np.inf)
+    low, high = np.full(COUNT + VALUES, -np.inf), np.full(COUNT + VALUES, np.inf)
     for k, ends in room.items():
-        low[VALUES + k], high[VALUES + k] = ends
-    sides = sides_within(room, rows, COUNT, RISE)
-    for k in range(COUNT):
+        low[k], high[k] = ends
+    sides = sides_within(room, rows, RISE)
+    for k in range(COUNT + VALUES):
         for side, sign in enumerate((-1.0, 1.0)):
-            end = profile_end(rows[:, :-1], rows[:, -1], low, high, VALUES + k, sign)
+            end = profile_end(rows[:, :-1], rows[:, -1], low, high, k, sign)
             assert sides[k, side] == pytest.approx(max(end, 0.0), abs=1e-5)
