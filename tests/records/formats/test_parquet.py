@@ -3,6 +3,7 @@
 import hashlib
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 from decimal import Decimal
 
@@ -127,6 +128,12 @@ def test_timestamps_are_the_time_also_behind_a_count(parquet):
 def test_a_missing_instant_is_refused(parquet):
     table = read_parquet(parquet({"ts": [INSTANTS[0], None]}))
     refused(lambda: table.instants(["ts"]), "bump.parquet: row 2", "'ts'", "missing")
+
+
+def test_timestamps_that_a_damaged_file_lacks_are_no_time(parquet):
+    table = read_parquet(parquet({"ts": INSTANTS}))
+    without = replace(table, fetch=lambda _: np.array([], "M8[us]"))
+    assert without.instants(["ts"]).tolist() == []
 
 
 OTHERS = {
