@@ -6,12 +6,14 @@ noise and the validations.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from math import nan
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from exfit.errors import SimulationError
 from exfit.estimate import (
     AT_TOLERANCE,
     LocalMinimum,
@@ -20,6 +22,7 @@ from exfit.estimate import (
     SolverIteration,
     Stop,
 )
+from exfit.estimate.solver import NotFinite
 from exfit.fitting.descents import Announce, following, stopped
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import FROM_FURTHER_STARTS
@@ -207,11 +210,11 @@ def extended(
     path, last = _refined(searches, history, own(found.best), announce, phase)
     if found.minima is None:
         return found._replace(best=last, own=last, history=path)
-    minima = [
-        local._replace(x=end.x, cost=end.cost, result=end)
-        for k, local in enumerate(found.minima.minima)
-        for end in [last if k == found.place else searches.refined(own(local.result), _unseen)]
-    ]
+    minima = list[LocalMinimum]()
+    for k, local in enumerate(found.minima.minima):
+        with suppress(SimulationError, NotFinite):  # it has no response with these parameters
+            end = last if k == found.place else searches.refined(own(local.result), _unseen)
+            minima.append(local._replace(x=end.x, cost=end.cost, result=end))
     minima.sort(key=lambda local: local.cost)
     place = next((k for k, local in enumerate(minima) if local.result is last), None)
     whole = found.minima._replace(minima=tuple(minima), best=last)

@@ -10,7 +10,7 @@ from exfit.estimate import Progress, Stop, half_square
 from exfit.fitting.channel_weights import balanced, residual_deviations
 from exfit.fitting.compression import compressed
 from exfit.fitting.descents import short_descent, stopped
-from exfit.fitting.global_search import extended
+from exfit.fitting.global_search import SearchResult, extended
 from exfit.fitting.noise import MISFIT, noise_of
 from exfit.fitting.parameters import LARGEST_FACTOR, freed_within
 from exfit.fitting.problem import FitProblem
@@ -19,6 +19,7 @@ from exfit.fitting.search import CaseSearches
 from exfit.fitting.system import parameters_of
 from exfit.fitting.uncertainty import free_values
 from exfit.results.compare_with_record import compare_with_record
+from exfit.results.intervals.free_values import improbability
 from exfit.results.intervals.value_errors import RefinedValues, Refinement
 from exfit.util.arrays import Array
 from exfit.util.vocabulary import REFINING_VALUES
@@ -31,9 +32,10 @@ Values = Mapping[str, float]
 
 NEGLIGIBLE = 1e-2  # of its error: a value that moves less stays as it was given
 MOST_VALUES = 8  # each the one that explains most of what is left
-STARTS, SEED = 8, 0  # of all values of an event
+STARTS, SEED = 12, 0  # of all values of an event
 MOST_HALVINGS, MOST_ITERATIONS, TOLERANCE = 6, 30, 1e-3  # of a start, and of its descent
-AS_LIKELY = 5.0  # half of a chi-square: weights may yet change
+AS_LIKELY = 10.0  # chi-square: weights may yet change
+ALIKE = 0.1  # chi-square
 SAME = 1e-2  # of a scaled parameter: ends that are no further apart are one minimum
 BEYOND_NOISE = 1.3  # times the cost of the noise, whose variance is known to 12 %
 MOST_OF_EVENT = 2  # an event shows so many values that all are off where it asks for more
@@ -61,7 +63,7 @@ def with_refined_values(state: SearchState) -> SearchState:
     if event and not state.interrupted and (asks_for_more or _misses(evidence)):
         values, before = _given(state), state.found
         best_alone = replace(state, searched=before._replace(minima=None))
-        after, others = _from_other_starts(_with_freed(best_alone, values), values)
+        after, others = _from_other_starts(_with_freed(best_alone, values), before, values)
         if after.interrupted:
             best = stopped(before.best, Stop.INTERRUPTED)
             state = replace(state, searched=before._replace(best=best))
@@ -128,21 +130,26 @@ def _with_freed(state: SearchState, values: Values) -> SearchState:
 
 
 def _from_other_starts(
-    state: SearchState, values: Values
+    state: SearchState, before: SearchResult, values: Values
 ) -> tuple[SearchState, tuple[Values, ...]]:
     """Search on from other values, drawn by their errors; return other minima that are as likely.
 
-    So many values may be likely in several places, and the first one found need not be the
-    likeliest. A start without a response is drawn nearer.
+    The parameters start from the minimum, from the case's start and from the minima ``before``. So
+    many values may be likely in several places, and the first one found need not be the likeliest.
+    A start without a response is drawn nearer.
     """
     if state.interrupted:
         return state, ()
     residuals, best = state.problem.residuals, state.found.best
     generator, std_errors = np.random.default_rng(SEED), given_std_errors(state.case)
+    count = len(before.best.x)
+    points = [best.x[:count], residuals.start[:count]]
+    points += [] if before.minima is None else [local.x for local in before.minima.minima]
     ends = [best]
     for number in range(STARTS):
         state.watch(Progress("refining", number, STARTS, min(end.cost for end in ends)))
         start = best.x.copy()
+        start[:count] = points[number % len(points)]
         for k, free in enumerate(residuals.free):
             if free.name in values:
                 drawn = values[free.name] + std_errors[free.name] * generator.standard_normal()
@@ -156,15 +163,21 @@ def _from_other_starts(
             return replace(state, searched=state.found._replace(best=stopped(best, end.stop))), ()
         if end is not None:
             ends.append(end)
-    ends.sort(key=lambda end: end.cost)
-    if best.cost > ends[0].cost + NEGLIGIBLE * residuals.noise**2:
-        lower = state.continued(state.problem, state.found, ends[0].x)
-        state = driving_noise(replace(state, searched=lower))
-    likely = [end.x for end in ends if end.cost < ends[0].cost + AS_LIKELY * residuals.noise**2]
-    others = [
-        x for k, x in enumerate(likely) if not any(np.allclose(x, y, atol=SAME) for y in likely[:k])
-    ]
-    return state, tuple(free_values(residuals, x) for x in others[1:])
+    shares = [improbability(residuals, end.x, end.cost) for end in ends]
+    place = int(np.argmin(shares))
+    if shares[place] > shares[0] - ALIKE:
+        place = 0  # it is the same
+    else:
+        searched = state.continued(state.problem, state.found, ends[place].x)
+        state = driving_noise(replace(state, searched=searched))
+    others = list[Array]()
+    for end, share in zip(ends, shares, strict=True):
+        likely = share < shares[place] + AS_LIKELY
+        likely |= 2.0 * (end.cost - ends[place].cost) < AS_LIKELY * residuals.noise**2
+        same = (np.allclose(end.x, x, atol=SAME) for x in (ends[place].x, *others))
+        if likely and not any(same):
+            others.append(end.x)
+    return state, tuple(free_values(residuals, x) for x in others)
 
 
 def _held(state: SearchState, refined: RefinedValues) -> SearchState:

@@ -25,6 +25,7 @@ from exfit.util.arrays import Array
 MOST_ITERATIONS, TOLERANCE = 25, 1e-3  # of a descent: the end of an interval is no estimate
 MOST_HELD = 4  # parameters on bounds that may leave them
 ROUNDING = 1e-9  # of a bound
+LEAST_WIDTH = 1e-6  # of scaled bounds
 
 
 def starts_of_values(
@@ -83,8 +84,9 @@ def sides_with_values(
     least = min([half_square(whole(here)), *(cost for _, cost in found)])
     spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
     sides = np.zeros((len(whole.free), 2))
-    for x, cost in found:
-        rise = NORMAL**2 - 2.0 * (cost - least) / whole.noise**2
+    shares = [improbability(whole, x, cost) for x, cost in found]
+    for (x, cost), share in zip(found, shares, strict=True):
+        rise = NORMAL**2 - min(2.0 * (cost - least) / whole.noise**2, share - min(shares))
         if rise > 0.0:
             values = whole.values(x)
             slopes = whole.exact(x) / slopes_of(whole, x)  # in their own units
@@ -94,6 +96,19 @@ def sides_with_values(
             sides = np.maximum(sides, own + moved[:, None] * [-1.0, 1.0])
     pairs = zip(whole.free, sides.tolist(), strict=True)
     return {each.name: (down, up) for each, (down, up) in pairs}
+
+
+def improbability(residuals: Residuals, theta: Array, cost: float) -> float:
+    """Return -2 ln of the share that a minimum theta (N,) has of all, but for a constant.
+
+    It counts how low the minimum is, and how wide: of a parameter without a prior its bounds.
+
+    Source: MacKay 2003, chapter 27 (Laplace's method).
+    """
+    low, high = residuals.bounds
+    jacobian = residuals.exact(theta) / residuals.noise
+    precision = jacobian.T @ jacobian + np.diag(np.maximum(high - low, LEAST_WIDTH) ** -2.0)
+    return 2.0 * cost / residuals.noise**2 + float(np.linalg.slogdet(precision)[1])
 
 
 def _room(residuals: Residuals, values: Mapping[str, float]) -> dict[int, tuple[float, float]]:
