@@ -187,8 +187,8 @@ class Difference:
     def rms(self) -> float:
         """Its root mean square over time, per unit."""
         kept, steps = np.isfinite(self.error), np.diff(self.time)
-        # each time stands for half the way to its neighbours
-        weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+        # each time stands for the way to its neighbours
+        weights = np.append(steps, 0.0) + np.append(0.0, steps)
         mean = np.average(self.error[kept] ** 2, weights=weights[kept])
         return float(np.sqrt(mean))
 

@@ -187,7 +187,8 @@ def points_table(result: VCurve) -> Table:
         cells = [f"{value:.3f}" for value in (result.p[k], result.q[k], result.vt[k])]
         for reading in result.readings.values():
             cells += [f"{reading.measured[k]:.4f}", f"{reading.simulated[k]:.4f}"]
-            share = reading.residuals[k] / reading.measured[k] if reading.measured[k] else inf
+            measured = float(reading.measured[k])
+            share = float(reading.residuals[k]) / measured if measured else inf
             cells.append(f"{100.0 * share:+.2f} %" if isfinite(share) else "-")
         worst = any(reading.worst == k for reading in result.readings.values())
         rows.append(row(str(k + 1), *cells, "largest" if worst else ""))

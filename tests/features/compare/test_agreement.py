@@ -228,6 +228,11 @@ def test_a_fit_is_compared_with_an_export_of_another_program():
         assert of(agreement, first="record").finals[0] == pytest.approx(2.05, abs=1e-6)
 
 
+def test_instants_that_rounding_hardly_tells_apart_are_compared():
+    a = write("a.csv", t=[0.0, 5e-324], vt=[1.0, 1.0])
+    assert of(compare([a, a])).rms == 0.0
+
+
 def test_a_column_of_time_is_named_where_it_has_a_name_of_its_own():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time))

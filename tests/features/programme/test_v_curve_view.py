@@ -1,12 +1,14 @@
 """Points of V-curves on the terminal and as a figure."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from exfit.features.programme import programme_figures
+from exfit.features.programme.programme_blocks import points_table
 from exfit.features.programme.programme_blocks import v_curve as blocks_of
 from exfit.features.programme.result import VCurve
 from exfit.features.programme.v_curve import (
@@ -49,6 +51,13 @@ def test_the_terminal_shows_every_point_in_eighty_columns(result):
     assert [row[0] for row in rows] == ["1", "2", "3", "4", "5", "6"]
     assert sum("largest" in line for line in lines) == 1
     assert any(line.startswith("Xd ") for line in lines)
+
+
+def test_a_point_without_field_current_has_no_share(result):
+    reading = result.readings["ifd"]
+    tiny = replace(reading, measured=np.full(len(P), 1e-320))
+    rows = points_table(replace(result, readings={"ifd": tiny})).rows
+    assert all("-" in [cell.text for cell in row] for row in rows)
 
 
 def test_the_figure_has_a_curve_and_points_for_each_power(result):
