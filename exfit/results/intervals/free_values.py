@@ -63,7 +63,7 @@ def sides_with_values(
     The values are fitted with their errors as priors, from each start, which gives what differs
     from theta and from the values; about each minimum that is likely enough these are the ends of
     the profiles of the linear model there, in which the ``spread`` (M,) is the standard deviation
-    of the errors. ``given`` are values that were moved.
+    of the errors. ``given`` are values that were moved: a minimum is then also likely by its width.
 
     Source: Raue et al. 2009, Bioinformatics 25, 1923-1929 (profiles with nuisances and priors).
     """
@@ -84,9 +84,10 @@ def sides_with_values(
     least = min([half_square(whole(here)), *(cost for _, cost in found)])
     spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
     sides = np.zeros((len(whole.free), 2))
-    shares = [improbability(whole, x, cost) for x, cost in found]
+    shares = [improbability(whole, x, cost) if given else 0.0 for x, cost in found]
     for (x, cost), share in zip(found, shares, strict=True):
-        rise = NORMAL**2 - min(2.0 * (cost - least) / whole.noise**2, share - min(shares))
+        beyond = 2.0 * (cost - least) / whole.noise**2
+        rise = NORMAL**2 - (min(beyond, share - min(shares)) if given else beyond)
         if rise > 0.0:
             values = whole.values(x)
             slopes = whole.exact(x) / slopes_of(whole, x)  # in their own units
