@@ -31,9 +31,11 @@ from exfit.results.intervals.averages import (
     recorder_averages,
 )
 from exfit.results.intervals.value_errors import (
+    NOT_NOISE,
     ErrorsOfValues,
     allowing_for,
     allowing_for_bias,
+    allowing_for_misfit,
     errors_of_values,
     given_error_notes,
 )
@@ -127,6 +129,7 @@ def fit_result(
         pace=pace,
     )
     verdict = verdict_of(evidence)
+    uncertainty = analysis.with_misfit(bool(given), verdict, residuals, values)
     uncertainty = analysis.uncertainty = _holding_causes(uncertainty, residuals, values, verdict)
     noted = _minima_notes(state, minima, uncertainty)
     if uncertainty is not None and verdict.no_interval:
@@ -255,6 +258,16 @@ class Analysis:
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
     errors: ErrorsOfValues | None = None
+
+    def with_misfit(
+        self, all_values: bool, verdict: Verdict, residuals: Residuals, values: Values
+    ) -> UncertaintyAnalysis | None:
+        """Return the uncertainty that allows for what is left where all values are fitted."""
+        uncertainty, errors = self.uncertainty, self.errors
+        if uncertainty is None or errors is None or verdict.explained or not all_values:
+            return uncertainty
+        self.errors = errors.times(NOT_NOISE)
+        return allowing_for_misfit(uncertainty, residuals, values)
 
     @property
     def why(self) -> str:

@@ -1,6 +1,6 @@
 """Given values that the records refine: they are fitted, with their standard errors as priors."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,6 @@ from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import with_freed
 from exfit.fitting.search import CaseSearches
 from exfit.fitting.system import parameters_of
-from exfit.fitting.uncertainty import free_values
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.intervals.free_values import improbability
 from exfit.results.intervals.value_errors import RefinedValues, Refinement
@@ -134,30 +133,15 @@ def _from_other_starts(
 ) -> tuple[SearchState, tuple[Values, ...]]:
     """Search on from other values, drawn by their errors; return other minima that are as likely.
 
-    The parameters start from the minimum, from the case's start and from the minima ``before``. So
-    many values may be likely in several places, and the first one found need not be the likeliest.
-    A start without a response is drawn nearer.
+    So many values may be likely in several places, and the first one found need not be the
+    likeliest.
     """
     if state.interrupted:
         return state, ()
     residuals, best = state.problem.residuals, state.found.best
-    generator, std_errors = np.random.default_rng(SEED), given_std_errors(state.case)
-    count = len(before.best.x)
-    points = [best.x[:count], residuals.start[:count]]
-    points += [] if before.minima is None else [local.x for local in before.minima.minima]
     ends = [best]
-    for number in range(STARTS):
+    for number, start in enumerate(_drawn_starts(state, before, values)):
         state.watch(Progress("refining", number, STARTS, min(end.cost for end in ends)))
-        start = best.x.copy()
-        start[:count] = points[number % len(points)]
-        for k, free in enumerate(residuals.free):
-            if free.name in values:
-                drawn = values[free.name] + std_errors[free.name] * generator.standard_normal()
-                start[k] = free.scaled(min(max(drawn, free.low), free.high))
-        for _ in range(MOST_HALVINGS):
-            if np.isfinite(residuals.costs([start])[0]):
-                break
-            start = 0.5 * (start + best.x)
         end = short_descent(residuals, start, MOST_ITERATIONS, tolerance=TOLERANCE)
         if end is not None and end.stop is Stop.INTERRUPTED:
             return replace(state, searched=state.found._replace(best=stopped(best, end.stop))), ()
@@ -170,14 +154,38 @@ def _from_other_starts(
     else:
         searched = state.continued(state.problem, state.found, ends[place].x)
         state = driving_noise(replace(state, searched=searched))
-    others = list[Array]()
+    others = [ends[place].x]
     for end, share in zip(ends, shares, strict=True):
-        likely = share < shares[place] + AS_LIKELY
-        likely |= 2.0 * (end.cost - ends[place].cost) < AS_LIKELY * residuals.noise**2
-        same = (np.allclose(end.x, x, atol=SAME) for x in (ends[place].x, *others))
-        if likely and not any(same):
+        higher = 2.0 * (end.cost - ends[place].cost) / residuals.noise**2
+        likely = min(higher, share - shares[place]) < AS_LIKELY
+        if likely and not any(np.allclose(end.x, x, atol=SAME) for x in others):
             others.append(end.x)
-    return state, tuple(free_values(residuals, x) for x in others)
+    return state, tuple(residuals.values(x) for x in others[1:])
+
+
+def _drawn_starts(state: SearchState, before: SearchResult, values: Values) -> Iterator[Array]:
+    """Yield starts with values drawn by their errors.
+
+    The parameters start from the minimum, from the case's start and from the minima ``before``. A
+    start without a response is drawn nearer.
+    """
+    residuals, best = state.problem.residuals, state.found.best
+    generator, std_errors = np.random.default_rng(SEED), given_std_errors(state.case)
+    count = len(before.best.x)
+    points = [best.x[:count], residuals.start[:count]]
+    points += [] if before.minima is None else [local.x for local in before.minima.minima]
+    for number in range(STARTS):
+        start = best.x.copy()
+        start[:count] = points[number % len(points)]
+        for k, free in enumerate(residuals.free):
+            if free.name in values:
+                drawn = values[free.name] + std_errors[free.name] * generator.standard_normal()
+                start[k] = free.scaled(min(max(drawn, free.low), free.high))
+        for _ in range(MOST_HALVINGS):
+            if np.isfinite(residuals.costs([start])[0]):
+                break
+            start = 0.5 * (start + best.x)
+        yield start
 
 
 def _held(state: SearchState, refined: RefinedValues) -> SearchState:

@@ -78,25 +78,37 @@ def sides_with_values(
         np.array([each.scaled(start.get(each.name, at[each.name])) for each in whole.free])
         for start in starts
     ]
-    ends = [short_descent(whole, at, MOST_ITERATIONS, tolerance=TOLERANCE) for at in points]
+    ends = [short_descent(whole, point, MOST_ITERATIONS, tolerance=TOLERANCE) for point in points]
     found = [(end.x, end.cost) for end in ends if end is not None]
     here = np.array([each.scaled(at[each.name]) for each in whole.free])
-    least = min([half_square(whole(here)), *(cost for _, cost in found)])
+    less = _less_likely(whole, found, half_square(whole(here)), by_width=bool(given))
     spread = np.append(spread[: whole.count], np.full(len(whole.priors), whole.noise))
     sides = np.zeros((len(whole.free), 2))
-    shares = [improbability(whole, x, cost) if given else 0.0 for x, cost in found]
-    for (x, cost), share in zip(found, shares, strict=True):
-        beyond = 2.0 * (cost - least) / whole.noise**2
-        rise = NORMAL**2 - (min(beyond, share - min(shares)) if given else beyond)
-        if rise > 0.0:
+    for (x, _), beyond in zip(found, less, strict=True):
+        if beyond < NORMAL**2:
             values = whole.values(x)
             slopes = whole.exact(x) / slopes_of(whole, x)  # in their own units
             rows = np.column_stack([slopes, whole(x)]) / spread[:, None]
-            own = sides_within(_room(residuals, values), rows, rise)
+            own = sides_within(_room(residuals, values), rows, NORMAL**2 - beyond)
             moved = np.array([values[each.name] - at[each.name] for each in whole.free])
             sides = np.maximum(sides, own + moved[:, None] * [-1.0, 1.0])
     pairs = zip(whole.free, sides.tolist(), strict=True)
     return {each.name: (down, up) for each, (down, up) in pairs}
+
+
+def _less_likely(
+    whole: Residuals, found: Sequence[tuple[Array, float]], here: float, by_width: bool
+) -> list[float]:
+    """Return by how much of chi-square minima are less likely than the lowest, or the widest.
+
+    These are ``found`` at x (N,) with a cost; ``here`` is that of the result.
+    """
+    least = min([here, *(cost for _, cost in found)])
+    beyond = [2.0 * (cost - least) / whole.noise**2 for _, cost in found]
+    if not by_width:
+        return beyond
+    shares = [improbability(whole, x, cost) for x, cost in found]
+    return [min(own, share - min(shares)) for own, share in zip(beyond, shares, strict=True)]
 
 
 def improbability(residuals: Residuals, theta: Array, cost: float) -> float:
