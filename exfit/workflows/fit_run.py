@@ -182,7 +182,7 @@ def fit_result(
             *state.line_notes,
             *noted,
             *_notes(state, comparisons, analysis),
-            *_refined_notes(refined),
+            *_refined_notes(refined, bool(given) and not verdict.explained),
             *filter(None, [pace.sentence]),
         ),
         validation=tuple(analysis.validation),
@@ -453,9 +453,11 @@ def _within_errors(of_given: Mapping[str, FittedParameter]) -> dict[str, float]:
     return {name: each.start for name, each in of_given.items() if each.as_given}
 
 
-def _refined_notes(refined: Values) -> Iterator[str]:
+def _refined_notes(refined: Values, twice: bool) -> Iterator[str]:
     if refined:
         yield f"moved within their errors, as is likeliest: {first_of([*refined])}"
+    if twice:
+        yield "more than noise is left with all values fitted: errors and intervals count twice"
 
 
 def _iterations(

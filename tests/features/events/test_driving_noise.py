@@ -24,6 +24,7 @@ from exfit.features.events.input_noise import (
     with_added,
     with_noise,
 )
+from exfit.fitting import descents
 from exfit.fitting.build import build_experiments
 from exfit.results.intervals import value_errors
 from exfit.results.intervals.value_errors import Refinement
@@ -395,6 +396,17 @@ def test_an_interruption_while_all_given_values_are_fitted_is_kept(folder, event
     assert not result.refined
 
 
+def test_an_interruption_of_the_further_starts_of_given_values_is_kept(values_off):
+    def interrupted(*arguments, **settings):
+        end = descents.short_descent(*arguments, **settings)
+        return end._replace(stop=Stop.INTERRUPTED, success=False)
+
+    with mock.patch.object(refined_values, "short_descent", interrupted):
+        result = fit(values_off)
+    assert result.interrupted
+    assert not result.refined
+
+
 @pytest.fixture(scope="module")
 def values_off(folder, event):
     """Return a case of which seven values are off by one or two of their errors."""
@@ -436,3 +448,24 @@ def test_values_of_an_event_that_are_all_off_are_fitted_at_once(values_off):
         assert result.values[name] != start
         assert result.own_values[name] == result.values[name]
         assert result.sources[name] != "fitted"
+
+
+def test_of_the_starts_of_given_values_the_likeliest_minimum_is_the_result(values_off):
+    """A minimum that is lower but far narrower is none, yet intervals reach as far as it does."""
+
+    def lower(_, start, *__, **___):
+        return SimpleNamespace(x=start, cost=0.0, stop=Stop.STEP)
+
+    def improbability(residuals, _, cost):
+        return 2.0 * cost / residuals.noise**2 + (0.0 if cost else 1e6)
+
+    with (
+        mock.patch.object(refined_values, "STARTS", 2),
+        mock.patch.object(refined_values, "short_descent", lower),
+        mock.patch.object(refined_values, "improbability", improbability),
+        mock.patch.object(refined_values, "_held", wraps=refined_values._held) as held,
+    ):
+        result = fit(values_off)
+    (_, refined), _ = held.call_args
+    assert [len(each) > 0 for each in refined.minima] == [True, True]
+    assert abs(result.parameters["machine.H"].value / UNIT["H"] - 1.0) < 0.01

@@ -14,6 +14,7 @@ from exfit.fitting.uncertainty import GivenError, uncertainty_at
 from exfit.results.intervals.value_errors import (
     ErrorsOfValues,
     allowing_for,
+    allowing_for_misfit,
     errors_of_values,
     influence_of_values,
 )
@@ -199,3 +200,20 @@ def test_a_fit_says_for_which_errors_it_allows_and_keeps_them(tmp_path):
     read = load_result(tmp_path / "result.json")
     assert read.knowledge.given_errors == result.knowledge.given_errors
     assert read.parameters["k"].interval == result.parameters["k"].interval
+
+
+def test_what_is_left_of_an_event_beyond_noise_counts_every_side_twice():
+    case = first_order()
+    problem, theta = minimum(case)
+    values = problem.residuals.values(theta)
+    uncertainty = uncertainty_at(problem, theta, ())
+    own = uncertainty.confidence.parameters["k"]
+    twice = allowing_for_misfit(uncertainty, problem.residuals, values).confidence.parameters["k"]
+    at = values["k"]
+    assert twice.std_error == pytest.approx(2.0 * own.std_error)
+    assert [end - at for end in twice.interval] == pytest.approx(
+        [2.0 * (end - at) for end in own.interval]
+    )
+    assert twice.by_noise == own.interval
+    errors = ErrorsOfValues({}, {}, sides={"a": (1.0, 2.0)}, left={"a": 0.5}).times(2.0)
+    assert (errors.sides, errors.left) == ({"a": (2.0, 4.0)}, {"a": 1.0})
