@@ -183,7 +183,7 @@ def test_convergence_shows_cost_gradient_and_damping_of_every_phase(phases, iter
     assert "damping" in damping.get_ylabel()
     assert damping.get_xlabel() == "iteration"
     used = phases if iterations > 1 else phases[:1]
-    labels = [text.get_text() for text in cost.get_legend().get_texts()]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == [PHASES[phase] for phase in used]
 
 

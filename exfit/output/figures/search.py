@@ -40,10 +40,12 @@ if TYPE_CHECKING:
     from exfit.workflows.profiles import Profiles
 
 LONGEST = 30  # letters of a parameter
+BETWEEN = [phase for phase in HISTORY_PHASES if phase not in PHASES]
 COLOURS: Mapping[str, str] = {
-    **dict.fromkeys(HISTORY_PHASES, LIMIT),
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
+    **dict(zip(BETWEEN, cycle(COLORS[3:]), strict=False)),
 }
+MOST_BESIDE = 2  # phases whose words stand beside each other
 WAYS = {
     "strategy": ("the case's start", "D"),
     "linear": ("by way of the linear phase", "o"),
@@ -63,9 +65,8 @@ ERROR = "simulated\n- measured\n(1e-3 pu)"
 
 def convergence(result: "FitResult") -> Figure:
     """Return cost, gradient and damping over the iterations."""
-    figure, axes = stacked(
-        7.0, 3, f"{result.name}: {result.strategy}; {result.message}", sharex=True
-    )
+    title = f"{result.name}: {result.strategy}; {result.message}"
+    figure, axes = stacked(6.5 + _legend_height(result), 3, title, sharex=True)
     rows = (
         ("cost", f"{COST} (pu²)", "o"),
         ("gradient_norm", GRADIENT, "o"),
@@ -78,10 +79,22 @@ def convergence(result: "FitResult") -> Figure:
         if any(value > 0.0 for value in values):
             logarithmic(ax)
         tidy(ax, label)
-    axes[0].legend(loc="upper right", frameon=False)
     axes[-1].set_xlabel("iteration")
     axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    _explain_phases(figure)
     return figure
+
+
+def _legend_height(result: "FitResult") -> float:
+    """Return the height of the words for the phases, inches."""
+    count = len({line.phase for line in result.history})
+    return 0.5 if count <= MOST_BESIDE else 0.25 * count
+
+
+def _explain_phases(figure: Figure) -> None:
+    handles, words = figure.axes[0].get_legend_handles_labels()
+    columns = len(words) if len(words) <= MOST_BESIDE else 1
+    figure.legend(handles, words, loc="outside lower right", ncols=columns, frameon=False)
 
 
 def _by_phase(axes: Axes, result: "FitResult", values: Sequence[float], marker: str) -> None:
@@ -105,7 +118,8 @@ def trajectories(result: "FitResult") -> Figure:
     names = list(result.parameters)
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
-    figure = new_figure(1.0 + 2.0 * rows, f"{result.name}: the parameters after each iteration")
+    height = 0.5 + 2.0 * rows + _legend_height(result)
+    figure = new_figure(height, f"{result.name}: the parameters after each iteration")
     grid = figure.add_gridspec(rows, columns)
     ax = None
     for k, name in enumerate(names):
@@ -125,10 +139,8 @@ def trajectories(result: "FitResult") -> Figure:
         lowest = k + columns >= len(names)
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel("iteration" if lowest else "")
-    phases = dict.fromkeys(line.phase for line in result.history)
-    if len(phases) > 1:
-        handles = figure.axes[0].get_legend_handles_labels()
-        figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
+    if len({line.phase for line in result.history}) > 1:
+        _explain_phases(figure)
     return figure
 
 

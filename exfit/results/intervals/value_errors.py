@@ -143,11 +143,9 @@ def errors_of_values(
     sides = dict[str, tuple[float, float]]()
     if case.external is None:
         acting = () if case.kind.finds_rest else setups  # limits: of an event that takes too long
-        starts: list[Mapping[str, float]] = [
-            *starts_of_values(residuals, theta, std_errors, acting)
-        ]
-        starts += refined.minima
-        starts += [{}] * (surprising or not influence.moving.all() or len(refined.minima) > 0)
+        starts = [*starts_of_values(residuals, theta, std_errors, acting), *refined.minima]
+        if surprising or refined.minima or not influence.moving.all():
+            starts.append({})
         if starts:
             sides = sides_with_values(residuals, theta, std_errors, spread, starts, refined.given)
     known_to = np.sqrt(np.diag(covariance) + bias**2)
