@@ -114,9 +114,17 @@ def _agree(before: Array, after: Array, tolerance: float) -> bool:
 def as_fitted(
     setups: Sequence[ExperimentSetup], problem: FitProblem
 ) -> tuple[ExperimentSetup, ...]:
-    """Return the setups of a problem with the weights of its channels."""
-    pairs = zip(setups, problem.residuals.experiments, strict=True)
+    """Return the setups of a problem with the weights of its channels, driven as recorded."""
+    pairs = zip(setups, map(as_recorded, problem.residuals.experiments), strict=True)
     return tuple(replace(setup, experiment=experiment) for setup, experiment in pairs)
+
+
+def as_recorded(experiment: Experiment) -> Experiment:
+    """Return an experiment that recorded signals drive as they are, with their noise."""
+    if experiment.recorded is None:
+        return experiment
+    simulator, own = experiment.recorded
+    return replace(experiment, simulator=simulator, own=own, recorded=None)
 
 
 def weighted_alike(

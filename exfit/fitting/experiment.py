@@ -99,7 +99,8 @@ class Experiment:
 
     ``own`` holds the parameters of the system that this test alone has: where its signals start,
     its network. ``sines`` are periodic disturbances of the response. ``whitening`` makes errors
-    white that hold noise of driving signals: weights of channels drop out.
+    white that hold noise of driving signals: weights of channels drop out, and the simulator has
+    these without it; ``recorded`` are simulator and ``own`` as recorded.
     """
 
     simulator: Simulator
@@ -109,6 +110,7 @@ class Experiment:
     name: str = ""
     sines: "tuple[Sine, ...]" = ()
     whitening: "Whitening | None" = None
+    recorded: tuple[Simulator, Values] | None = None
 
     @property
     def signals(self) -> tuple[str, ...]:

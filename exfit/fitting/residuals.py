@@ -152,11 +152,11 @@ class Residuals:
         return float(np.sqrt(np.mean(np.square(sizes))))
 
     @property
-    def shift(self) -> Array:
-        """Shift that is taken from the errors (M,) of the records for the bias by inputs."""
+    def bias(self) -> Array:
+        """What noise of the inputs would add to the errors (M,) of the records: none is left."""
         return np.concatenate(
             [
-                np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.shift
+                np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.bias
                 for each in self.experiments
             ]
         )

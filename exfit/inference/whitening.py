@@ -54,7 +54,8 @@ class Whitening(NamedTuple):
 
     An error becomes what those before it in time do not predict, over the standard deviation of
     that. The white errors have the standard deviation ``scale``; ``deviations`` (M,) are those that
-    the errors had. ``shift`` (M,) is taken from the white errors.
+    the errors had. ``shift`` (M,) is taken from the white errors, of which ``bias`` (M,) is what
+    noise of the driving signals would add along the derivatives.
 
     Source: Seber & Wild 1989, section 2.1.4 (generalised least squares by a Cholesky factor);
     Vecchia 1988 (given only those that came just before).
@@ -64,6 +65,7 @@ class Whitening(NamedTuple):
     scale: float
     deviations: Array
     shift: Array
+    bias: Array
 
     def errors(self, errors: Array) -> Array:
         """Return errors (K, M) as white ones."""
@@ -88,6 +90,7 @@ def whitening(
         tuple(_parts(noise, order, scale, before)),
         scale,
         np.sqrt(noise.variance),
+        np.zeros(len(order)),
         np.zeros(len(order)),
     )
 

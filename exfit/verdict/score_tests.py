@@ -364,7 +364,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Arr
                     yield _held_value(evidence, each), direction
         yield from _of_channels(evidence, errors)
 
-    return linear_model(influence, known), tested(), extended.shift
+    return linear_model(influence, known), tested(), extended.bias
 
 
 def _at_once(together: Iterable[tuple[str, ...]], most: int) -> Iterator[list[tuple[str, ...]]]:

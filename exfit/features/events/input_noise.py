@@ -7,12 +7,13 @@ the errors of all channels at once, coloured by the unit. To first order these e
 
 with n_y the noise of the channels, n_u that of the driving signals, and J the response to each of
 their samples. Weighting errors by this covariance is maximum likelihood where the true values of
-the driving signals are unknown at every sample, and eliminated. To second order the derivatives by
-the parameters have the same noise as the errors, which biases the parameters: this bias is
-estimated by adding as much noise again (simulation-extrapolation), and removed.
+the driving signals are unknown at every sample, and eliminated. Derivatives by the parameters have
+the same noise as the errors where they are taken at the recorded signals, which biases the
+parameters: they are taken at the likeliest true ones, u - E[n_u | e], whose errors are independent
+of e.
 
 Source: Seber & Wild 1989, sections 2.1.4 and 10.2 (generalised least squares; errors in variables);
-Carroll, Ruppert, Stefanski & Crainiceanu 2006, chapter 5 (simulation-extrapolation).
+Britt & Luecke 1973, Technometrics 15, 233-247 (derivatives at the estimated true values).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 from exfit.dsp.noise import noise
 from exfit.dsp.sampling import sampling_of
 from exfit.estimate import LocalMinimum, Progress, Stop
+from exfit.fitting.channel_weights import as_recorded
 from exfit.fitting.descents import descent_near, stopped
 from exfit.fitting.experiment import Channel, Experiment, ExperimentSetup
 from exfit.fitting.global_search import SearchResult
@@ -53,8 +55,6 @@ ROUGH_ROWS = 200  # of errors before that tell what noise comes next
 SAMPLES_AT_ENDS = 4  # of a record, where a spline through them is another: each has a pulse
 Rows = NDArray[np.intp]
 Values = Mapping[str, float]
-SEED = 0
-PAIRS = 6  # of realisations of noise, with either sign: what is of first order cancels
 MOST_ERRORS = 5000  # of a record: the covariance of more takes too much memory and time
 MOST_PASSES = 5
 FAR = 0.1  # of a scaled parameter: the response to noise is not the same
@@ -361,7 +361,7 @@ def weighted_search(
             if not _far(theta, at) and np.max(np.abs(bias - before)) < SMALL_BIAS:
                 break
         watch(Progress("weighing", MOST_PASSES, MOST_PASSES, cost))
-        notes = [*noise_notes(unbiased, theta, bias)]
+        notes = [*noise_notes(white, theta, bias)]
         if found.minima is not None:
             minima = []
             for place, minimum in enumerate(found.minima.minima):
@@ -444,43 +444,33 @@ def without_bias(
 ) -> tuple[Residuals, Array]:
     """Return white residuals whose minimum near theta (N,) the driving noise does not move.
 
-    With the bias (N,) that is gone, in standard errors of each parameter. As much noise again, of
-    either sign, shows how it moves the gradient: only what is of second order is left on average.
-    As in the record, noise at rest moves the level that the simulation starts at.
+    With the bias (N,) that is gone, in standard errors of each parameter. At theta the errors are
+    those as recorded, their derivatives are without the noise.
     """
-    generator = np.random.default_rng(SEED)
     values, moves = residuals.values(theta), residuals.moves(theta)
-    gradient, jacobians = np.zeros(len(theta)), []
+    gradient, jacobians, experiments = np.zeros(len(theta)), [], []
     for whole, setup in zip(residuals.experiments, setups, strict=True):
-        experiment = whole.coarse()
-        simulator = experiment.with_inputs(values)
-        errors, own = experiment.tangents(values, moves)
+        recorded = as_recorded(whole)
+        if recorded.whitening is not None:
+            unshifted = recorded.whitening._replace(shift=np.zeros(sum(recorded.sizes)))
+            recorded = replace(recorded, whitening=unshifted)
+        errors, slopes = recorded.tangents(values, moves)
+        smooth = without_likely_noise(recorded, setup, values, errors)
+        other, own = smooth.tangents(values, moves)
+        gradient += (slopes - own).T @ errors
         jacobians.append(own)
-        recorded, deviations = simulator.inputs.recorded, noise_of_inputs(simulator)
-        levels, powers = rest_levels(setup, experiment, recorded), phasor_in_powers(setup.record)
-        for _ in range(PAIRS):
-            drawn = drawn_noise(generator, deviations, len(setup.record.time), powers)
-            sizes = {
-                signal: own.weights @ drawn[signal][own.rest]
-                for signal, own in levels.items()
-                if signal in drawn
-            }
-            for sign in (1.0, -1.0):
-                more, moved = (
-                    {signal: sign * each for signal, each in of.items()} for of in (drawn, sizes)
-                )
-                noisy = with_noise(experiment, simulator, levels, more, moved)
-                noisy_errors, slopes = noisy.tangents(values, moves)
-                gradient += (slopes.T @ noisy_errors - own.T @ errors) / (2 * PAIRS)
+        if smooth.whitening is not None:
+            smooth = replace(smooth, whitening=smooth.whitening._replace(shift=other - errors))
+        experiments.append(smooth)
     jacobian = np.concatenate(jacobians)
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     seen = singular > UNSEEN * np.max(singular, initial=0.0)
     roots = directions[seen].T / singular[seen]
     bias = -roots @ (roots.T @ gradient)
-    shifts = np.split(-jacobian @ bias, np.cumsum([sum(e.sizes) for e in residuals.experiments]))
+    added = np.split(-jacobian @ bias, np.cumsum([sum(e.sizes) for e in residuals.experiments]))
     experiments = [
-        replace(experiment, whitening=experiment.whitening._replace(shift=shift))
-        for experiment, shift in zip(residuals.experiments, shifts, strict=False)
+        replace(experiment, whitening=experiment.whitening._replace(bias=own))
+        for experiment, own in zip(experiments, added, strict=False)
         if experiment.whitening is not None
     ]
     scale = next(e.whitening.scale for e in experiments if e.whitening is not None)
@@ -490,21 +480,35 @@ def without_bias(
     return replace(residuals, experiments=experiments), relative
 
 
-def drawn_noise(
-    generator: np.random.Generator,
-    deviations: Mapping[str, float],
-    samples: int,
-    in_power: Mapping[str, Complex],
-) -> dict[str, Array]:
-    """Draw noise (M,) of the driving signals, and what it is in powers of the same phasors."""
-    drawn: dict[str, Array] = {
-        signal: deviation * generator.standard_normal(samples)
-        for signal, deviation in deviations.items()
+def without_likely_noise(
+    experiment: Experiment, setup: ExperimentSetup, values: Values, errors: Array
+) -> Experiment:
+    """Return an experiment driven by recorded signals less what white errors (M,) say is noise.
+
+    As in the record, noise at rest moves the level that the simulation starts at.
+    """
+    if experiment.whitening is None:
+        return experiment
+    recorded = experiment.simulator.inputs.recorded
+    white, carried = experiment.whitening, propagated_noise(setup, values).carried
+    likely = white.slopes(carried).T @ errors / white.scale**2  # in standard deviations
+    noise, first = dict[str, Array](), 0
+    for signal, deviation in noise_of_inputs(experiment.simulator).items():
+        count = len(recorded[signal].samples)
+        noise[signal] = -deviation * likely[first : first + count]
+        first += count
+    if powers := phasor_in_powers(setup.record):
+        power = np.sum([powers[signal] * noise[signal] for signal in powers], axis=0)
+        noise |= {"p": power.real, "q": power.imag}
+    levels = rest_levels(setup, experiment, recorded)
+    sizes = {
+        signal: own.weights @ noise[signal][own.rest]
+        for signal, own in levels.items()
+        if signal in noise
     }
-    if in_power:
-        power = np.sum([in_power[signal] * drawn[signal] for signal in in_power], axis=0)
-        drawn |= {"p": power.real, "q": power.imag}
-    return drawn
+    there = with_noise(experiment, experiment.simulator, levels, noise, sizes)
+    as_it_was = experiment.simulator, experiment.own
+    return replace(there, channels=experiment.channels, recorded=as_it_was)
 
 
 def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str]:

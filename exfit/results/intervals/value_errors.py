@@ -176,7 +176,7 @@ def _uncertain_bias(residuals: Residuals, slopes: Array, precision: Array) -> Ar
         return np.zeros(len(precision))
     from exfit.inference.whitening import BIAS_KNOWN_TO
 
-    moved = slopes[: residuals.count].T @ residuals.shift
+    moved = slopes[: residuals.count].T @ residuals.bias
     return BIAS_KNOWN_TO * np.asarray(np.linalg.solve(precision, moved))
 
 
@@ -231,7 +231,7 @@ def allowing_for_bias(
     from exfit.inference.whitening import BIAS_KNOWN_TO
 
     jacobian = residuals.errors(theta)[1]
-    bias = np.linalg.lstsq(jacobian, -residuals.shift, rcond=UNSEEN)[0]
+    bias = np.linalg.lstsq(jacobian, -residuals.bias, rcond=UNSEEN)[0]
     sizes = linearisation(problem, theta, of_record).own_size
     widened = {}
     for parameter, x, size, moved in zip(residuals.free, theta, sizes, bias, strict=True):
