@@ -143,15 +143,13 @@ def _by_what_moves(record: "Inspection", signals: Mapping[str, Array]) -> KindOf
     if _swings(record, signals):
         return KindOfTest(EVENT, f"{names['p']} moves more than {names['q']}, as behind a loss")
     lasts = any(names.get("vt") in step.sizes for step in record.steps)
-    moved = _range_pu(signals["frequency"]) if "frequency" in signals else 0.0
-    of_grid = "angle" in signals or moved > OF_GRID
-    if together > CERTAINLY and (lasts or not of_grid):
+    if together > CERTAINLY and (lasts or "angle" not in signals):
         return KindOfTest(BUMP, f"{names['q']} moves with {names['vt']}: {BY_REFERENCE}")
     on_load = bool({"p", "q"} & signals.keys())
     if record.steps and "vt" in signals and not on_load:
         seen = " and ".join(filter(None, map(names.get, OF_BUMP_TEST)))
         return KindOfTest(BUMP, f"{seen} move, and no channel is known for power")
-    return _by_frequency(names, signals, on_load, moved) or KindOfTest(
+    return _by_frequency(names, signals, on_load) or KindOfTest(
         BUMP,
         f"{'a step' if record.steps else 'no step in any channel'}; or is it a grid event, or a "
         f"steady point? {_lacking(names)}".strip(),
@@ -176,9 +174,10 @@ def _scale(power: "InspectedChannel") -> str:
 
 
 def _by_frequency(
-    names: Mapping[str, str], signals: Mapping[str, Array], on_load: bool, moved: float
+    names: Mapping[str, str], signals: Mapping[str, Array], on_load: bool
 ) -> KindOfTest | None:
     """Suppose a grid event where a frequency or an angle moves and nothing else is known."""
+    moved = _range_pu(signals["frequency"]) if "frequency" in signals else 0.0
     if on_load and "vt" in signals and ("angle" in signals or moved > OF_GRID):
         why = f"{names.get('angle') or names['frequency']} moves with the power"
         return KindOfTest(EVENT, f"{why}; or is it a bump test? {_lacking(names)}".strip())

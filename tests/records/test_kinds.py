@@ -7,15 +7,7 @@ from places import SAMPLES
 
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
-from exfit.records.kinds import (
-    BUMP,
-    EVENT,
-    FOLLOWING,
-    INJECTION,
-    ISOLATED_LOAD,
-    OF_GOVERNOR,
-    REFERENCE,
-)
+from exfit.records.kinds import FOLLOWING, INJECTION, ISOLATED_LOAD, OF_GOVERNOR, REFERENCE
 
 TIME = np.arange(0.0, 60.0, 0.1)
 NOISE = {"speed": 3e-5, "p": 1e-3, "gate": 1e-3, "vt": 2e-4}
@@ -61,11 +53,3 @@ def test_a_step_of_the_voltage_reference_is_no_test_of_the_governor():
     found = kind(vt=1.0 + 0.03 * after(0.5), p=0.6 + 0.02 * kick, gate=np.full_like(TIME, 0.6),
                  speed=1.0 + 1e-4 * kick)  # fmt: skip
     assert found.name not in OF_GOVERNOR
-
-
-@pytest.mark.parametrize(("swing", "name"), [(1e-4, BUMP), (2e-3, EVENT)])
-def test_q_that_swings_with_vt_without_a_step_is_of_the_grid_where_the_frequency_moves(swing, name):
-    wave = np.exp(-0.05 * TIME) * np.sin(2.0 * np.pi * 0.5 * TIME) * (TIME > 5.0)
-    found = kind(vt=1.0 + 0.01 * wave, p=0.8 + 0.01 * wave, q=0.2 + 0.05 * wave,
-                 frequency=60.0 * (1.0 + swing * wave))  # fmt: skip
-    assert found.name == name
