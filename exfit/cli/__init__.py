@@ -18,7 +18,6 @@ from exfit.registry import LazyCommand, LazyPart
 from exfit.registry import commands as of_features
 from exfit.util.gate import guarded
 from exfit.util.interrupts import endings_as_interruptions
-from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -126,8 +125,6 @@ class Commands(click.Group):
         try:
             with guarded(lambda code: LazyPart("exfit.cli.trusting:permit").load()(ctx, code)):
                 return super().invoke(ctx)
-        except click.UsageError as fault:  # which quotes what was given
-            raise click.UsageError(printable(fault.format_message()), fault.ctx) from None
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault
         except OSError as fault:

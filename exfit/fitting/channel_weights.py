@@ -121,9 +121,7 @@ def as_fitted(
 
 def as_recorded(experiment: Experiment) -> Experiment:
     """Return an experiment that recorded signals drive as they are, with their noise."""
-    if experiment.recorded is None:
-        return experiment
-    simulator, own = experiment.recorded
+    simulator, own = experiment.recorded or (experiment.simulator, experiment.own)
     return replace(experiment, simulator=simulator, own=own, recorded=None)
 
 

@@ -98,9 +98,8 @@ class Experiment:
     """A simulated test and the channels that it is compared with.
 
     ``own`` holds the parameters of the system that this test alone has: where its signals start,
-    its network. ``sines`` are periodic disturbances of the response. ``whitening`` makes errors
-    white that hold noise of driving signals: weights of channels drop out, and the simulator has
-    these without it; ``recorded`` are simulator and ``own`` as recorded.
+    its network. ``sines`` disturb the response. ``whitening`` makes errors white that hold noise of
+    driving signals: weights of channels drop out; ``recorded`` are simulator and own with it.
     """
 
     simulator: Simulator

@@ -154,12 +154,8 @@ class Residuals:
     @property
     def bias(self) -> Array:
         """What noise of the inputs would add to the errors (M,) of the records: none is left."""
-        return np.concatenate(
-            [
-                np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.bias
-                for each in self.experiments
-            ]
-        )
+        pairs = ((each.whitening, sum(each.sizes)) for each in self.experiments)
+        return np.concatenate([np.zeros(n) if white is None else white.bias for white, n in pairs])
 
     def match(self, residuals: Array, rmse: float) -> bool:
         """Test that no channel of any record has a root mean square error above ``rmse``.

@@ -31,11 +31,9 @@ from exfit.results.intervals.averages import (
     recorder_averages,
 )
 from exfit.results.intervals.value_errors import (
-    NOT_NOISE,
     ErrorsOfValues,
     allowing_for,
     allowing_for_bias,
-    allowing_for_misfit,
     errors_of_values,
     given_error_notes,
 )
@@ -266,7 +264,9 @@ class Analysis:
         uncertainty, errors = self.uncertainty, self.errors
         if uncertainty is None or errors is None or verdict.explained or not all_values:
             return uncertainty
-        self.errors = errors.times(NOT_NOISE)
+        from exfit.results.intervals.misfit import allowing_for_misfit, counted_twice
+
+        self.errors = counted_twice(errors)
         return allowing_for_misfit(uncertainty, residuals, values)
 
     @property
@@ -457,7 +457,9 @@ def _refined_notes(refined: Values, twice: bool) -> Iterator[str]:
     if refined:
         yield f"moved within their errors, as is likeliest: {first_of([*refined])}"
     if twice:
-        yield "more than noise is left with all values fitted: errors and intervals count twice"
+        from exfit.results.intervals.misfit import COUNTED_TWICE
+
+        yield COUNTED_TWICE
 
 
 def _iterations(

@@ -35,7 +35,7 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     """Return the number of a part and how many there are, of a text such as 3/40."""
     match = re.fullmatch(r"([0-9]+)/([0-9]+)", value)
     if match is None:
-        raise click.BadParameter(f"{value}: not of the form 3/40")
+        raise click.BadParameter(f"{value!r}: not of the form 3/40")
     number, parts = int(match[1]), int(match[2])
     if not 1 <= number <= parts:
         raise click.BadParameter(f"{value}: must be 1/{parts} ... {parts}/{parts}")

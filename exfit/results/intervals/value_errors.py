@@ -34,7 +34,6 @@ from exfit.util.arrays import Array
 from exfit.util.text import digits, listed
 
 NEGLIGIBLE = 1e-3  # of what all values move: one that moves less, as a limit that does not act
-NOT_NOISE = 2.0  # times the errors where more than noise is left of an event, as measured
 UNSEEN = 1e-9  # of the largest singular value: rounding
 
 
@@ -79,12 +78,6 @@ class ErrorsOfValues(NamedTuple):
     without: tuple[str, ...] = ()
     sides: Mapping[str, tuple[float, float]] = MappingProxyType({})
     left: Mapping[str, float] = MappingProxyType({})
-
-    def times(self, factor: float) -> "ErrorsOfValues":
-        """Return what records leave of the values so many times as large."""
-        sides = {name: (factor * down, factor * up) for name, (down, up) in self.sides.items()}
-        left = {name: factor * own for name, own in self.left.items()}
-        return self._replace(sides=sides, left=left)
 
 
 def errors_of_values(
@@ -241,34 +234,6 @@ def allowing_for_bias(
             shift, own, parameter, float(x), float(size), ["the noise of the driving signals"]
         )
     return uncertainty.with_parameters(widened)
-
-
-def allowing_for_misfit(
-    uncertainty: UncertaintyAnalysis, residuals: Residuals, values: Mapping[str, float]
-) -> UncertaintyAnalysis:
-    """Return the uncertainty of an event of which more than noise is left with all values fitted.
-
-    What the model lacks moves as many parameters as far as it can: errors and the sides of the
-    intervals about the fitted ``values`` count twice, which is how far they were off.
-    """
-    parameters = {**uncertainty.confidence.parameters}
-    for free in residuals.free:
-        own, at = parameters[free.name], values[free.name]
-        error, relative, ends = own.std_error, own.relative_error, own.interval
-        parameters[free.name] = own._replace(
-            std_error=None if error is None else NOT_NOISE * error,
-            relative_error=None if relative is None else NOT_NOISE * relative,
-            interval=ends and (_farther(free, at, ends[0]), _farther(free, at, ends[1])),
-            by_noise=own.by_noise or ends,
-        )
-    return uncertainty.with_parameters(parameters)
-
-
-def _farther(free: FreeParameter, value: float, limit: float | None) -> float | None:
-    if limit is None:
-        return None
-    at, bounds = free.scaled(value), (free.scaled(free.low), free.scaled(free.high))
-    return free.value(float(np.clip(at + NOT_NOISE * (free.scaled(limit) - at), *bounds)))
 
 
 def given_error_notes(

@@ -11,10 +11,10 @@ from exfit import Record
 from exfit.case.case import Case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import GivenError, uncertainty_at
+from exfit.results.intervals.misfit import allowing_for_misfit, counted_twice
 from exfit.results.intervals.value_errors import (
     ErrorsOfValues,
     allowing_for,
-    allowing_for_misfit,
     errors_of_values,
     influence_of_values,
 )
@@ -215,5 +215,5 @@ def test_what_is_left_of_an_event_beyond_noise_counts_every_side_twice():
         [2.0 * (end - at) for end in own.interval]
     )
     assert twice.by_noise == own.interval
-    errors = ErrorsOfValues({}, {}, sides={"a": (1.0, 2.0)}, left={"a": 0.5}).times(2.0)
+    errors = counted_twice(ErrorsOfValues({}, {}, sides={"a": (1.0, 2.0)}, left={"a": 0.5}))
     assert (errors.sides, errors.left) == ({"a": (2.0, 4.0)}, {"a": 1.0})
