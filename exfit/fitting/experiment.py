@@ -59,9 +59,8 @@ class Channel:
 
     def slopes(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives of filtered samples, given those (M, N) of the samples."""
-        if self.filtering is None:
-            return slopes
-        return self.filtering.tangents(samples, slopes)
+        own = self.filtering
+        return slopes if own is None else own.tangents(samples, slopes)
 
     @cached_property
     def record(self) -> Array:

@@ -160,7 +160,8 @@ def _from_other_starts(
         likely = min(higher, share - shares[place]) < AS_LIKELY
         if likely and not any(np.allclose(end.x, x, atol=SAME) for x in others):
             others.append(end.x)
-    return state, tuple(residuals.values(x) for x in others[1:])
+    itself: tuple[Values, ...] = ({},) if len(others) > 1 else ()
+    return state, (*itself, *(residuals.values(x) for x in others[1:]))
 
 
 def _drawn_starts(state: SearchState, before: SearchResult, values: Values) -> Iterator[Array]:

@@ -54,7 +54,7 @@ class RefinedValues(NamedTuple):
     """Given values that are fitted: in ``steps``, one after the other, each with its error.
 
     Where all were fitted at once and moved to where they are most likely, they are as ``given``;
-    the ``minima`` are as likely, of these values and of the parameters.
+    ``minima`` that are as likely have other values and parameters, the result itself none.
     """
 
     given: Mapping[str, float] = MappingProxyType({})
@@ -137,8 +137,7 @@ def errors_of_values(
     if case.external is None:
         acting = () if case.kind.finds_rest else setups  # limits: of an event that takes too long
         starts = [*starts_of_values(residuals, theta, std_errors, acting), *refined.minima]
-        if surprising or refined.minima or not influence.moving.all():
-            starts.append({})
+        starts += [{}] * (surprising or not influence.moving.all())
         if starts:
             sides = sides_with_values(residuals, theta, std_errors, spread, starts, refined.given)
     known_to = np.sqrt(np.diag(covariance) + bias**2)
