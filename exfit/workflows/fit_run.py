@@ -127,7 +127,9 @@ def fit_result(
         pace=pace,
     )
     verdict = verdict_of(evidence)
-    uncertainty = analysis.with_misfit(bool(given), verdict, residuals, values)
+    if given:
+        analysis.allow_for_misfit(residuals, values, fine, verdict.explained)
+    uncertainty = analysis.uncertainty
     uncertainty = analysis.uncertainty = _holding_causes(uncertainty, residuals, values, verdict)
     noted = _minima_notes(state, minima, uncertainty)
     if uncertainty is not None and verdict.no_interval:
@@ -180,8 +182,8 @@ def fit_result(
             *state.line_notes,
             *noted,
             *_notes(state, comparisons, analysis),
-            *_refined_notes(refined, bool(given) and not verdict.explained),
-            *filter(None, [pace.sentence]),
+            *_refined_notes(refined),
+            *filter(None, [analysis.twice, pace.sentence]),
         ),
         validation=tuple(analysis.validation),
         versions=versions(),
@@ -256,18 +258,20 @@ class Analysis:
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
     errors: ErrorsOfValues | None = None
+    twice: str = ""
 
-    def with_misfit(
-        self, all_values: bool, verdict: Verdict, residuals: Residuals, values: Values
-    ) -> UncertaintyAnalysis | None:
-        """Return the uncertainty that allows for what is left where all values are fitted."""
-        uncertainty, errors = self.uncertainty, self.errors
-        if uncertainty is None or errors is None or verdict.explained or not all_values:
-            return uncertainty
-        from exfit.results.intervals.misfit import allowing_for_misfit, counted_twice
+    def allow_for_misfit(
+        self, residuals: Residuals, values: Values, setups: Sequence[ExperimentSetup], noise: bool
+    ) -> None:
+        """Allow for what the model does not show of an event, where ``noise`` or more is left."""
+        if self.uncertainty is None or self.errors is None:
+            return
+        from exfit.results.intervals import misfit
 
-        self.errors = counted_twice(errors)
-        return allowing_for_misfit(uncertainty, residuals, values)
+        self.twice = misfit.why_counted_twice(setups, values, noise)
+        if self.twice:
+            self.errors = misfit.counted_twice(self.errors)
+            self.uncertainty = misfit.allowing_for_misfit(self.uncertainty, residuals, values)
 
     @property
     def why(self) -> str:
@@ -453,13 +457,9 @@ def _within_errors(of_given: Mapping[str, FittedParameter]) -> dict[str, float]:
     return {name: each.start for name, each in of_given.items() if each.as_given}
 
 
-def _refined_notes(refined: Values, twice: bool) -> Iterator[str]:
+def _refined_notes(refined: Values) -> Iterator[str]:
     if refined:
         yield f"moved within their errors, as is likeliest: {first_of([*refined])}"
-    if twice:
-        from exfit.results.intervals.misfit import COUNTED_TWICE
-
-        yield COUNTED_TWICE
 
 
 def _iterations(

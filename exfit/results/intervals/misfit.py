@@ -1,16 +1,39 @@
-"""Intervals where more than noise is left of an event with all given values fitted."""
+"""Intervals of an event with all given values fitted of which the model shows not all.
 
-from collections.abc import Mapping
+That is where more than noise is left, or where limits act: the filter of a recorder blurs what
+drives them, and parameters take that up.
+"""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.results.influences import first_of
 from exfit.results.intervals.value_errors import ErrorsOfValues
+from exfit.simulation.limits import extremes
 
 NOT_NOISE = 2.0  # times the errors, as measured
-COUNTED_TWICE = "more than noise is left with all values fitted: errors and intervals count twice"
+ACTING = 0.999  # of a limit: what comes so far is held by it
+
+
+def why_counted_twice(
+    setups: Sequence[ExperimentSetup], values: Mapping[str, float], explained: bool
+) -> str:
+    """Return why errors and intervals count twice, "" where they do not."""
+    acting = dict.fromkeys(
+        each.limit
+        for setup in setups
+        for each in extremes(*setup.experiment.at(values))
+        if each.share >= ACTING
+    )
+    if explained and not acting:
+        return ""
+    why = f"{first_of([*acting])} limits the response" if explained else "more than noise is left"
+    return f"{why} with all values fitted: errors and intervals count twice"
 
 
 def counted_twice(errors: ErrorsOfValues) -> ErrorsOfValues:
@@ -26,11 +49,7 @@ def counted_twice(errors: ErrorsOfValues) -> ErrorsOfValues:
 def allowing_for_misfit(
     uncertainty: UncertaintyAnalysis, residuals: Residuals, values: Mapping[str, float]
 ) -> UncertaintyAnalysis:
-    """Return the uncertainty of an event of which more than noise is left with all values fitted.
-
-    What the model lacks moves as many parameters as far as it can: errors and the sides of the
-    intervals about the fitted ``values`` count twice, which is how far they were off.
-    """
+    """Return the uncertainty with errors, and sides of intervals about the ``values``, twice."""
     parameters = {**uncertainty.confidence.parameters}
     for free in residuals.free:
         own, at = parameters[free.name], values[free.name]
