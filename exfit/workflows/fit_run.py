@@ -128,9 +128,9 @@ def fit_result(
     )
     verdict = verdict_of(evidence)
     if given:
-        analysis.allow_for_misfit(residuals, values, fine, verdict.explained)
-    uncertainty = analysis.uncertainty
-    uncertainty = analysis.uncertainty = _holding_causes(uncertainty, residuals, values, verdict)
+        analysis.allow_for_misfit(residuals, values, verdict.explained)
+    uncertainty = _holding_causes(analysis.uncertainty, residuals, values, verdict)
+    analysis.uncertainty = uncertainty
     noted = _minima_notes(state, minima, uncertainty)
     if uncertainty is not None and verdict.no_interval:
         uncertainty = analysis.uncertainty = uncertainty.without_intervals(verdict.no_interval)
@@ -258,17 +258,16 @@ class Analysis:
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
     errors: ErrorsOfValues | None = None
+    acting: tuple[str, ...] = ()
     twice: str = ""
 
-    def allow_for_misfit(
-        self, residuals: Residuals, values: Values, setups: Sequence[ExperimentSetup], noise: bool
-    ) -> None:
-        """Allow for what the model does not show of an event, where ``noise`` or more is left."""
+    def allow_for_misfit(self, residuals: Residuals, values: Values, explained: bool) -> None:
+        """Allow for what the model does not show of an event with all given values fitted."""
         if self.uncertainty is None or self.errors is None:
             return
         from exfit.results.intervals import misfit
 
-        self.twice = misfit.why_counted_twice(setups, values, noise)
+        self.twice = misfit.why_counted_twice(self.acting, explained)
         if self.twice:
             self.errors = misfit.counted_twice(self.errors)
             self.uncertainty = misfit.allowing_for_misfit(self.uncertainty, residuals, values)
@@ -366,6 +365,10 @@ def _analysed(
             noises = uncertainty.confidence.noise
             errors = errors_of_values(case, problem, best.x, noises, fine, state.refined)
             analysis.errors = errors
+            if state.refined.given:
+                from exfit.results.intervals.misfit import acting_limits
+
+                analysis.acting = acting_limits(fine, values)
             if case.kind.plays_back and not case.kind.has_exciter:
                 from exfit.results.intervals.windows import spread_over_windows, with_spread
 

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from exfit.errors import SimulationError
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
 from exfit.fitting.global_search import (
     METHODS_OF_AUTO,
     NO_JUDGE,
     FurtherDescents,
     Judge,
+    extended,
     global_search,
     judged_again,
     local_search,
@@ -338,3 +340,17 @@ def test_an_interruption_of_the_last_judgement_keeps_the_lowest_of_all():
     found, _ = judged(Scripted(end(4.0), end(3.0), more=[end(1.0)]), interrupted)
     assert (found.best.stop, found.best.cost) == (Stop.INTERRUPTED, 1.0)
     assert found.minima.interrupted
+
+
+def test_a_minimum_without_a_response_among_other_parameters_is_left_out():
+    class Restless(Scripted):
+        def refined(self, result, announce):
+            if result.cost == 3.0:
+                raise SimulationError("no state of rest")
+            return super().refined(result, announce)
+
+    found, _ = searched(Restless(end(1.0), more=[end(2.0), end(3.0)]))
+    assert [minimum.cost for minimum in found.minima.minima] == [1.0, 2.0, 3.0]
+    wider = extended(Restless(), found, lambda x: x, lambda _: None, "given")
+    assert [minimum.cost for minimum in wider.minima.minima] == [1.0, 2.0]
+    assert wider.best.cost == 1.0

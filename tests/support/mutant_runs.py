@@ -147,7 +147,7 @@ def of_case(case: str, number: int, to: tuple[str, ...]) -> Iterator[tuple[str, 
         case 2:
             yield ("profile", case, *to)
         case 3:
-            yield ("rank", case, "--models", "SEXS", "--search", "local", *to)
+            yield ("rank", case, "--models", "FIRST_ORDER,SEXS", "--search", "local", *to)
         case 4:
             yield ("simulate", case, *to)
             yield ("check", case)

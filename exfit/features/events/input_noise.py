@@ -34,7 +34,7 @@ from exfit.fitting.global_search import SearchResult
 from exfit.fitting.noise import LEAST_NOISE
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
-from exfit.inference.whitening import ROWS_BEFORE, PropagatedNoise, whitening
+from exfit.inference.whitening import ROWS_BEFORE, PropagatedNoise, Whitening, whitening
 from exfit.plants import NETWORK, VT0
 from exfit.plants.parts import initial
 from exfit.records.record import Record
@@ -450,18 +450,15 @@ def without_bias(
     values, moves = residuals.values(theta), residuals.moves(theta)
     gradient, jacobians, experiments = np.zeros(len(theta)), [], []
     for whole, setup in zip(residuals.experiments, setups, strict=True):
-        recorded = as_recorded(whole)
-        if recorded.whitening is not None:
-            unshifted = recorded.whitening._replace(shift=np.zeros(sum(recorded.sizes)))
-            recorded = replace(recorded, whitening=unshifted)
+        assert whole.whitening is not None
+        unshifted = whole.whitening._replace(shift=np.zeros(sum(whole.sizes)))
+        recorded = replace(as_recorded(whole), whitening=unshifted)
         errors, slopes = recorded.tangents(values, moves)
-        smooth = without_likely_noise(recorded, setup, values, errors)
+        smooth = without_likely_noise(recorded, unshifted, setup, values, errors)
         other, own = smooth.tangents(values, moves)
         gradient += (slopes - own).T @ errors
         jacobians.append(own)
-        if smooth.whitening is not None:
-            smooth = replace(smooth, whitening=smooth.whitening._replace(shift=other - errors))
-        experiments.append(smooth)
+        experiments.append(replace(smooth, whitening=unshifted._replace(shift=other - errors)))
     jacobian = np.concatenate(jacobians)
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     seen = singular > UNSEEN * np.max(singular, initial=0.0)
@@ -469,8 +466,8 @@ def without_bias(
     bias = -roots @ (roots.T @ gradient)
     added = np.split(-jacobian @ bias, np.cumsum([sum(e.sizes) for e in residuals.experiments]))
     experiments = [
-        replace(experiment, whitening=experiment.whitening._replace(bias=own))
-        for experiment, own in zip(experiments, added, strict=False)
+        replace(experiment, whitening=experiment.whitening._replace(bias=each))
+        for experiment, each in zip(experiments, added, strict=False)
         if experiment.whitening is not None
     ]
     scale = next(e.whitening.scale for e in experiments if e.whitening is not None)
@@ -481,16 +478,18 @@ def without_bias(
 
 
 def without_likely_noise(
-    experiment: Experiment, setup: ExperimentSetup, values: Values, errors: Array
+    experiment: Experiment,
+    white: Whitening,
+    setup: ExperimentSetup,
+    values: Values,
+    errors: Array,
 ) -> Experiment:
     """Return an experiment driven by recorded signals less what white errors (M,) say is noise.
 
     As in the record, noise at rest moves the level that the simulation starts at.
     """
-    if experiment.whitening is None:
-        return experiment
     recorded = experiment.simulator.inputs.recorded
-    white, carried = experiment.whitening, propagated_noise(setup, values).carried
+    carried = propagated_noise(setup, values).carried
     likely = white.slopes(carried).T @ errors / white.scale**2  # in standard deviations
     noise, first = dict[str, Array](), 0
     for signal, deviation in noise_of_inputs(experiment.simulator).items():

@@ -188,12 +188,6 @@ def holding(
     """
     parameters = {**uncertainty.confidence.parameters}
 
-    def moved(free: FreeParameter, limit: float | None, shift: float) -> float | None:
-        if limit is None:
-            return None
-        bounds = free.scaled(free.low), free.scaled(free.high)
-        return free.value(float(np.clip(free.scaled(limit) + shift, *bounds)))
-
     for free in residuals.free:
         own = parameters[free.name]
         if own.interval is not None and free.name in others:
@@ -205,3 +199,11 @@ def holding(
                 interval=interval, method=method, by_noise=by_noise
             )
     return uncertainty.with_parameters(parameters)
+
+
+def moved(free: FreeParameter, limit: float | None, shift: float) -> float | None:
+    """Return an end of an interval by a shift of its scaled value, within the bounds."""
+    if limit is None:
+        return None
+    bounds = free.scaled(free.low), free.scaled(free.high)
+    return free.value(float(np.clip(free.scaled(limit) + shift, *bounds)))

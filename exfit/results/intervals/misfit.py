@@ -6,13 +6,12 @@ drives them, and parameters take that up.
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from exfit.fitting.experiment import ExperimentSetup
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.influences import first_of
+from exfit.results.intervals.averages import moved
 from exfit.results.intervals.value_errors import ErrorsOfValues
 from exfit.simulation.limits import extremes
 
@@ -20,16 +19,16 @@ NOT_NOISE = 2.0  # times the errors, as measured
 ACTING = 0.999  # of a limit: what comes so far is held by it
 
 
-def why_counted_twice(
-    setups: Sequence[ExperimentSetup], values: Mapping[str, float], explained: bool
-) -> str:
+def acting_limits(
+    setups: Sequence[ExperimentSetup], values: Mapping[str, float]
+) -> tuple[str, ...]:
+    """Return the limits that hold the responses at the values."""
+    reached = (each for setup in setups for each in extremes(*setup.experiment.at(values)))
+    return tuple(dict.fromkeys(each.limit for each in reached if each.share >= ACTING))
+
+
+def why_counted_twice(acting: Sequence[str], explained: bool) -> str:
     """Return why errors and intervals count twice, "" where they do not."""
-    acting = dict.fromkeys(
-        each.limit
-        for setup in setups
-        for each in extremes(*setup.experiment.at(values))
-        if each.share >= ACTING
-    )
     if explained and not acting:
         return ""
     why = f"{first_of([*acting])} limits the response" if explained else "more than noise is left"
@@ -66,5 +65,4 @@ def allowing_for_misfit(
 def _farther(free: FreeParameter, value: float, limit: float | None) -> float | None:
     if limit is None:
         return None
-    at, bounds = free.scaled(value), (free.scaled(free.low), free.scaled(free.high))
-    return free.value(float(np.clip(at + NOT_NOISE * (free.scaled(limit) - at), *bounds)))
+    return moved(free, limit, (NOT_NOISE - 1.0) * (free.scaled(limit) - free.scaled(value)))

@@ -26,6 +26,9 @@ from exfit.features.events.input_noise import (
 )
 from exfit.fitting import descents
 from exfit.fitting.build import build_experiments
+from exfit.fitting.channel_weights import as_fitted
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.search import fitted as fitted_of
 from exfit.results.intervals import value_errors
 from exfit.results.intervals.value_errors import Refinement
 from exfit.results.verdict import GOOD, MATCHES
@@ -350,6 +353,21 @@ def test_a_given_value_is_contradicted_where_it_is_wrong_and_not_by_what_drives(
     assert not right.causes
     assert wrong.verdict == MATCHES
     assert wrong.reason.startswith("the record contradicts machine.")
+
+
+def test_errors_are_those_as_recorded_and_only_their_derivatives_without_noise(folder, event):
+    """At the point where noise was told from them; a test is shown as it was recorded."""
+    setups, problem = fitted_of(load_case(event_case(folder, "event")))
+    residuals, theta = problem.residuals, problem.residuals.start
+    white = input_noise.whitened(residuals, setups, theta)
+    unbiased, bias = input_noise.without_bias(white, setups, theta)
+    (errors, noisy), (same, slopes) = white.errors(theta), unbiased.errors(theta)
+    np.testing.assert_allclose(same, errors, rtol=0.0, atol=1e-9 * np.max(np.abs(errors)))
+    assert np.max(np.abs(slopes - noisy)) > 1e-6 * np.max(np.abs(noisy))
+    assert np.max(np.abs(bias)) > 0.0
+    (shown,) = as_fitted(setups, FitProblem(unbiased, unbiased))
+    recorded = setups[0].experiment.samples(residuals.values(theta))[0]
+    np.testing.assert_array_equal(shown.experiment.samples(residuals.values(theta))[0], recorded)
 
 
 def test_ctrl_c_as_the_weighing_begins_keeps_the_search():
