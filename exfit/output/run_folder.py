@@ -166,7 +166,7 @@ def figures_of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> Pla
 
 
 def figures_of_comparisons(comparisons: "Iterable[Comparison]") -> PlannedFigures:
-    """Return the overlay of each comparison under its name."""
+    """Return the overlay of each comparison that has a response, under its name."""
     from exfit.output import figures as plots
 
     return {
@@ -175,6 +175,7 @@ def figures_of_comparisons(comparisons: "Iterable[Comparison]") -> PlannedFigure
             partial(plots.overlay, match, f"{match.name}: simulated and {match.record}"),
         )
         for match in comparisons
+        if match.overlays
     }
 
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
-from exfit.fitting.experiment import Channel
+from exfit.fitting.experiment import Channel, ExperimentSetup
 from exfit.fitting.noise import noise_of, noise_shape
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import Comparison, Match, StepFeatures
 
 MUCH_WORSE = 3.0  # times the error of the fit, or the noise of the record where that is larger
 
@@ -43,6 +44,24 @@ def judged(
     reason = "; ".join(filter(None, reasons))
     limit = limits[validation.judging[0]]
     return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
+
+
+def without_response(setup: ExperimentSetup, why: str) -> Comparison:
+    """Return a validation that the values have no response to, not accepted, for the reason given.
+
+    Values that one record was fitted with need not have a state of rest in another.
+    """
+    return Comparison(
+        name=setup.name,
+        record=setup.record.source.name,
+        cost=nan,
+        accepted=False,
+        channels={channel.signal: Match(nan, nan, nan) for channel in setup.channels},
+        features=StepFeatures(None, None),
+        reason=why,
+        validation=True,
+        sha256=setup.record.sha256,
+    )
 
 
 def _error_of_fit(signal: str, fitted: Sequence[Comparison]) -> float | None:

@@ -258,9 +258,9 @@ class Comparison:
 
     ``record`` is the name of its file, ``cost`` that of the weighted residuals of all signals.
     ``channels`` says how well each signal matches, ``overlays`` holds its samples at ``time`` (M,)
-    in s: of a result that is read back they are thinned, and missing in files of an earlier
-    version. ``played`` says what of the record drove the simulation, where it did in place of a
-    plant. ``criteria`` are those that it was judged by, ``reason`` says why it is not accepted.
+    in s: of a result that is read back they are thinned, and without a response there are none.
+    ``played`` says what of the record drove the simulation, where it did in place of a plant.
+    ``criteria`` are those that it was judged by, ``reason`` says why it is not accepted.
     ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse (pu)
     that is accepted without criteria of the case, and ``of_record`` what was found about the record
     itself; ``steps`` are those of a record that was given by hand, ``notes`` what must be known of
@@ -277,7 +277,7 @@ class Comparison:
 
     name: str
     record: str
-    cost: float
+    cost: Annotated[float, nan]
     accepted: bool
     channels: Mapping[str, Match]
     features: StepFeatures

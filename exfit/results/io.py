@@ -61,9 +61,10 @@ def files_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
 
 
 def comparison_files(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, str]]:
-    """Yield the samples of each comparison under its name."""
+    """Yield the samples of each comparison that has some, under its name."""
     for match in comparisons:
-        yield f"{match.name}.csv", comparison_table(match)
+        if match.overlays:
+            yield f"{match.name}.csv", comparison_table(match)
 
 
 def result_text(result: FitResult) -> str:

@@ -58,13 +58,12 @@ from exfit.workflows.case_search import STAGES
 from exfit.workflows.given_values import given_value_notes, given_values
 from exfit.workflows.responses import (
     LiveResponse,
-    aligned,
     as_found_of,
     behaviour_of,
+    judged_on,
     live_response,
     phase_ends,
     skipped_response_notes,
-    validation_of,
     with_iteration_responses,
 )
 from exfit.workflows.search_state import SearchState, in_turn
@@ -352,12 +351,13 @@ def _analysed(
     analysis = Analysis(uncertainty, interrupted, unfinished)
     try:
         analysis.phase_ends.extend(phase_ends(case, fine, problem.residuals, history, fitted))
-        validated = [aligned(case, setup, values) for setup in state.unseen]
-        analysis.validation = [validation_of(case, fitted, *pair) for pair in validated]
+        unseen = [judged_on(case, fitted, setup, values) for setup in state.unseen]
+        analysis.validation = [match for _, match in unseen]
         tests = [(setup, values) for setup in fine]
         if not case.has_no_equations:
-            analysis.behaviour = behaviour_of(tests, validated)
-        every = [*tests, *validated], [*fitted, *analysis.validation]
+            others = [test for test, match in unseen if match.overlays]
+            analysis.behaviour = behaviour_of(tests, others)
+        every = [*tests, *(test for test, _ in unseen)], [*fitted, *analysis.validation]
         analysis.as_found = as_found_of(case, *every, state.program)
         if uncertainty is not None:
             at = problem, best.x, names_of_records(fine)

@@ -24,7 +24,7 @@ from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.fitting.system import values_of
 from exfit.models import find
 from exfit.registry import parts
-from exfit.results.acceptance import judged
+from exfit.results.acceptance import judged, without_response
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import (
     AsFound,
@@ -104,6 +104,22 @@ def validation_of(
     driven = comparison.is_event and comparison.judged.describes
     by_noise = parts("INPUT_NOISE")["errors by noise"].load()(setup, values) if driven else None
     return judged(comparison, fitted, setup.channels, by_noise)
+
+
+def judged_on(
+    case: Case, fitted: Sequence[Comparison], setup: ExperimentSetup, values: Values
+) -> tuple[TestWithValues, Comparison]:
+    """Align a test that was not fitted, and judge the values on it by the ``fitted`` ones.
+
+    One that they have no response to, as one without a state of rest, is not accepted. Raises
+    KeyboardInterrupt at an interruption.
+    """
+    try:
+        test = aligned(case, setup, values)
+        return test, validation_of(case, fitted, *test)
+    except SimulationError as fault:
+        why = str(fault).removeprefix(f"{case.path}: ")
+        return (setup, setup.with_start_values(values)), without_response(setup, why)
 
 
 class LiveResponse(NamedTuple):

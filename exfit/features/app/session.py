@@ -554,7 +554,9 @@ def _judged(match: Comparison) -> Content:
         "validation": match.validation,
         "accepted": match.accepted,
         "reason": match.reason,
-        "match": f"rmse {match.rmse:.3g} pu, fit {match.fit_percent:.4g} %",
+        "match": f"rmse {match.rmse:.3g} pu, fit {match.fit_percent:.4g} %"
+        if match.overlays
+        else "no response",
     }
 
 

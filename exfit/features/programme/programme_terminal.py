@@ -46,5 +46,6 @@ class ProgrammeProgress(RunLines):
             for match in (*result.comparisons, *result.validation):
                 judged = "validated" if match.validation else "fitted"
                 word = judged if match.accepted else "not accepted"
-                cells = (f"  {match.name}", "", f"{word}, {percentage(match.fit_percent)} %", "")
+                fit = f", {percentage(match.fit_percent)} %" if match.overlays else ""
+                cells = (f"  {match.name}", "", f"{word}{fit}", "")
                 self.line(cells, "" if match.accepted else "yellow")

@@ -136,7 +136,18 @@ def _names(own: str, given: Sequence[str]) -> Sequence[str]:
 
 
 def ranking_of(case: Case, series: FitSeries) -> Ranking:
-    """Return the ranking of a series of fits of one case, a model each."""
+    """Return the ranking of a series of fits of one case, a model each.
+
+    One whose fit has no response to a record that was not fitted has failed.
+    """
+    silent = {
+        run.name: match.reason
+        for run in series.runs
+        for match in run.result.validation
+        if not match.overlays
+    }
+    runs = tuple(run for run in series.runs if run.name not in silent)
+    series = replace(series, runs=runs, failed={**series.failed, **silent})
     typical = tuple(name for name in typical_values_used(case) if name.startswith(MACHINE))
     models = ranked(series.results, typical)
     return Ranking(case.path.stem, models, tuple(ranking_sentences(models)), series)

@@ -169,7 +169,8 @@ def headline(result: Reported) -> Headline:
         if reasons:
             word, good = "not accepted", False
         explained = [f"simulated with {result.origin}", *reasons]
-    errors = _rmse((*result.comparisons, *result.validation))
+    every = (*result.comparisons, *result.validation)
+    errors = _rmse(match for match in every if match.overlays)
     sentence = "; ".join([*explained, *_validated(result), errors])
     return Headline(
         word=f"{word[:1].upper()}{word[1:]}",
