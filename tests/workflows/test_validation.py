@@ -6,11 +6,13 @@ from itertools import product
 import numpy as np
 import pytest
 import yaml
+from click.testing import CliRunner
 from places import CONFIGS, ROOT
-from records import SAMPLES, config
+from records import SAMPLES, config, write
 from records import case_of as case_in
 from tiers import few_of
 
+from exfit import cli, rank
 from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.case.schema import ChannelSection, StepSection
@@ -297,3 +299,43 @@ def test_a_case_that_has_only_records_under_validate_is_validated_with_given_val
         fit(case)
     with pytest.raises(CaseError, match=r"test\.duration: missing; there is no record"):
         simulate(case)
+
+
+def test_a_fit_is_kept_whose_values_have_no_state_of_rest_in_another_record(tmp_path):
+    """With the start's KD the unit rests at 1.2 pu, with that of the record it passes VRMAX."""
+    time, truth = np.arange(0.0, 6.0, 0.02), TRUTH["ac1a_typical"]
+    channel = {"time": "t", "channels": {"vt": "vt"}}
+    content = config("ac1a_typical") | {
+        "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.005}]},
+        "record": {"file": "up.csv", **channel},
+        "validate": [{
+            "name": "high",
+            "test": {"vt0": 1.2, "vref": [{"at": 1.0, "step": 0.005}]},
+            "record": {"file": "high.csv", **channel},
+        }],
+    }  # fmt: skip
+    fixed = content["parameters"]["fixed"] | truth | {"VRMAX": 2.5}
+    del fixed["KD"]
+    free = {"KD": {"start": 0.02, "min": 0.01, "max": 1.0}}
+    content["parameters"] = {"fixed": fixed, "free": free}
+    write(tmp_path / "up.csv", t=time, vt=np.ones(len(time)))
+    write(tmp_path / "high.csv", t=time, vt=np.where(time < 1.0, 1.2, 1.205))
+    case = case_in(content, tmp_path)
+    vt = simulate(case, {"KD": truth["KD"]}).comparison.overlays["vt"].simulated
+    noise = np.random.default_rng(1).normal(0.0, 1e-5, len(time))
+    write(tmp_path / "up.csv", t=time, vt=vt + noise)
+    result = fit(case)
+    parameter, (unseen,) = result.parameters["KD"], result.validation
+    assert parameter.interval[0] < truth["KD"] < parameter.interval[1]
+    assert not unseen.accepted
+    assert "no state of rest at vt0 = 1.2 pu: the start needs 2.8" in unseen.reason
+    assert unseen.reason.endswith("above VRMAX = 2.5")
+    assert result.verdict.verdict == "matches, not all determined"
+    assert "high is not accepted" in result.verdict.reason
+    for words in (["fit", case.path, "-o", tmp_path / "run"], ["report", tmp_path / "run"]):
+        done = CliRunner().invoke(cli.main, [*map(str, words)])
+        assert "Warning" not in done.output
+        assert done.exception is None or isinstance(done.exception, SystemExit)
+    assert (tmp_path / "run" / "report.html").exists()
+    ranking = rank(case, ["AC1A"])
+    assert "no state of rest" in ranking.series.failed["AC1A"]
