@@ -1,4 +1,4 @@
-"""Time a fit of AC1A to a record of two million rows, as a whole process with all its figures.
+"""Time a fit of AC1A to a record of a million rows, as a whole process with all its figures.
 
 Run it as ``python tests/benchmarks/long_record.py [ROWS]``. Beside it stands what NumPy takes for
 reading the same file alone.
@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 ROOT = Path(__file__).parents[2]
-ROWS = 2_000_000
+ROWS = 1_000_000
 REPEATS = 3
 NOISE = 1e-4  # pu
 TRUTH = ROOT / "tests" / "reference" / "reference_ac1a.csv"
