@@ -43,7 +43,7 @@ def noise(samples: Array, order: int = 2) -> float:
 
 def spread(values: Array, axis: int = -1) -> Array:
     """Return the median absolute deviation along an axis, scaled to the normal law's spread."""
-    away = np.abs(values - median(values, axis=axis, keepdims=True))
+    away = np.abs(values - median(values, axis=axis, keepdims=values.ndim > 1))
     return np.asarray(median(away, axis=axis) / MEDIAN_DEVIATION)
 
 
