@@ -1,10 +1,13 @@
 """Sets of grid events of one unit whose data are known: exciter, stabiliser, governor, machine."""
 
+from dataclasses import replace
+
 import numpy as np
 import yaml
 
 from exfit.case.load import load_case
-from exfit.workflows import simulate
+from exfit.fitting.build import plain_simulator
+from exfit.simulation.inputs import SplinedInput
 
 MACHINE = {
     "Tpd0": 6.27, "Tppd0": 0.059, "Tpq0": 0.7, "Tppq0": 0.096, "H": 4.471, "D": 0.0, "Xd": 2.014,
@@ -35,13 +38,6 @@ def angle_at(time, size, swing, damping, fall, recovery):
     return angle + begun * size * np.exp(-damping * after) * np.sin(2.0 * np.pi * swing * after)
 
 
-def frequency_course(seconds, *course):
-    """Return instants (s) of a table of a grid's angle, and the angle there (degrees)."""
-    fine = np.arange(REST, min(REST + 12.0, seconds), 1.0 / 60.0)
-    time = np.concatenate([[0.0], fine, np.arange(fine[-1] + 0.2, seconds, 0.2), [seconds]])
-    return time, angle_at(time, *course)
-
-
 COURSES = (
     (20.0, 0.9, 0.25, 0.03, 0.8),
     (-25.0, 1.3, 0.35, 0.015, 0.6),
@@ -54,8 +50,6 @@ def recorded(folder, exciter="EXST1", noise=2e-4, seed=1, lengths=LENGTHS):
     rng = np.random.default_rng(seed)
     events = zip(OPERATING, lengths, COURSES, strict=False)
     for number, ((p0, q0), length, course) in enumerate(events, 1):
-        time, angle = frequency_course(length, *course)
-        rows = [[float(t), float(a)] for t, a in zip(time, angle, strict=True)]
         content = {
             "model": exciter,
             "given": "exact",
@@ -64,18 +58,24 @@ def recorded(folder, exciter="EXST1", noise=2e-4, seed=1, lengths=LENGTHS):
             "stabiliser": {"model": "PSS2B", "parameters": STABILISER},
             "governor": {"model": "GGOV1", "parameters": GOVERNOR},
             "test": {"vt0": 1.01, "duration": length,
-                     "angle": {"table": rows, "unit": "deg"}},
+                     "angle": [{"at": REST, "step": 1.0, "unit": "deg"}]},
             "parameters": {"fixed": EXCITERS[exciter]},
             "simulation": {"output_step": 1.0 / 240.0, "step": 1.0 / 960.0},
         }  # fmt: skip
         file = folder / f"truth{number}.yaml"
         file.write_text(yaml.safe_dump(content))
-        response = simulate(load_case(file), {}).response
+        case = load_case(file)
+        values = case.values()
+        simulator, levels = plain_simulator(case, values)
+        moved = np.radians(angle_at(simulator.times, *course))  # smooth, as no table of it is
+        inputs = {"angle": SplinedInput(simulator.times, moved)}
+        simulator = simulator.remade(inputs=replace(simulator.inputs, steps=(), recorded=inputs))
+        response = simulator.response({**values, **levels})
         keep = slice(None, None, round(240.0 / RATE))
         at = response.time[keep]
         vt, p, q = (response.signals[name][keep] for name in ("vt", "p", "q"))
         source = vt - (LINE["R"] + 1j * LINE["X"]) * (p - 1j * q) / vt
-        phase = np.radians(np.interp(at, time, angle)) - np.angle(source)
+        phase = moved[keep] - np.angle(source)
         columns = [at, vt, np.unwrap(phase), p, q]
         for column in (1, 3, 4):
             columns[column] = columns[column] + noise * rng.standard_normal(len(at))
