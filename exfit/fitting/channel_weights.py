@@ -121,8 +121,13 @@ def as_fitted(
 
 def as_recorded(experiment: Experiment) -> Experiment:
     """Return an experiment that recorded signals drive as they are, with their noise."""
-    simulator, own = experiment.recorded or (experiment.simulator, experiment.own)
-    return replace(experiment, simulator=simulator, own=own, recorded=None)
+    if experiment.recorded is None:
+        return experiment
+    simulator, own = experiment.recorded
+    white = experiment.whitening
+    if white is not None:  # its errors were shifted to those of the signals as recorded
+        white = white._replace(shift=np.zeros_like(white.shift))
+    return replace(experiment, simulator=simulator, own=own, recorded=None, whitening=white)
 
 
 def weighted_alike(

@@ -450,15 +450,15 @@ def without_bias(
     values, moves = residuals.values(theta), residuals.moves(theta)
     gradient, jacobians, experiments = np.zeros(len(theta)), [], []
     for whole, setup in zip(residuals.experiments, setups, strict=True):
-        assert whole.whitening is not None
-        unshifted = whole.whitening._replace(shift=np.zeros(sum(whole.sizes)))
-        recorded = replace(as_recorded(whole), whitening=unshifted)
+        recorded = as_recorded(whole)
+        white = recorded.whitening
+        assert white is not None
         errors, slopes = recorded.tangents(values, moves)
-        smooth = without_likely_noise(recorded, unshifted, setup, values, errors)
+        smooth = without_likely_noise(recorded, white, setup, values, errors)
         other, own = smooth.tangents(values, moves)
         gradient += (slopes - own).T @ errors
         jacobians.append(own)
-        experiments.append(replace(smooth, whitening=unshifted._replace(shift=other - errors)))
+        experiments.append(replace(smooth, whitening=white._replace(shift=other - errors)))
     jacobian = np.concatenate(jacobians)
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     seen = singular > UNSEEN * np.max(singular, initial=0.0)
@@ -491,6 +491,7 @@ def without_likely_noise(
     recorded = experiment.simulator.inputs.recorded
     carried = propagated_noise(setup, values).carried
     likely = white.slopes(carried).T @ errors / white.scale**2  # in standard deviations
+    likely /= max(float(np.sqrt(np.mean(likely**2))), 1.0)  # more is no noise: a misfit
     noise, first = dict[str, Array](), 0
     for signal, deviation in noise_of_inputs(experiment.simulator).items():
         count = len(recorded[signal].samples)

@@ -368,6 +368,24 @@ def test_errors_are_those_as_recorded_and_only_their_derivatives_without_noise(f
     (shown,) = as_fitted(setups, FitProblem(unbiased, unbiased))
     recorded = setups[0].experiment.samples(residuals.values(theta))[0]
     np.testing.assert_array_equal(shown.experiment.samples(residuals.values(theta))[0], recorded)
+    as_shown = shown.experiment.errors(residuals.values(theta))[0]
+    np.testing.assert_allclose(as_shown, errors, rtol=0.0, atol=1e-9 * np.max(np.abs(errors)))
+
+
+def test_a_misfit_is_not_taken_for_noise_of_what_drives(folder, event):
+    """Errors of a hundred times their noise would say that vt was of tens of pu."""
+    setups, problem = fitted_of(load_case(event_case(folder, "event")))
+    residuals, theta = problem.residuals, problem.residuals.start
+    white = input_noise.whitened(residuals, setups, theta)
+    ((experiment,), (setup,)) = white.experiments, setups
+    values = residuals.values(theta)
+    errors = 1e5 * experiment.errors(values)[0]
+    moved = input_noise.without_likely_noise(
+        experiment, experiment.whitening, setup, values, errors
+    )
+    for signal, deviation in noise_of_inputs(experiment.simulator).items():
+        signals = (each.simulator.inputs.recorded[signal].samples for each in (moved, experiment))
+        assert np.max(np.abs(np.subtract(*signals))) < 50.0 * deviation
 
 
 def test_ctrl_c_as_the_weighing_begins_keeps_the_search():
