@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from exfit.engine.located_runs import LocatedCourse, LocatedSegment
 from exfit.simulation.inputs import Direction, Inputs, InputStep, RecordedInput, SplinedInput
 from exfit.simulation.interpolation import ON_GRID, GridSegment
-from exfit.util.arrays import Array, median_step
+from exfit.util.arrays import Array, distinct, median_step
 
 DENSEST = 1e-3  # s: a recorded input with closer samples is averaged over steps as long
 SAME = 1e-9  # of a step
@@ -63,10 +63,11 @@ class LocatedTest:
                 length = min(length, DENSEST)
                 continue
             inside = recorded.time[(recorded.time > start) & (recorded.time < end)]
-            points = np.union1d(points, inside)
+            points = distinct(np.append(points, inside))
         if start > self.inputs.start:
             # a jump moves what is fast, which has come to rest after some steps
-            points = np.union1d(points, [t for t in start + length * AFTER_JUMP if t < end])
+            fine = start + length * AFTER_JUMP
+            points = distinct(np.append(points, fine[fine < end]))
         lengths = np.diff(points)
         counts = np.maximum(np.ceil(lengths / length - ON_GRID), 1.0).astype(int)
         parts = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -108,11 +109,14 @@ class LocatedTest:
         wanted = times - delay
         read = np.clip(wanted, self.bounds[0], self.bounds[-1])
         near = ON_GRID * self.step if delay == 0.0 else 0.0
-        owner = np.searchsorted(self.bounds[1:-1], read - near, side="left")
+        inside = self.bounds[1:-1]
+        owner = np.searchsorted(inside, read - near, side="left")
         if len(read) > 1:
             again = np.flatnonzero(np.diff(read) == 0.0) + 1
-            again = again[(wanted[again] == read[again]) & np.isin(read[again], self.bounds[1:-1])]
-            owner[again] = np.searchsorted(self.bounds[1:-1], read[again], side="right")
+            again = again[wanted[again] == read[again]]
+            behind = np.searchsorted(inside, read[again], side="right")
+            jumped = behind > np.searchsorted(inside, read[again], side="left")
+            owner[again[jumped]] = behind[jumped]
         firsts = np.searchsorted(owner, np.arange(len(self.grids) + 1))
         positions = []
         for grid, first, last in zip(self.grids, firsts[:-1], firsts[1:], strict=True):
