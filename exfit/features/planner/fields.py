@@ -24,6 +24,19 @@ class DynamicsFault(NamedTuple):
     text: str
 
 
+class UnreadRecord(DynamicsFault):
+    """The fault of a record that cannot be read, of a ``bus``; 0 where its line is no record."""
+
+    bus = 0
+
+    @classmethod
+    def at(cls, line: int, text: str, bus: int) -> "UnreadRecord":
+        """Return the fault of a record at a bus."""
+        fault = cls(line, text)
+        fault.bus = bus
+        return fault
+
+
 class Field(NamedTuple):
     """One field: its text without quotes and blanks around it, its line, and where it stands.
 

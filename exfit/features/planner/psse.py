@@ -2,12 +2,13 @@
 
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from exfit.case.case_draft import in_comment
 from exfit.features.planner.buses import NO_BUSES, Buses, numbers_of
-from exfit.features.planner.fields import DynamicsFault, Field, lines_of
+from exfit.features.planner.fields import DynamicsFault, Field, UnreadRecord, lines_of
 from exfit.features.planner.records import (
     PSSE,
     WIDTH,
@@ -70,19 +71,30 @@ def sound_records(text: str) -> FileRecords:
             continue
         if open_ and HEAD.match(line):
             fault = f"{ENDLESS} before the next one on line {number}"
-            faults.append(DynamicsFault(open_[0].line, fault))
+            faults.append(_unread(open_[0].line, fault, open_))
             open_, unclosed = (), False
         read = read_line(line, number, start, after_comma)
-        if read.unclosed:
-            faults.append(DynamicsFault(number, "a quote is opened and not closed on the line"))
         open_, unclosed = open_ + read.fields, unclosed or read.unclosed
+        if read.unclosed:
+            fault = "a quote is opened and not closed on the line"
+            faults.append(_unread(number, fault, open_))
         after_comma = read.after_comma
         if read.ended:
             records += [Fields(open_[0].line, open_)] if open_ and not unclosed else []
             open_, after_comma, unclosed = (), True, False
     if open_:
-        faults.append(DynamicsFault(open_[0].line, f"{ENDLESS} before the end of the file"))
+        fault = f"{ENDLESS} before the end of the file"
+        faults.append(_unread(open_[0].line, fault, open_))
     return FileRecords(records, faults)
+
+
+def _unread(line: int, text: str, fields: Sequence[Field]) -> DynamicsFault:
+    """Return the fault of a record: of its bus, of none, or of any if that cannot be read."""
+    first = fields[0] if fields else Field("", line, quoted=True)
+    if first.text.isdecimal():
+        return UnreadRecord.at(line, text, int(first.text))
+    may_be = first.quoted or first.text[:1].isdecimal()
+    return DynamicsFault(line, text) if may_be else UnreadRecord.at(line, text, 0)
 
 
 def read_line(line: str, number: int, start: int, after_comma: bool) -> _Line:
@@ -113,7 +125,7 @@ def heads(text: str, buses: Buses = NO_BUSES) -> Heads:
             if len(fields) < 3 or any(definition_of(field.text) for field in fields[:2]):
                 begin = " ".join(field.text for field in fields[:3])
                 what = f"{show_value(begin)} is not bus, 'model' and id"
-                faults.append(DynamicsFault(line, what))
+                faults.append(_unread(line, what, fields))
             continue  # of a line or a device: their records begin otherwise
         place = _by_number(fields[0], buses)
         bus, name, machine_id = place.text, fields[1].text, fields[2].text
@@ -124,7 +136,7 @@ def heads(text: str, buses: Buses = NO_BUSES) -> Heads:
             label = in_comment(name).upper()
             known = buses[int(bus)].name.strip() if int(bus) in buses else ""
             if definition is None:
-                faults += _swallowed(label, data[1:])
+                faults += _swallowed(label, data)
             head = Head(int(bus), label, machine_id, line, data, definition)
             found.append(head._replace(bus_name=known))
         elif definition is not None:
@@ -146,10 +158,10 @@ def _of_user(
 
 def _swallowed(name: str, data: tuple[Field, ...]) -> Iterator[DynamicsFault]:
     """Find a record within another, whose '/' is missing; it may stand on the same line."""
-    for field in data:
+    for before, field in pairwise(data):
         if field.text[:1].isalpha() and definition_of(field.text):
             what = f"{name}: {show_value(field.text)} among its values: is a '/' missing before?"
-            yield DynamicsFault(field.line, what)
+            yield _unread(field.line, what, (before,))
 
 
 def _by_number(field: Field, buses: Buses) -> Field:

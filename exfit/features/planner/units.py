@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from exfit.errors import DynamicsError
 from exfit.features.planner.buses import NO_BUSES, Bus, Buses, numbers_of
-from exfit.features.planner.fields import DynamicsFault, located, number
+from exfit.features.planner.fields import DynamicsFault, UnreadRecord, located, number
 from exfit.features.planner.pslf import PSLF_FILES
 from exfit.features.planner.psse import PSSE_FILES
 from exfit.features.planner.records import (
@@ -167,7 +167,10 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
             continue
         missing, first = _missing_kinds(own), own[0]
         wrong += _lacking(own, missing)
-        if faults and missing == ["exciter"]:
+        unread = any(
+            not isinstance(fault, UnreadRecord) or fault.bus == first.bus for fault in faults
+        )
+        if unread and missing == ["exciter"]:
             why = "a record that cannot be read may be its exciter"
             wrong.append(DynamicsFault(first.line, why))
         refused.append(
@@ -180,7 +183,7 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
                 or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
                 tuple(sorted(wrong, key=lambda fault: fault.line)),
                 first.bus_name,
-                None if faults else _machine_alone(own),  # what cannot be read may be its exciter
+                None if unread else _machine_alone(own),
             )
         )
     return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical, devices)

@@ -74,7 +74,7 @@ def test_a_record_without_an_end_leaves_the_other_units(damaged):
     assert "has no '/' before the next one" in units.faults[0].text
 
 
-def test_a_record_that_another_holds_is_named_and_may_be_what_a_machine_lacks():
+def test_a_record_that_another_holds_is_named_and_belongs_to_no_other_unit():
     """A converter left out '/' and end of line: the machine of 104 is data of the device."""
     machine = "{} 'GENROU' 1 6 .03 .5 .08 6.4 0 .9 .86 .12 .2 .09 .05 0 0 /\n"
     sound = at_bus(102) + machine.format(105)
@@ -91,8 +91,32 @@ def test_a_record_that_another_holds_is_named_and_may_be_what_a_machine_lacks():
     assert fault.text == "GFORM: 'GENROU' among its values: is a '/' missing before?"
     assert [unit.bus for unit in damaged.units] == [102]
     alone, without_machine = damaged.refused
-    assert (alone.alone, without_machine.bus) == (None, 104)
-    assert alone.faults[-1].text == "a record that cannot be read may be its exciter"
+    assert (alone.alone is None, without_machine.bus) == (False, 104)
+
+
+UNREADABLE = {  # whether it may be the exciter of machine 105
+    "105 'SEXS' 1 .1 10 100\n": True,
+    "105 'SEXS 1 .1 10 100 .1 0 5 /\n": True,
+    "1O5 'SEXS' 1 .1 10 100\n": True,
+    "'NORTH' 'SEXS' 1 .1 10 100\n": True,
+    "106 'SEXS' 1 .1 10 100\n": False,
+    "#---- machines -----\n": False,
+    "<<<<<<< HEAD\n": False,
+}
+
+
+@pytest.mark.parametrize(("record", "doubtful"), UNREADABLE.items())
+def test_a_machine_without_an_exciter_is_alone_unless_an_unreadable_record_may_be_it(
+    record, doubtful
+):
+    machine = "105 'GENROU' 1 6 .03 .5 .08 6.4 0 .9 .86 .12 .2 .09 .05 0 0 /\n"
+    units = read_units(f"{machine}{record}{at_bus(102)}", "f")
+    assert [unit.bus for unit in units.units] == [102]
+    assert units.faults
+    (alone,) = units.refused
+    assert (alone.alone is None) == doubtful
+    why = "a record that cannot be read may be its exciter"
+    assert (alone.faults[-1].text == why) == doubtful
 
 
 FOREIGN = (
