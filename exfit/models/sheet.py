@@ -47,6 +47,7 @@ LIMIT = ("pu", (-9999.0, 9999.0))
 WITHIN_10, WITHIN_1000 = ("pu", (-10.0, 10.0)), ("pu", (-1000.0, 1000.0))
 WITHIN_10000 = ("pu", (-10000.0, 10000.0))
 UP_TO_10, UP_TO_100 = ("pu", (0.0, 10.0)), ("pu", (0.0, 100.0))
+UP_TO_1000 = ("pu", (0.0, 1000.0))
 UP_TO_1000, UP_TO_10000 = ("pu", (0.0, 1000.0)), ("pu", (0.0, 10000.0))
 GAIN, PID_GAIN = ("pu", (0.01, 100000.0)), ("pu", (0.0, 100000.0))
 INTEGRAL_GAIN = ("pu/s", (0.0, 100000.0))
@@ -175,7 +176,7 @@ SHARED = (
     *table(
         ("TR", "s", (0.0, 1.0), "voltage transducer lag"),
         ("KA", *GAIN, "regulator gain", FREE),
-        ("TA", *SHORT_TIME, "regulator time constant", REGULATOR_LAG),
+        ("TA", *TIME, "regulator time constant", REGULATOR_LAG),
         ("TB", *TIME, "regulator lag"),
         ("TC", *TIME, "regulator lead"),
         ("VRMAX", *LIMIT, "regulator ceiling"),
@@ -185,9 +186,9 @@ SHARED = (
         ("KF", *UP_TO_10, "stabilising feedback gain", FEEDBACK),
         ("TF", *POSITIVE_TIME, "stabilising feedback time constant", LAG_OF_KF),
         ("E1", *UP_TO_100, "first voltage of the saturation curve"),
-        ("SE1", *UP_TO_100, "saturation at E1"),
+        ("SE1", *UP_TO_1000, "saturation at E1"),
         ("E2", *UP_TO_100, "second voltage of the saturation curve"),
-        ("SE2", *UP_TO_100, "saturation at E2"),
+        ("SE2", *UP_TO_1000, "saturation at E2"),
         ("KC", *UP_TO_100, "rectifier loading factor"),
         ("KD", *UP_TO_100, "demagnetising factor", DEMAGNETISING),
         ("VEMIN", *LIMIT, "floor of the exciter voltage"),

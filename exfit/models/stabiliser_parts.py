@@ -4,7 +4,6 @@ from functools import partial
 
 from exfit.models.blocks import Signal, clip, high_pass, lag, lead_lag, limited, where
 from exfit.models.sheet import (
-    DIVIDING_TIME,
     LONG_TIME,
     MOST_LAGS,
     TIME,
@@ -46,9 +45,9 @@ ACCELERATING = sheet(
     ("KS2", 0.99, *WITHIN_1000, "gain of the second input"),
     ("KS3", 1.0, *WITHIN_1000, "share of the second input that is filtered"),
     ("T8", 0.5, *TIME, "lead of the ramp tracking filter"),
-    ("T9", 0.1, *DIVIDING_TIME, "lag of the ramp tracking filter"),
-    ("M", 5.0, "1", (1.0, 5.0), "number of lags of a block of the ramp tracking filter"),
-    ("N", 1.0, "1", (1.0, 4.0), "number of blocks of the ramp tracking filter"),
+    ("T9", 0.1, *TIME, "lag of the ramp tracking filter"),
+    ("M", 5.0, "1", (0.0, 8.0), "number of lags of a block of the ramp tracking filter"),
+    ("N", 1.0, "1", (0.0, 8.0), "number of blocks of the ramp tracking filter"),
 )
 
 

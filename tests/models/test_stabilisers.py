@@ -367,8 +367,26 @@ def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(stabiliser):
             for T in (0.0, SHORTEST, 2.0 * SHORTEST)
         )
         # a T + b T^2 + ...: the small ones tell a; 2 (2 pi 10 Hz SHORTEST)^2 = 8e-5 remains, times
-        # ten where a lead keeps its ratio to the lag
-        assert np.abs(2.0 * small - twice - none).max() < 1e-3 * np.abs(none).max(), row.symbol
+        # ten where a lead keeps its ratio to the lag; of T9 there are M N lags
+        lags = values["M"] * values["N"] if row.symbol == "T9" else 1.0
+        remains = 1e-3 * lags * np.abs(none).max()
+        assert np.abs(2.0 * small - twice - none).max() < remains, row.symbol
+
+
+@pytest.mark.parametrize("name", ["PSS2B", "PSS2C", "PSSSB", "PSS7C"])
+def test_a_ramp_tracking_filter_without_order_or_lag_is_bypassed(name):
+    """What is filtered and what is not of the second input cancel then, with KS3 = 1."""
+    model = STABILISERS[name]
+    values = lively(model) | {"KS3": 1.0}
+    bypassed = [
+        frequency_response(model, values | zero | {"KS2": KS2})
+        for zero in ({"M": 0.0}, {"N": 0.0}, {"T9": 0.0})
+        for KS2 in (0.1, 0.9)
+    ]
+    for other in bypassed[1:]:
+        np.testing.assert_allclose(other, bypassed[0], rtol=0.0, atol=1e-9)
+    filtered = frequency_response(model, values | {"KS2": 0.9})
+    assert np.abs(filtered - bypassed[0]).max() > 0.1 * np.abs(bypassed[0]).max()
 
 
 def test_a_washout_that_zero_leaves_out_is_the_limit_of_a_long_one(stabiliser):

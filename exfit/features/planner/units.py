@@ -1,5 +1,6 @@
 """The units of a dynamics file: machine, exciter, stabiliser, governor, and what is left out."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -63,6 +64,12 @@ OTHERS: Mapping[str, str] = {
 Driven = Mapping[tuple[str, str], Head]
 SECOND = ("JBUS", "M")  # of a record of IEEEG1: bus and id of a machine beside its own
 COMPENSATION = "IEEEVC"  # |vt + (Rc + jXc) it|
+# those of PSS/E that exfit lacks: a name like theirs is no typing error
+WITHOUT_MODEL = re.compile("BUDCZT|CELIN|EMAC1T|EX2000|EXBAS|IEEET5|IEEX2A|IEET1[AB]")
+LOAD = re.compile(  # its id is another's than that of a machine at its bus
+    r"(ACMT|CIM[56W]|CLOD|CMLD|DLSH|EXTL|IEEL|LDFR|LDS[3HT]|LVS[3HT])(BL|OW|ZN|AR|AL)(U\d)?"
+    r"|[ABWZ]LWSCC|CMPLDW|LSDT\d|LVSH\d?"
+)
 CLASSICAL = {"GENCLS": "a constant voltage behind a reactance, with nothing to verify"}
 
 
@@ -153,7 +160,8 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
     heads, faults = format_of(file).heads(text, buses)
     driven = _driven(heads)
     units, refused, classical = list[Unit](), list[RefusedUnit](), 0
-    devices = Counter[str]()
+    loads = {(head.bus, head.id, head.name) for head in heads if _is_load(head)}
+    devices = Counter(name for _, _, name in loads)
     for own in _by_unit(heads).values():
         if _all_classical(own):
             classical += 1
@@ -204,11 +212,12 @@ def read_unit(
     """
     files = format_of(file)
     heads, unread = files.heads(text, buses)
-    if not heads:
+    by_unit = _by_unit(heads)
+    if not by_unit:
         none = f"{file}: has no record of a unit: {files.begins}"
         raise DynamicsError([*located(unread, file), none])
     try:
-        chosen = _chosen(_by_unit(heads), file, bus, machine_id)
+        chosen = _chosen(by_unit, file, bus, machine_id)
     except DynamicsError as fault:
         raise DynamicsError([*located(unread, file), *fault.faults]) from None
     unit, faults = _unit_of(chosen, _driven(heads))
@@ -221,9 +230,11 @@ def read_unit(
 
 
 def _by_unit(heads: Iterable[Head]) -> dict[tuple[int, str], list[Head]]:
-    """Return the records of each unit by its bus and its id in capitals."""
+    """Return the records of each unit by its bus and its id in capitals, without those of loads."""
     units: dict[tuple[int, str], list[Head]] = {}
     for head in heads:
+        if _is_load(head):
+            continue
         units.setdefault((head.bus, head.id.upper()), []).append(head)
     return units
 
@@ -511,6 +522,10 @@ def _is_machine(name: str) -> bool:
     return name.upper().startswith("GEN") and name.upper() not in CLASSICAL
 
 
+def _is_load(head: Head) -> bool:
+    return head.definition is None and LOAD.fullmatch(head.name.upper()) is not None
+
+
 def _is_device(heads: Sequence[Head]) -> bool:
     """Whether no record at a place is of a machine or of a model of exfit, nor nearly so named."""
     return all(
@@ -555,6 +570,8 @@ def _names_of(kind: str, program: str) -> tuple[str, ...]:
 @cache
 def _meant(name: str, program: str) -> str | None:
     """Return the machine or exciter whose name is nearly this one, if one is."""
+    if WITHOUT_MODEL.fullmatch(name.upper()):
+        return None
     names = [known for kind in NEEDED for known in _names_of(kind, program)]
     return closest(name, names, NEARLY_THE_NAME)
 

@@ -52,9 +52,9 @@ def pss2b(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     The first input is the speed, the second the electrical power (KS2 = T7 / 2H).
     TW2 = 0 and TW4 = 0 leave out their washouts; T6, T7, T2, T4 or T11 = 0 bypass
     their blocks. The ramp tracking filter is N of the blocks that are drawn; M and
-    N are whole numbers, M N at most 8. With T10 = T11 = 0 and input limits out of
-    reach this is PSS2A, whose record has no such rows: it is read as PSS2B with
-    these values.
+    N are whole numbers, M N at most 8; T9, M or N = 0 bypass it, as in files of
+    planners. With T10 = T11 = 0 and input limits out of reach this is PSS2A, whose
+    record has no such rows: it is read as PSS2B with these values.
     """
     v10 = shaped(accelerating(s, u, p, d), s, p, d)
     return clip(v10, p.VSTMIN, p.VSTMAX)

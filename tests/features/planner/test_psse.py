@@ -399,7 +399,7 @@ def test_a_record_that_multiplies_by_the_speed_makes_a_case_that_does():
 
 
 def test_a_long_list_of_units_is_cut():
-    many = "".join(f"{bus} IEELBL 1 0 /\n" for bus in range(1, 101))
+    many = "".join(f"{bus} WT9G1 1 0 /\n" for bus in range(1, 101))
     faults = fault_of(many)
     assert len(faults) == 22
     assert "80 more" in faults[-1]

@@ -122,7 +122,8 @@ def test_a_machine_without_an_exciter_is_alone_unless_an_unreadable_record_may_b
 FOREIGN = (
     "{bus} 'WEHGOV' 1 0 0 0.05 /\n", "{bus} 'USRMDL' 1 'HYG3' 5 0 0 1 2*3.5 /\n",
     "{bus} TGOV1 1 x y /\n", "{bus} 'PSS1A' 1 1 /\n", "{bus} 'UEL1' 1 -9E9 /\n",
-    "{bus} 'OEL9' 1 /\n", "{bus} IEELBL 1 1 0 /\n", "{bus} TGOV1 1 .05 .5 1 0 3 10 0 /\n",
+    "{bus} 'OEL9' 1 /\n", "{bus} VTGTPA 1 1 0 /\n", "{bus} IEELBL 1 1 0 /\n",
+    "{bus} TGOV1 1 .05 .5 1 0 3 10 0 /\n",
 )  # fmt: skip
 
 
@@ -137,10 +138,29 @@ def test_no_record_beside_machine_and_exciter_stops_a_unit_and_each_left_out_is_
     assert ([unit.bus for unit in units.units], units.refused) == ([*BUSES], ())
     for unit in units.units:
         assert unit.governor.values["R"] == 0.05
-        assert {*unit.unknown} == {"WEHGOV", "USRMDL HYG3", "OEL9", "IEELBL"}
+        assert {*unit.unknown} == {"WEHGOV", "USRMDL HYG3", "OEL9", "VTGTPA"}
         left = [warning.text for warning in unit.warnings if "is left out" in warning.text]
-        names = ("WEHGOV", "USRMDL HYG3", "OEL9", "IEELBL", "TGOV1", "PSS1A", "UEL1")
+        names = ("WEHGOV", "USRMDL HYG3", "OEL9", "VTGTPA", "TGOV1", "PSS1A", "UEL1")
         assert [sum(name in words for words in left) for name in names] == [1] * len(names)
+
+
+LOADS = "LDSHBL LVSHBL IEELAR CIM5BL CIM6OW CLODZN CMLDBLU2 ACMTBLU1 EXTLAL LDFRBL DLSHBL"
+
+
+@pytest.mark.parametrize("load", LOADS.split())
+def test_the_record_of_a_load_is_of_no_machine_whose_id_it_has(load):
+    machine = "105 'GENROU' 1 6 .03 .5 .08 6.4 0 .9 .86 .12 .2 .09 .05 0 0 /\n"
+    units = read_units(f"{machine}105 '{load}' 1 .1 2 /\n106 '{load}' 1 .1 2 /\n", "f")
+    assert units.refused[0].alone is not None
+    assert (len(units.refused), units.devices) == (1, {load: 2})
+    with pytest.raises(DynamicsError, match="f: has no record of a unit"):
+        read_unit(f"106 '{load}' 1 .1 2 /\n", "f")
+
+
+def test_a_model_of_the_program_is_no_typing_error_of_another():
+    text = at_bus(102).replace("ESAC1A", "IEET1B") + at_bus(103).replace("ESAC1A", "ESAC1B")
+    texts = [[fault.text for fault in each.faults] for each in read_units(text, "f").refused]
+    assert ["did you mean" in " ".join(each) for each in texts] == [False, True]
 
 
 def test_a_unit_with_an_unknown_machine_or_exciter_is_refused_by_that_record():
